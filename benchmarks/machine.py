@@ -58,3 +58,13 @@ def peak_memory() -> float:
     """Return the most that this process has held since `memory_now`, or since its start where that cannot be told."""
     peak = _field(str(STATUS), r"VmHWM:\s*(\d+)")
     return int(peak or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) / 2**10
+
+
+def own_memory() -> float:
+    """Return the memory that this process holds without pages of files, in MiB."""
+    return int(_field(str(STATUS), r"RssAnon:\s*(\d+)") or 0) / 2**10
+
+
+def file_memory() -> float:
+    """Return the pages of files that this process has mapped and that are in memory, in MiB."""
+    return int(_field(str(STATUS), r"RssFile:\s*(\d+)") or 0) / 2**10

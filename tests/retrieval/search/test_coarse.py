@@ -64,6 +64,31 @@ def test_rows_are_read_again_and_completed(tmp_path, monkeypatch):
     assert not now.numbers.flags.writeable
 
 
+def test_few_changes_leave_the_file_as_it_is(tmp_path):
+    source = make_source(tmp_path, 200)
+    first = coarse_rows(source.chosen(range(190)), RECIPE)
+    (path,) = tmp_path.iterdir()
+    written = path.read_bytes()
+    places = [*range(3), 195, 193, *range(3, 8), *range(10, 190)]  # two new, two removed
+    changed = source.chosen(places)
+    for before in (None, first):
+        now = coarse_rows(changed, RECIPE, before)
+        assert path.read_bytes() == written
+        assert (len(now.numbers), len(now.added), len(now.rows)) == (190, 2, 190)
+        assert now.checksums[now.rows].tolist() == changed.row_checksums.tolist()
+        for query in mixtures(2, 3)[:, 0]:
+            expected = patch_distances(query, changed.codes[:, 0])
+            assert now.scores(query) == pytest.approx(expected, abs=0.02)
+            some = np.array([0, 3, 4, 100])
+            assert now.scores_at(query, some).tolist() == now.scores(query)[some].tolist()
+    assert now.numbers is first.numbers
+    later = coarse_rows(source, RECIPE, now)  # all ten are there again, and eight of them are new
+    assert (len(later.numbers), len(later.added)) == (190, 10)
+    most = coarse_rows(source.chosen(range(170)), RECIPE, later)
+    assert path.read_bytes() != written
+    assert (len(most.numbers), len(most.added)) == (170, 0)
+
+
 def test_axes_are_fitted_again_when_an_index_has_grown(tmp_path):
     source = make_source(tmp_path, 60)
     few = coarse_rows(source.chosen(range(10)), RECIPE)

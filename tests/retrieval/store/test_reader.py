@@ -1,6 +1,10 @@
 """One state for many queries and threads; filters."""
 
+import sqlite3
 import threading
+import warnings
+from contextlib import closing, suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +12,7 @@ from describers import RECIPE, descriptor
 
 import eigenshape as es
 from eigenshape.retrieval import DescribedShape
+from eigenshape.retrieval.store import snapshot
 
 
 @pytest.fixture
@@ -104,6 +109,19 @@ def test_a_reader_keeps_its_state_until_it_is_refreshed(index):
         reader.query(descriptor(1))
 
 
+def check_refreshed(index, old):
+    with index.reader() as new:
+        for name in ("texts", "ids", "ends", "pictures"):
+            assert np.array_equal(getattr(old.state.shapes, name), getattr(new.state.shapes, name))
+        assert np.array_equal(old.state.descriptors, new.state.descriptors)
+        labels = [
+            [r.state.shapes.labels[c] for c in r.state.shapes.label_codes] for r in (old, new)
+        ]
+        assert labels[0] == labels[1]
+        for reader in (old, new):
+            assert reader.query(descriptor(5), n_matches=1)[0].name == "s5"
+
+
 def test_a_refreshed_reader_is_as_a_new_one(index):
     with index.reader() as old:
         for seed in range(20, 30):
@@ -111,12 +129,44 @@ def test_a_refreshed_reader_is_as_a_new_one(index):
             if seed % 4 == 0:
                 index.remove(f"t{seed}")
             old.refresh()
-            with index.reader() as new:
-                assert old.state.shapes.texts == new.state.shapes.texts
-                assert np.array_equal(old.state.shapes.ends, new.state.shapes.ends)
-                assert np.array_equal(old.state.descriptors, new.state.descriptors)
-                for reader in (old, new):
-                    assert reader.query(descriptor(5), n_matches=1)[0].name == "s5"
+            check_refreshed(index, old)
+
+
+def test_a_refresh_reads_what_was_changed_alone(index, monkeypatch):
+    def change(number):
+        if number == 0:
+            index.remove("s0", "s3", "s9")
+        if number == 1:  # one is changed that was there, one is new, one comes and goes
+            index.update([replace(index.records()[0], label="other", tags=("new",))])
+            index.add_descriptors("t1", [descriptor(51)], digest="1")
+            index.add_descriptors("t2", [descriptor(52)])
+            index.remove("t2")
+        if number == 2:  # one gains a recipe, another is replaced
+            other = replace(RECIPE, name="other")
+            index.add_descriptors("t1", [descriptor(51, other)], digest="1")
+            new = DescribedShape("s1", [descriptor(61), descriptor(62)], digest="2", label="new")
+            index.add_many([new], replace=True)
+        if number == 3:
+            index.remove(*(record.name for record in index.records() if record.name != "s5"))
+
+    read_all = snapshot._all_rows
+    for number in range(4):
+        with index.reader() as reader:
+            change(number)
+            monkeypatch.setattr(snapshot, "_all_rows", lambda *_: pytest.fail("all was read"))
+            assert reader.refresh()
+            monkeypatch.setattr(snapshot, "_all_rows", read_all)
+            check_refreshed(index, reader)
+
+
+def test_a_refresh_reads_all_if_the_list_of_changes_is_damaged(index):
+    with index.reader() as reader:
+        index.remove("s0", "s3")
+        with closing(sqlite3.connect(index.folder / "index.sqlite")) as database:
+            database.execute("UPDATE touched SET shape = 2 WHERE id = 2")
+            database.commit()
+        assert reader.refresh()
+        check_refreshed(index, reader)
 
 
 def test_many_threads_see_whole_states_alone(index):
@@ -158,20 +208,63 @@ def test_many_threads_see_whole_states_alone(index):
 
 def test_a_snapshot_gives_what_search_needs(index):
     with index.reader() as reader:
-        snapshot = reader.snapshot(RECIPE)
-        assert snapshot.n_shapes == 20  # two views of each
+        found = reader.snapshot(RECIPE)
+        assert found.n_shapes == 20  # two views of each
         place = 7
-        assert np.array_equal(snapshot.rows(place), descriptor(1003).vectors.astype("<f4"))
-        snapshot.verify(place)
-        assert snapshot.details(place) == np.arange(2, dtype="<i8").tobytes()
-        assert snapshot.names([0, 7]) == ["s0", "s3"]
-        assert snapshot.labels([18]) == [None]
-        assert snapshot.sources([0]) == [None]
-        labels = [reader.state.shapes.labels[code] for code in snapshot.label_codes]
-        assert labels == [snapshot.shape(place).label for place in range(20)]
+        for ahead in (False, True):
+            every = found.rows_of(np.arange(20), read_ahead=ahead)
+            assert np.array_equal(every[place], descriptor(1003).vectors.astype("<f4"))
+        assert np.array_equal(found.rows(place), every[place])
+        assert reader.snapshot(RECIPE) is found
+        found.verify(place)
+        assert found.details(place) == np.arange(2, dtype="<i8").tobytes()
+        assert found.names([0, 7]) == ["s0", "s3"]
+        assert found.labels([18]) == [None]
+        assert found.sources([0]) == [None]
+        labels = [reader.state.shapes.labels[code] for code in found.label_codes]
+        assert labels == [found.shape(place).label for place in range(20)]
         chosen = np.arange(10) == 3
-        assert np.flatnonzero(snapshot.mask(chosen)).tolist() == [6, 7]
-        assert snapshot.beside("coarse.bin").parent == index.folder
+        assert np.flatnonzero(found.mask(chosen)).tolist() == [6, 7]
+        assert found.beside("coarse.bin").parent == index.folder
+
+
+def test_one_shape_is_read_without_the_others(index, monkeypatch):
+    picture = es.retrieval.draw_thumbnail(es.make_creature("fish", n_vertices=500))
+    views = [descriptor(71), descriptor(72)]
+    index.add_many([DescribedShape("new", views, thumbnail=picture)])
+    monkeypatch.setattr(snapshot, "_all_rows", lambda *_: pytest.fail("all was read"))
+    found = index.descriptors("new", RECIPE)
+    assert [each.vectors.tolist() for each in found] == [
+        each.vectors.astype("<f4").tolist() for each in views
+    ]
+    assert index.thumbnail("new") == picture
+    assert index.thumbnail("s1") is None
+
+
+@pytest.mark.parametrize("table", ["shape", "descriptor"])
+def test_a_damaged_bit_never_hides_a_descriptor_of_one_shape(index, table):
+    """Flip bits of the indexes of SQLite by which one shape is found."""
+    path = index.folder / "index.sqlite"
+    with closing(sqlite3.connect(path)) as database:
+        (size,) = database.execute("PRAGMA page_size").fetchone()
+        query = "SELECT rootpage FROM sqlite_master WHERE type = 'index' AND tbl_name = ?"
+        (page,) = database.execute(query, (table,)).fetchone()
+    data = path.read_bytes()
+    truth = [each.vectors.tolist() for each in index.descriptors("s4", RECIPE)]
+    start = (page - 1) * size
+    used = start + np.flatnonzero(np.frombuffer(data, np.uint8, size, start))
+    rng, n_alone, n_right = np.random.default_rng(0), 0, 0
+    places = rng.choice(used, min(len(used), 60), replace=False).tolist()
+    for place in places:
+        spoilt = bytearray(data)
+        spoilt[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(spoilt)
+        with warnings.catch_warnings(), suppress(es.StoreError):
+            warnings.simplefilter("ignore")
+            n_alone += snapshot.read_shape(index.folder, "s4") is not None
+            assert [each.vectors.tolist() for each in index.descriptors("s4", RECIPE)] == truth
+            n_right += 1
+    assert 0 < n_alone < n_right
 
 
 def test_a_temporary_index_is_deleted_with_its_last_reference():

@@ -9,6 +9,7 @@ from search_cases import RECIPE, mixtures
 import eigenshape as es
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search import candidates
+from eigenshape.retrieval.store import snapshot
 
 N_SHAPES = 300
 
@@ -94,6 +95,46 @@ def test_an_engine_chooses_what_is_compared(index, points):
         found = reader.query(query, n_matches=1)
         assert found.method == "candidates"
         assert names(found) == names(index.query(query, n_matches=1, exact=True))
+
+
+def test_an_engine_serves_as_long_as_few_shapes_change(index, points):
+    pytest.importorskip("faiss")
+    made = []
+
+    def make(coarse):
+        made.append(coarse)
+        return es.retrieval.FaissEngine(coarse)
+
+    new, *others = described(points, 98, 30)
+    with index.reader(make) as reader:
+        reader.query(new)
+        index.add_many([es.retrieval.DescribedShape("new", [new])])
+        index.remove("shape7")
+        assert reader.refresh()
+        found = reader.query(new)
+        assert (found[0].name, found.method, found.n_shapes) == ("new", "candidates", N_SHAPES)
+        (old,) = described(points, 1, 8)[7:]
+        assert "shape7" not in names(reader.query(old))
+        assert len(made) == 1
+        index.add_many(
+            es.retrieval.DescribedShape(f"new{number}", [each])
+            for number, each in enumerate(others)
+        )
+        assert reader.refresh()
+        assert reader.query(others[3], n_matches=1)[0].name == "new3"
+        assert len(made) == 2
+
+
+def test_candidates_are_read_ahead_and_an_exact_search_reads_on(index, points, monkeypatch):
+    asked, ask_ahead = [], snapshot.ask_ahead
+    monkeypatch.setattr(
+        snapshot, "ask_ahead", lambda *piece: asked.append(piece) or ask_ahead(*piece)
+    )
+    (query,) = described(points, 5, 1)
+    index.query(query)
+    assert len(asked) == 60
+    index.query(query, exact=True)
+    assert len(asked) == 60
 
 
 def test_threads_share_the_scan_of_a_reader(index, points):

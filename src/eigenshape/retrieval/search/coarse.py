@@ -27,6 +27,9 @@ N_TO_FIT = 2000
 SHAPES_AT_ONCE = 1000  # whose codes are unpacked at a time: 46 MB as floats
 # Axes are fitted again once an index has this many times as many shapes as they were fitted to.
 GROWTH = 4
+# Rows that the file may lack, or hold of shapes that were removed, as a share of all. They are made
+# at each opening, 0.2 ms a shape; writing the file anew takes as long as making a tenth of it.
+MOST_CHANGED = 0.05
 FORMAT = "eigenshape coarse rows 1"
 
 
@@ -56,17 +59,24 @@ class CoarseRows:
     Attributes
     ----------
     axes : PatchAxes
-    checksums : (n,) int64
-        Of the packed rows that each row is made from.
-    numbers : (n, s, q) int8
-        Mapped into memory, if they come from a file.
+    checksums : (m,) int64
+        Of the packed rows that each short row is made from.
+    numbers : (k, s, q) int8
+        The rows of the file, mapped into memory.
+    added : (m - k, s, q) int8
+        Rows of shapes that were added since the file was written.
+    rows : (n,) int64
+        The row of each shape: one of the file or, from number k on, one that was added. Rows of
+        shapes that were removed belong to none.
     n_fitted : int
         How many shapes there were when the axes were fitted.
     """
 
     axes: PatchAxes
-    checksums: Int64[np.ndarray, " n"]
-    numbers: Int8[np.ndarray, "n s q"]
+    checksums: Int64[np.ndarray, " m"]
+    numbers: Int8[np.ndarray, "k s q"]
+    added: Int8[np.ndarray, "a s q"]
+    rows: Int64[np.ndarray, " n"]
     n_fitted: int
 
     __repr__ = short_repr
@@ -75,29 +85,59 @@ class CoarseRows:
     def scores(self, codes: Int8[np.ndarray, "b s v"]) -> Float32[np.ndarray, " n"]:
         """Return distances of a query to all whole shapes, as far as the axes show them."""
         query, unit = self.axes.coarse_query(codes)
-        found = np.empty(len(self.numbers), dtype=np.float32)
-        scan(query, self.numbers, unit, SIZE_PRICE, found)
+        found = np.empty(len(self.checksums), dtype=np.float32)
+        scan(query, self.numbers, unit, SIZE_PRICE, found[: len(self.numbers)])
+        scan(query, self.added, unit, SIZE_PRICE, found[len(self.numbers) :])
+        return found[self.rows]
+
+    def scores_at(
+        self, codes: Int8[np.ndarray, "b s v"], places: Int[np.ndarray, " k"]
+    ) -> Float32[np.ndarray, " k"]:
+        """Return `scores` of some shapes."""
+        query, unit = self.axes.coarse_query(codes)
+        found = np.empty(len(places), dtype=np.float32)
+        scan(query, self.numbers_at(places), unit, SIZE_PRICE, found)
+        return found
+
+    def numbers_at(self, places: Int[np.ndarray, " k"]) -> Int8[np.ndarray, "k s q"]:
+        """Return the rows of some shapes."""
+        rows, n_kept = self.rows[places], len(self.numbers)
+        found = np.empty((len(rows), *self.numbers.shape[1:]), dtype=np.int8)
+        is_added = rows >= n_kept
+        found[~is_added] = self.numbers[rows[~is_added]]
+        found[is_added] = self.added[rows[is_added] - n_kept]
         return found
 
 
-def coarse_rows(source: Rows, recipe: PatchRecipe) -> CoarseRows:
+def coarse_rows(source: Rows, recipe: PatchRecipe, before: CoarseRows | None = None) -> CoarseRows:
     """Return the short rows of an index: as they were kept, with what is missing made now.
 
     They are kept in a file beside the index. What was kept serves shapes whose checksums are the
     same, so adding shapes makes their rows alone. A file that is damaged, or cannot be written,
     costs time and changes no answer.
+
+    Parameters
+    ----------
+    source : Rows
+    recipe : PatchRecipe
+    before : CoarseRows, optional
+        Of an earlier state of the index, in place of the file.
     """
     path = source.beside(f"coarse-{recipe.codebook.digest[:16]}-{recipe.clip!r}.bin")
     wanted = np.asarray(source.row_checksums, dtype=np.int64)
-    kept = _read(path)
-    if kept is not None and np.array_equal(kept.checksums, wanted):
-        return kept
-    if kept is not None and len(wanted) <= GROWTH * kept.n_fitted:
-        made = _completed(source, recipe, kept, wanted)
-    else:
+    kept = before or _read(path)
+    if kept is None or len(wanted) > GROWTH * kept.n_fitted:
         axes = fit_axes(_codes(source, recipe, _spread(len(wanted), N_TO_FIT)))
-        known = CoarseRows(axes, np.empty(0, np.int64), _no_rows(recipe, axes), len(wanted))
-        made = _completed(source, recipe, known, wanted)
+        nothing = _no_rows(recipe, axes)
+        kept = _in_order(axes, np.empty(0, np.int64), nothing, len(wanted))
+    found = _completed(source, recipe, kept, wanted)
+    few = MOST_CHANGED * len(wanted)
+    if len(found.added) <= few and len(found.checksums) - len(wanted) <= few:
+        return found
+    # No copy is made to freeze these: at a million shapes it takes 1.2 GB.
+    numbers = found.numbers_at(np.arange(len(wanted)))
+    numbers.flags.writeable = False
+    made = _in_order(found.axes, freeze(wanted), numbers, found.n_fitted)
     # A folder that cannot be written to, as on a read-only disk, is searched all the same.
     with suppress(OSError):
         _write(path, made)
@@ -105,24 +145,41 @@ def coarse_rows(source: Rows, recipe: PatchRecipe) -> CoarseRows:
     return made
 
 
+def _in_order(
+    axes: PatchAxes,
+    checksums: Int64[np.ndarray, " n"],
+    numbers: Int8[np.ndarray, "n s q"],
+    n_fitted: int,
+) -> CoarseRows:
+    """Return rows of which each belongs to the shape of its number."""
+    rows = freeze(np.arange(len(checksums)))
+    return CoarseRows(axes, checksums, numbers, numbers[:0], rows, n_fitted)
+
+
 def _completed(
     source: Rows, recipe: PatchRecipe, kept: CoarseRows, wanted: Int64[np.ndarray, " n"]
 ) -> CoarseRows:
     """Return rows with the wanted checksums: those that are kept, and the others made now."""
-    numbers = np.empty((len(wanted), *kept.numbers.shape[1:]), dtype=np.int8)
+    if np.array_equal(kept.checksums[kept.rows], wanted):
+        return kept
     order = np.argsort(kept.checksums, kind="stable")
-    places = np.searchsorted(kept.checksums[order], wanted)
-    nearest = order[np.minimum(places, len(order) - 1)] if len(order) else np.zeros_like(places)
+    rows = np.zeros(len(wanted), dtype=np.int64)
     known = np.zeros(len(wanted), dtype=bool)
     if len(order):
-        known = kept.checksums[nearest] == wanted
-    numbers[known] = kept.numbers[nearest[known]]
+        places = np.searchsorted(kept.checksums[order], wanted)
+        rows = order[np.minimum(places, len(order) - 1)]
+        known = kept.checksums[rows] == wanted
     missing = np.flatnonzero(~known)
+    rows[missing] = len(order) + np.arange(len(missing))
+    made = [kept.added]
     for first in range(0, len(missing), SHAPES_AT_ONCE):
         some = missing[first : first + SHAPES_AT_ONCE]
-        numbers[some] = kept.axes.coarse_rows(_codes(source, recipe, some))
-    numbers.flags.writeable = False  # and no copy: at a million shapes it takes 1.2 GB
-    return CoarseRows(kept.axes, freeze(wanted), numbers, kept.n_fitted)
+        made.append(kept.axes.coarse_rows(_codes(source, recipe, some)))
+    added = np.concatenate(made)
+    added.flags.writeable = False
+    checksums = np.concatenate([kept.checksums, wanted[missing]])
+    known_rows = (freeze(checksums), kept.numbers, added, freeze(rows))
+    return CoarseRows(kept.axes, *known_rows, kept.n_fitted)
 
 
 def _codes(
@@ -171,7 +228,7 @@ def _read(path: Path) -> CoarseRows | None:
         numbers = _mapped(file)
         if numbers is None:
             return None
-        rows = CoarseRows(PatchAxes(axes, steps), checksums, numbers, n_fitted)
+        rows = _in_order(PatchAxes(axes, steps), checksums, numbers, n_fitted)
         if _checksum(_parts(rows)) == checksum:
             return rows
     return None

@@ -11,10 +11,8 @@ from jaxtyping import Float32, Int, Int8
 
 from eigenshape._errors import MissingExtraError
 from eigenshape._text import html_repr
-from eigenshape.retrieval.patches.distance import SIZE_PRICE
 from eigenshape.retrieval.search.candidates import Supplier, smallest
 from eigenshape.retrieval.search.coarse import CoarseRows
-from eigenshape.retrieval.search.scan_loops import scan
 
 VECTORS_AT_ONCE = 30_000  # given to an engine at a time: 46 MB as floats
 # Of FAISS: 4-bit product quantization of six numbers each, and lists of vectors that lie together.
@@ -30,7 +28,10 @@ VECTORS_ASKED_FOR = 2
 
 @runtime_checkable
 class Engine(Protocol):
-    """Vectors that are searched by inner products; number k × s + i is size i of shape k."""
+    """Vectors that are searched by inner products.
+
+    Number k × s + i is size i of row k of ``CoarseRows.numbers``.
+    """
 
     def nearest(self, queries: Float32[np.ndarray, "p q"], count: int) -> Int[np.ndarray, "p c"]:
         """Return the numbers of the vectors with the largest products, best first; -1 for none."""
@@ -40,24 +41,25 @@ def supply_from(engine: Engine, coarse: CoarseRows) -> Supplier:
     """Return what supplies candidates from an engine that holds `coarse_vectors`.
 
     Sizes are compared as the scan does it: the least size of the query with all of a shape, and
-    the others with the least size of a shape.
+    the others with the least size of a shape. Shapes that were added since the file of short rows
+    was written are candidates in any case.
     """
-    n_sizes = coarse.numbers.shape[1]
+    n_rows, n_sizes, _ = coarse.numbers.shape
 
     def supplied(codes: Int8[np.ndarray, "b s v"], count: int) -> Int[np.ndarray, " k"]:
         found = engine.nearest(coarse.axes.project_query(codes), VECTORS_ASKED_FOR * count)
         numbers = np.concatenate([found[0], found[1:][found[1:] % n_sizes == 0]])
-        places = np.unique(numbers[numbers >= 0] // n_sizes)
-        query, unit = coarse.axes.coarse_query(codes)
-        scores = np.empty(len(places), dtype=np.float32)
-        scan(query, coarse.numbers[places], unit, SIZE_PRICE, scores)
-        return places[smallest(scores, count)]
+        chosen = np.zeros(len(coarse.checksums), dtype=bool)
+        chosen[numbers[numbers >= 0] // n_sizes] = True
+        chosen[n_rows:] = True
+        places = np.flatnonzero(chosen[coarse.rows])
+        return places[smallest(coarse.scores_at(codes, places), count)]
 
     return supplied
 
 
 def coarse_vectors(coarse: CoarseRows, first: int, last: int) -> Float32[np.ndarray, "c q"]:
-    """Return vectors of the shapes from `first` to `last`, each size one, as an engine holds them."""
+    """Return vectors of the rows from `first` to `last`, each size one, as an engine holds them."""
     steps = coarse.axes.steps.reshape(-1)
     return (coarse.numbers[first:last] * steps).reshape(-1, len(steps))
 

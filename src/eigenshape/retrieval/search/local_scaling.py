@@ -21,14 +21,15 @@ def crowding(coarse: CoarseRows) -> Float32[np.ndarray, " n"]:
 
     The time grows with the square of the number of shapes: 10 s for 10,000.
     """
-    n_shapes = len(coarse.numbers)
+    rows = coarse.numbers_at(np.arange(len(coarse.rows)))
+    n_shapes = len(rows)
     weights = coarse.axes.steps.reshape(-1) ** 2
     scores, means = np.empty(n_shapes, np.float32), np.zeros(n_shapes, np.float32)
-    for place, row in enumerate(coarse.numbers):
+    for place, row in enumerate(rows):
         numbers = row * weights
         scale = LARGEST_OF_QUERY / (float(np.abs(numbers).max()) or 1.0)
         query = np.rint(np.float32(scale) * numbers).astype(np.int16)
-        scan(query, coarse.numbers, 1 / (scale * len(coarse.axes.axes)), SIZE_PRICE, scores)
+        scan(query, rows, 1 / (scale * len(coarse.axes.axes)), SIZE_PRICE, scores)
         scores[place] = np.inf
         nearest = scores[smallest(scores, N_NEAREST)]
         if n_shapes > 1:

@@ -20,12 +20,13 @@ from eigenshape.retrieval.store.damage import Damage
 
 DATABASE = "index.sqlite"
 APPLICATION = 0x65696773  # "eigs", by which SQLite files tell whose they are
-FORMAT = 5  # of the tables and of the files beside the database; raised by every change
+FORMAT = 6  # of the tables and of the files beside the database; raised by every change
 MODULUS = 2**63  # of sums of checksums, so that SQLite stores them as integers
 ROWS_AT_ONCE = 20_000  # rows of a table in memory at a time: 10 MB
 # Errors that a damaged file causes: SQLite quotes bytes of it in messages, which may be no text.
 DAMAGE = (sqlite3.Error, UnicodeError)
-# The number of a row is never used twice: `seal` has the last one of each table.
+# The number of a row is never used twice: `seal` has the last one of each table. `touched` lists the
+# shapes that were removed or replaced, 12 bytes each: a reader reads these alone, not the tables.
 SCHEMA = """
 CREATE TABLE recipe (
     id INTEGER PRIMARY KEY, fields TEXT NOT NULL UNIQUE, n_columns INTEGER NOT NULL,
@@ -52,14 +53,17 @@ CREATE TABLE descriptor (
     checksum INTEGER NOT NULL,
     UNIQUE (shape, recipe, view)
 );
+CREATE TABLE touched (id INTEGER PRIMARY KEY, shape INTEGER NOT NULL);
 CREATE TABLE seal (
     id TEXT PRIMARY KEY, n_rows INTEGER NOT NULL, total INTEGER NOT NULL, last INTEGER NOT NULL,
     checksum INTEGER NOT NULL
 );
 """
-ENCODER = json.JSONEncoder(default=repr)  # the default is for a value whose type was damaged
+# The default is for a value whose type was damaged. Rows are flat: none is inside itself.
+ENCODER = json.JSONEncoder(default=repr, check_circular=False)
 DESCRIPTOR = struct.Struct("<13q")  # the numbers of a row of that table, for its checksum
-CHANGES = "changes"  # the row of `seal` that counts committed changes
+# The row of `seal` that counts committed changes; its last number is that of the table `touched`.
+CHANGES = "changes"
 
 
 class RecipeRow(NamedTuple):
@@ -132,6 +136,13 @@ class Seal(NamedTuple):
     last: int
 
 
+class WholeRows(NamedTuple):
+    """Values of rows that agree with their checksums, and the bytes that these are of."""
+
+    rows: list[Any]
+    texts: list[bytes]
+
+
 TABLES: dict[str, Any] = {
     "recipe": RecipeRow,
     "file": FileRow,
@@ -145,14 +156,19 @@ def row_text(values: tuple[Any, ...]) -> bytes:
     return ENCODER.encode(values).encode()
 
 
+def row_bytes(table: str, values: tuple[Any, ...]) -> bytes:
+    """Return the bytes of a row of a table of which its checksum is."""
+    if table != "descriptor":
+        return row_text(values)
+    try:  # integers alone, and as many as there are shapes: 8 times as fast
+        return DESCRIPTOR.pack(*values)
+    except struct.error:  # the type of a value was damaged
+        return row_text(values)
+
+
 def row_checksum(table: str, values: tuple[Any, ...]) -> int:
     """Return the checksum of the values of a row of a table."""
-    if table == "descriptor":  # integers alone, and as many as there are shapes: 8 times as fast
-        try:
-            return crc32(DESCRIPTOR.pack(*values))
-        except struct.error:  # the type of a value was damaged
-            return -1
-    return crc32(row_text(values))
+    return crc32(row_bytes(table, values))
 
 
 def create_tables(database: sqlite3.Connection) -> None:
@@ -185,7 +201,7 @@ def require_format(place: str, database: sqlite3.Connection) -> None:
         raise StoreError(
             f"{place} must be an index of format {FORMAT}; it is of format {version}, by {age} "
             "version of eigenshape. Index the shapes again, into another folder: `eigenshape "
-            "index NEW_FOLDER MESHES`."
+            "index add NEW_FOLDER MESHES`."
         )
 
 
@@ -219,6 +235,11 @@ class Tally:
         self.n_rows += len(checksums)
         self.total = (self.total + sum(checksums)) % MODULUS
 
+    def discount(self, checksums: list[int]) -> None:
+        """Count rows no more."""
+        self.n_rows -= len(checksums)
+        self.total = (self.total - sum(checksums)) % MODULUS
+
     def agrees(self, seal: Seal) -> bool:
         """Return whether all rows of a seal were counted, and no others."""
         return (self.n_rows, self.total) == (seal.n_rows, seal.total)
@@ -226,7 +247,7 @@ class Tally:
 
 def read_table(
     database: sqlite3.Connection, seal: Seal, damages: list[Damage]
-) -> Iterator[list[Any]]:
+) -> Iterator[WholeRows]:
     """Yield the whole rows of a table, some at a time; damage is appended to a list.
 
     If the table cannot be walked through, or the walk finds too few rows, the missing rows are
@@ -241,38 +262,93 @@ def read_table(
         with closing(database.execute(walk)) as cursor:
             while chunk := cursor.fetchmany(ROWS_AT_ONCE):
                 whole = _whole_rows(table, chunk, found, tally)
-                found.update(row[0] for row in whole)
+                found.update(row[0] for row in whole.rows)
                 yield whole
     except DAMAGE:
         pass  # the rest is salvaged
     if tally.agrees(seal):
         return
-    salvaged = _salvage(database, seal, found, damages)
-    tally.count([checksum for *_, checksum in salvaged])
-    yield [TABLES[table](*row[:-1]) for row in salvaged]
+    yield _whole_rows(table, _salvage(database, seal, found, damages), found, tally)
     if not tally.agrees(seal):
         lost = seal.n_rows - tally.n_rows
         damages.append(Damage(DATABASE, f"{lost} of {seal.n_rows} rows of table {table} are lost"))
 
 
-def read_appended(database: sqlite3.Connection, before: Seal, now: Seal) -> list[Any] | None:
-    """Return the rows that a table gained, or None if it lost or changed any."""
-    table = now.id
-    columns = ", ".join(TABLES[table]._fields)
-    query = f"SELECT {columns}, checksum FROM {table} WHERE id > ?"
-    tally = Tally(before.n_rows, before.total)
-    whole = _whole_rows(table, database.execute(query, (before.last,)).fetchall(), set(), tally)
+def read_changed(
+    database: sqlite3.Connection, before: Seal, now: Seal, touched: list[int], left: list[bytes]
+) -> WholeRows | None:
+    """Return what a table gained, and its rows of some shapes, or None if more has changed.
+
+    Parameters
+    ----------
+    database : Connection
+    before, now : Seal
+        Of the table of shapes, or of descriptors.
+    touched : list of int
+        Shapes that were removed or replaced.
+    left : list of bytes
+        Of the rows of these shapes as they were before.
+    """
+    table, tally = now.id, Tally(before.n_rows, before.total)
+    tally.discount([crc32(text) for text in left])
+    rows = _rows_where(database, table, "id > ?", before.last)
+    shape = "id" if table == "shape" else "shape"
+    for number in touched:
+        rows += _rows_where(database, table, f"{shape} = ? AND id <= ?", number, before.last)
+    whole = _whole_rows(table, rows, set(), tally)
     return whole if tally.agrees(now) else None
 
 
-def _whole_rows(table: str, rows: list[Any], found: set[int], tally: Tally) -> list[Any]:
+def read_touched(database: sqlite3.Connection, before: Seal) -> list[int]:
+    """Return the shapes that were removed or replaced since a seal of all changes."""
+    query = "SELECT DISTINCT shape FROM touched WHERE id > ?"
+    return [shape for (shape,) in database.execute(query, (before.last,))]
+
+
+def read_named(database: sqlite3.Connection, name: str) -> tuple[WholeRows, WholeRows] | None:
+    """Return the row of one shape and those of its descriptors, or None if these are in doubt.
+
+    An index of SQLite finds them, which may silently miss rows, or lead to others, if a bit of it
+    is wrong. A shape of which nothing is found is in doubt, therefore, and so is one with a
+    descriptor beside those that were found: all by one recipe have numbers in a row.
+    """
+    found = _rows_where(database, "shape", "name = ?", name)
+    shapes = _whole_rows("shape", found, set(), Tally())
+    if [row.name for row in shapes.rows] != [name]:
+        return None
+    number = shapes.rows[0].id
+    found = _rows_where(database, "descriptor", "shape = ?", number)
+    descriptors = _whole_rows("descriptor", found, set(), Tally())
+    ids = {row.id for row in descriptors.rows if row.shape == number}
+    if not ids or len(ids) < len(found):
+        return None
+    query = "SELECT shape FROM descriptor NOT INDEXED WHERE id = ?"
+    for beside in {each + step for each in ids for step in (-1, 1)} - ids:
+        if database.execute(query, (beside,)).fetchone() == (number,):
+            return None
+    return shapes, descriptors
+
+
+def _rows_where(
+    database: sqlite3.Connection, table: str, condition: str, *values: Any
+) -> list[Any]:
+    columns = ", ".join(TABLES[table]._fields)
+    query = f"SELECT {columns}, checksum FROM {table} WHERE {condition} ORDER BY id"
+    return database.execute(query, values).fetchall()
+
+
+def _whole_rows(table: str, rows: list[Any], found: set[int], tally: Tally) -> WholeRows:
     """Return the rows that agree with their checksums and were not found before, and count them."""
-    kind = TABLES[table]
-    whole = [
-        row for row in rows if row_checksum(table, row[:-1]) == row[-1] and row[0] not in found
-    ]
-    tally.count([row[-1] for row in whole])
-    return [kind(*row[:-1]) for row in whole]
+    kind, whole, texts, checksums = TABLES[table], [], [], []
+    for row in rows:
+        values, checksum = row[:-1], row[-1]
+        text = row_bytes(table, values)
+        if crc32(text) == checksum and row[0] not in found:
+            whole.append(kind._make(values))
+            texts.append(text)
+            checksums.append(checksum)
+    tally.count(checksums)
+    return WholeRows(whole, texts)
 
 
 def _salvage(

@@ -12,6 +12,7 @@ from eigenshape._errors import StoreError
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.store.catalog import (
     CHANGES,
+    DATABASE,
     MODULUS,
     TABLES,
     FileRow,
@@ -47,6 +48,7 @@ class Change:
     def __init__(self, folder: Path, database: sqlite3.Connection, seals: dict[str, Seal]) -> None:
         self.folder, self.database = folder, database
         self.n_changes = seals[CHANGES].n_rows + 1
+        self._n_touched = seals[CHANGES].last
         self._seals = dict(seals)
         self._touched = False
         self._handles: dict[int, BinaryIO] = {}
@@ -57,7 +59,7 @@ class Change:
         self.files: dict[int, FileRow] = {}
         for table, rows in (("recipe", self.recipe_rows), ("file", self.files)):
             for chunk in read_table(database, seals[table], damages):
-                rows.update((row[0], row) for row in chunk)
+                rows.update((row[0], row) for row in chunk.rows)
         self._recipes = read_recipes(
             str(folder), database, list(self.recipe_rows.values()), damages
         )
@@ -84,6 +86,9 @@ class Change:
         checksums = self.database.execute(f"SELECT checksum {where}", (value,)).fetchall()
         self.database.execute(f"DELETE {where}", (value,))
         self._count(table, -len(checksums), -sum(checksum for (checksum,) in checksums))
+        if table == "shape":
+            self._n_touched += 1
+            self.database.execute("INSERT INTO touched VALUES (?, ?)", (self._n_touched, value))
 
     def _write(self, table: str, row: Any) -> None:
         checksum = row_checksum(table, row)
@@ -101,7 +106,16 @@ class Change:
         """Return the shape of a name, or None if there is none."""
         query = f"SELECT {', '.join(ShapeRow._fields)} FROM shape WHERE name = ?"
         row = self.database.execute(query, (name,)).fetchone()
-        return row and ShapeRow(*row)
+        if row is None:
+            return None
+        found = ShapeRow(*row)
+        if found.name != name:  # a flipped bit in the list of names led to another shape
+            raise StoreError(
+                f"The list of names must lead from {name!r} to its shape; it leads to "
+                f"{found.name!r}. {self.folder / DATABASE} is damaged: merge the index into a new "
+                "one to keep what is whole."
+            )
+        return found
 
     def delete_shape(self, shape: ShapeRow) -> None:
         """Delete a shape and its descriptors; their bytes stay, since readers may need them."""
@@ -205,7 +219,7 @@ class Change:
             return False
         for table in TABLES:
             keep_seal(self.database, self._seals[table])
-        keep_seal(self.database, Seal(CHANGES, self.n_changes, 0, 0))
+        keep_seal(self.database, Seal(CHANGES, self.n_changes, 0, self._n_touched))
         return True
 
     def finish(self) -> None:

@@ -265,7 +265,8 @@ def read_recipes_of(folder: Path) -> dict[int, AnyRecipe]:
     damages: list[Damage] = []
     with reading(folder) as (database, _):
         seals = read_seals(str(folder / DATABASE), database)
-        rows = [row for rows in read_table(database, seals["recipe"], damages) for row in rows]
+        chunks = read_table(database, seals["recipe"], damages)
+        rows = [row for chunk in chunks for row in chunk.rows]
         recipes = read_recipes(str(folder / DATABASE), database, rows, damages)
     warn_of_damage(str(folder), damages)
     return recipes

@@ -18,9 +18,10 @@ from eigenshape.retrieval.store import files as store
 from eigenshape.retrieval.store.catalog import DATABASE, read_seals
 from eigenshape.retrieval.store.damage import warn_of_damage
 from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.kept_tables import open_state
 from eigenshape.retrieval.store.reader import EngineMaker, IndexReader, choose_recipe
 from eigenshape.retrieval.store.records import Matches, Record
-from eigenshape.retrieval.store.snapshot import IndexState, read_state
+from eigenshape.retrieval.store.snapshot import IndexState, read_shape
 from eigenshape.retrieval.store.thumbnails import draw_thumbnail
 from eigenshape.retrieval.store.upkeep import (
     IndexReport,
@@ -163,14 +164,14 @@ class ShapeIndex:
             return read_seals(str(self.folder / DATABASE), database)["shape"].n_rows
 
     def _read(self) -> IndexState:
-        state = read_state(self.folder)
+        state = open_state(self.folder)
         warn_of_damage(str(self.folder), state.damages)
         return state
 
     def reader(self, engine: EngineMaker | None = None) -> IndexReader:
         """Open a reader, which keeps the index in memory for many queries and many threads.
 
-        `query` opens one for each call. A reader takes 0.3 KB of memory a shape; the numbers that
+        `query` opens one for each call. A reader takes 0.4 KB of memory a shape; the numbers that
         are compared are mapped from disk.
 
         Parameters
@@ -525,7 +526,9 @@ class ShapeIndex:
             If the shape has no descriptor by that recipe, or it is damaged.
         """
         require_type(recipe, AnyRecipe, "recipe")
-        state = self._read()
+        state = read_shape(self.folder, name)
+        if state is None or not len(state.entries_by(recipe)):
+            state = self._read()  # which tells what is damaged, or which recipes there are
         snapshot = state.snapshot(recipe)
         shape = state.names.get(name, -1)
         places = (snapshot.shape_of == shape).nonzero()[0].tolist()
@@ -553,7 +556,7 @@ class ShapeIndex:
         StoreError
             If there is no shape of that name, or the picture is damaged.
         """
-        state = self._read()
+        state = read_shape(self.folder, name) or self._read()
         if name not in state.names:
             raise StoreError(f"A shape must be in the index to have a picture; {name!r} is not.")
         return state.thumbnail(state.names[name])

@@ -28,6 +28,7 @@ from eigenshape.retrieval.search.coarse import CoarseRows, coarse_rows
 from eigenshape.retrieval.search.engines import Engine, supply_from
 from eigenshape.retrieval.store.damage import warn_of_damage
 from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.kept_tables import open_state
 from eigenshape.retrieval.store.records import Matches
 from eigenshape.retrieval.store.searching import search_candidates
 from eigenshape.retrieval.store.snapshot import IndexState, Snapshot, read_state
@@ -59,7 +60,7 @@ class IndexReader:
         self._lock = RLock()
         self._engine = engine
         self._scans: dict[PatchRecipe, _Scan] = {}
-        self._state: IndexState | None = read_state(folder)
+        self._state: IndexState | None = open_state(folder)
         warn_of_damage(str(folder), self._state.damages)
 
     def __enter__(self) -> "IndexReader":
@@ -214,11 +215,19 @@ class IndexReader:
         """Return the short rows of a snapshot; they are made or read once a state."""
         with self._lock:
             kept = self._scans.get(recipe)
-            if kept is None or kept.state is not snapshot.state:
-                coarse = coarse_rows(snapshot, recipe)
-                engine = self._engine and supply_from(self._engine(coarse), coarse)
-                kept = self._scans[recipe] = _Scan(snapshot.state, coarse, engine)
-            return kept
+            if kept is not None and kept.state is snapshot.state:
+                return kept
+            if kept is None:
+                coarse, engine = coarse_rows(snapshot, recipe), None
+            else:
+                coarse, engine = coarse_rows(snapshot, recipe, kept.coarse), kept.engine
+            # An engine holds the rows of the file, which stay until many shapes have changed.
+            is_new = kept is None or kept.coarse.numbers is not coarse.numbers
+            if self._engine is not None and is_new:
+                engine = self._engine(coarse)
+            supplier = None if engine is None else supply_from(engine, coarse)
+            found = self._scans[recipe] = _Scan(snapshot.state, coarse, engine, supplier)
+            return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +236,7 @@ class _Scan:
 
     state: IndexState
     coarse: CoarseRows
+    engine: Engine | None
     supplier: Supplier | None
 
 

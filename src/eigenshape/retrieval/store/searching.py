@@ -39,7 +39,9 @@ def search_candidates(
     found: tuple[Match, ...] = ()
     nothing = False
     while len(places):
-        distances = kind.scores(query, [snapshot.rows(place) for place in places.tolist()])
+        # An exact search reads all shapes one after the other in any case.
+        stored = snapshot.rows_of(places, read_ahead=candidates.method != "exact")
+        distances = kind.scores(query, stored)
         try:
             for bad in places[~np.isfinite(distances)].tolist():
                 snapshot.verify(bad)

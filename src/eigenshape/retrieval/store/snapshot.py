@@ -3,8 +3,8 @@
 import json
 import mmap
 import sqlite3
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,23 +17,27 @@ from eigenshape._errors import StoreError
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 from eigenshape.retrieval.store.catalog import (
     CHANGES,
+    DAMAGE,
     DATABASE,
     DescriptorRow,
     FileRow,
     RecipeRow,
     Seal,
     ShapeRow,
-    read_appended,
+    WholeRows,
+    read_changed,
+    read_named,
     read_recipes,
     read_seals,
     read_table,
-    row_text,
+    read_touched,
 )
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.files import reading
 
 # Columns of the table of descriptors, by name
-DESCRIPTORS = np.dtype([(name, np.int64) for name in DescriptorRow._fields])
+DESCRIPTORS = np.dtype([(name, "<i8") for name in DescriptorRow._fields])
+NO_DESCRIPTORS = np.empty(0, DESCRIPTORS)
 # Columns of the table of shapes that say where the picture of each is
 PICTURE = slice(ShapeRow._fields.index("thumbnail_file"), None)
 N_TRIES = 5  # readings of an index whose files are compacted meanwhile
@@ -76,38 +80,61 @@ class Shapes:
 
     def row(self, place: int) -> ShapeRow:
         """Return the row of a shape."""
-        start = int(self.ends[place - 1]) if place else 0
-        return ShapeRow(*json.loads(self.texts[start : self.ends[place]]))
+        return ShapeRow(*json.loads(self._text(place)))
 
-    def extended(self, chunks: Iterator[list[ShapeRow]]) -> "Shapes":
-        """Return the table with more rows, whose numbers are larger."""
+    def extended(self, chunks: Iterable[WholeRows]) -> "Shapes":
+        """Return the table with more rows."""
         codes = {label: code for code, label in enumerate(self.labels)}
-        ids, ends, label_codes, pictures = (
-            [self.ids],
-            [self.ends],
-            [self.label_codes],
-            [self.pictures],
-        )
-        texts = [self.texts]
-        size = len(self.texts)
-        for rows in chunks:
-            parts = [row_text(row) for row in rows]
-            sizes = np.array([len(part) for part in parts], dtype=np.int64)
+        columns = [(self.ids, self.ends, self.label_codes, self.pictures)]
+        texts, size = [self.texts], len(self.texts)
+        for rows, parts in chunks:
+            ends = size + np.cumsum(np.array([len(part) for part in parts], dtype=np.int64))
             texts.append(b"".join(parts))
-            ids.append(np.array([row.id for row in rows], dtype=np.int64))
-            ends.append(size + np.cumsum(sizes))
             size += len(texts[-1])
+            ids = np.array([row.id for row in rows], dtype=np.int64)
             new = [codes.setdefault(row.label, len(codes)) for row in rows]
-            label_codes.append(np.array(new, dtype=np.int32))
             where = np.array([row[PICTURE] for row in rows], dtype=np.int64).reshape(-1, 4)
-            pictures.append(where)
+            columns.append((ids, ends, np.array(new, dtype=np.int32), where))
+        all_ids, all_ends, label_codes, pictures = map(np.concatenate, zip(*columns, strict=True))
         return Shapes(
-            np.concatenate(ids),
+            all_ids, b"".join(texts), all_ends, tuple(codes), label_codes, pictures
+        )._in_order()
+
+    def without(self, ids: list[int]) -> "Shapes":
+        """Return the table without some rows."""
+        return self._rows_at(np.flatnonzero(~np.isin(self.ids, ids)))
+
+    def texts_of(self, ids: list[int]) -> list[bytes]:
+        """Return the rows of some shapes, as far as the table has them, as JSON."""
+        return [self._text(place) for place in np.flatnonzero(np.isin(self.ids, ids)).tolist()]
+
+    def _text(self, place: int) -> bytes:
+        start = int(self.ends[place - 1]) if place else 0
+        return self.texts[start : self.ends[place]]
+
+    def _in_order(self) -> "Shapes":
+        """Return the rows by their numbers: those that were salvaged or replaced come last."""
+        if (np.diff(self.ids) > 0).all():
+            return self
+        return self._rows_at(np.argsort(self.ids))
+
+    def _rows_at(self, places: Int[np.ndarray, " k"]) -> "Shapes":
+        """Return some rows; texts that follow one another are copied at once."""
+        starts = np.concatenate([[0], self.ends[:-1]])
+        breaks = np.flatnonzero(np.diff(places) != 1) + 1
+        texts = [
+            self.texts[starts[run[0]] : self.ends[run[-1]]]
+            for run in np.split(places, breaks)
+            if len(run)
+        ]
+        sizes = (self.ends - starts)[places]
+        return Shapes(
+            self.ids[places],
             b"".join(texts),
-            np.concatenate(ends),
-            tuple(codes),
-            np.concatenate(label_codes),
-            np.concatenate(pictures),
+            np.cumsum(sizes),
+            self.labels,
+            self.label_codes[places],
+            self.pictures[places],
         )
 
 
@@ -139,6 +166,8 @@ class IndexState:
     shapes : Shapes
     descriptors : (d,) structured array
         Columns of the table of descriptors.
+    n_read : int
+        Shapes that were read from the database, or left out, to make this of what was known.
     damages : tuple of Damage
         What was found so far. Numbers of a shape are checked when it is among the best.
     """
@@ -150,6 +179,7 @@ class IndexState:
     maps: dict[int, memoryview]
     shapes: Shapes
     descriptors: np.ndarray
+    n_read: int
     damages: tuple[Damage, ...]
 
     def piece(self, file: int, offset: int, size: int) -> memoryview:
@@ -172,10 +202,20 @@ class IndexState:
         """Return the number of a recipe, or None if it is not stored."""
         return next((number for number, other in self.recipes.items() if other == recipe), None)
 
+    def entries_by(self, recipe: AnyRecipe) -> Int[np.ndarray, " k"]:
+        """Return where the descriptors by a recipe stand in the table."""
+        # No recipe has the number 0.
+        return np.flatnonzero(self.descriptors["recipe"] == (self.recipe_id(recipe) or 0))
+
     @cached_property
     def shape_of(self) -> Int[np.ndarray, " d"]:
         """Return the place of the shape of each descriptor."""
         return np.searchsorted(self.shapes.ids, self.descriptors["shape"])
+
+    @cached_property
+    def _snapshots(self) -> dict[AnyRecipe, "Snapshot"]:
+        """Return those that were asked for: each query needs one, and its arrays are large."""
+        return {}
 
     @cached_property
     def names(self) -> dict[str, int]:
@@ -209,16 +249,18 @@ class IndexState:
         StoreError
             If there are none.
         """
-        number = self.recipe_id(recipe)
-        entries = np.flatnonzero(self.descriptors["recipe"] == (number or 0))
-        if number is None or not len(entries):
+        known = self._snapshots.get(recipe)
+        if known is not None:
+            return known
+        entries = self.entries_by(recipe)
+        if not len(entries):
             used = set(np.unique(self.descriptors["recipe"]).tolist())
             names = sorted(str(other.name) for key, other in self.recipes.items() if key in used)
             raise StoreError(
                 f"An index must hold descriptors of the requested recipe; {self.folder} holds "
                 f"{', '.join(names) or 'no shape'}, and {recipe} was requested."
             )
-        return Snapshot(self, recipe, entries)
+        return self._snapshots.setdefault(recipe, Snapshot(self, recipe, entries))
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +286,10 @@ class Snapshot:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "row_type", kind_of(self.recipe).row_type)
-        object.__setattr__(self, "columns", self.state.descriptors[self.entries])
+        columns = self.state.descriptors
+        if len(self.entries) < len(columns):  # else no copy of 104 bytes a shape
+            columns = columns[self.entries]
+        object.__setattr__(self, "columns", columns)
 
     @property
     def n_shapes(self) -> int:
@@ -270,11 +315,27 @@ class Snapshot:
 
     def rows(self, place: int) -> np.ndarray:
         """Return the (m, q) rows of a place, mapped into memory and not checked."""
-        row = self.columns[place]
-        n_rows, n_columns = int(row["n_rows"]), int(row["n_columns"])
-        whole = self.state.maps[int(row["rows_file"])]
-        count, offset = n_rows * n_columns, int(row["rows_offset"])
-        return np.frombuffer(whole, self.row_type, count, offset).reshape(n_rows, n_columns)
+        return self.rows_of(np.array([place]))[0]
+
+    def rows_of(
+        self, places: Int[np.ndarray, " k"], *, read_ahead: bool = False
+    ) -> list[np.ndarray]:
+        """Return the rows of some places, mapped into memory and not checked.
+
+        With `read_ahead`, the system is told that all of them are needed. Of 1,600 shapes that lie
+        apart in a file, none of them in memory, the rows were there after 0.4 s in place of 20. If
+        they are in memory, it takes 2 microseconds a shape.
+        """
+        names = ("rows_file", "rows_offset", "n_rows", "n_columns")
+        facts = (self.columns[name][places].tolist() for name in names)
+        found = []
+        for file, offset, n_rows, n_columns in zip(*facts, strict=True):
+            whole, count = self.state.maps[file], n_rows * n_columns
+            if read_ahead:
+                ask_ahead(whole, offset, count * self.row_type.itemsize)
+            rows = np.frombuffer(whole, self.row_type, count, offset)
+            found.append(rows.reshape(n_rows, n_columns))
+        return found
 
     def details(self, place: int) -> bytes:
         """Return the details of a place.
@@ -349,8 +410,27 @@ class Snapshot:
         return self.state.folder / name
 
 
-def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
-    """Read an index. Of what was read before, only what was added since is read.
+def ask_ahead(whole: memoryview, offset: int, size: int) -> None:
+    """Tell the system that bytes of a mapped file are needed soon, and do not wait for them."""
+    mapped = whole.obj
+    if size and isinstance(mapped, mmap.mmap) and hasattr(mapped, "madvise"):  # not on Windows
+        start = offset - offset % mmap.PAGESIZE
+        mapped.madvise(mmap.MADV_WILLNEED, start, offset + size - start)
+
+
+def read_state(
+    folder: Path, before: IndexState | None = None, kept: IndexState | None = None
+) -> IndexState:
+    """Read an index.
+
+    Parameters
+    ----------
+    folder : Path
+    before : IndexState, optional
+        Of the same index at an earlier moment: only what has changed since is read. It is returned
+        if nothing has.
+    kept : IndexState, optional
+        As `before`, but its tables and files alone are known.
 
     Raises
     ------
@@ -358,7 +438,7 @@ def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
         If the folder is not an index of this format, or its database cannot be read at all.
     """
     for _ in range(N_TRIES):
-        state = _read_once(folder, before)
+        state = _read_once(folder, before, kept)
         missing = [file for file in state.files.values() if file.id not in state.maps]
         # A file that is missing was compacted since the catalog was read, or is lost.
         if not missing or _n_changes(folder) == state.seals[CHANGES].n_rows:
@@ -371,7 +451,7 @@ def _n_changes(folder: Path) -> int:
         return read_seals(str(folder / DATABASE), database)[CHANGES].n_rows
 
 
-def _read_once(folder: Path, before: IndexState | None) -> IndexState:
+def _read_once(folder: Path, before: IndexState | None, kept: IndexState | None) -> IndexState:
     with reading(folder) as (database, committed):
         seals = read_seals(str(folder / DATABASE), database)
         if before is not None and before.seals == seals:
@@ -379,20 +459,64 @@ def _read_once(folder: Path, before: IndexState | None) -> IndexState:
         damages: list[Damage] = []
         if committed != seals[CHANGES].n_rows:
             damages += _lost_changes(committed, seals[CHANGES].n_rows)
-        rows: list[RecipeRow] = _whole_table(database, seals["recipe"], damages)
-        recipes = read_recipes(str(folder / DATABASE), database, rows, damages)
-        files = {file.id: file for file in _whole_table(database, seals["file"], damages)}
-        tables = _appended(database, before, seals, files) or _all_rows(database, seals, damages)
-    shapes, descriptors = tables
+        recipes, files = _read_short_tables(folder, database, seals, damages)
+        changed = _changed_tables(database, before or kept, seals, files)
+        tables = changed or _all_rows(database, seals, damages)
+    state = IndexState(folder, seals, recipes, files, {}, *tables, ())
+    return _with_files(state, damages, before)
+
+
+def read_shape(folder: Path, name: str) -> IndexState | None:
+    """Read what an index holds of one shape, at a cost that does not grow with the index.
+
+    Returns
+    -------
+    IndexState or None
+        None if there is no such shape or anything is damaged, which reading all of the index tells.
+
+    Raises
+    ------
+    StoreError
+        If the folder is not an index of this format.
+    """
+    damages: list[Damage] = []
+    with reading(folder) as (database, committed):
+        seals = read_seals(str(folder / DATABASE), database)
+        if committed != seals[CHANGES].n_rows:
+            return None
+        try:
+            recipes, files = _read_short_tables(folder, database, seals, damages)
+            found = read_named(database, name)
+        except DAMAGE:
+            return None
+    if found is None:
+        return None
+    tables = NO_SHAPES.extended([found[0]]), _as_columns(found[1]), 1
+    state = _with_files(IndexState(folder, seals, recipes, files, {}, *tables, ()), damages)
+    return None if damages else state
+
+
+def _read_short_tables(
+    folder: Path, database: sqlite3.Connection, seals: dict[str, Seal], damages: list[Damage]
+) -> tuple[dict[int, AnyRecipe], dict[int, FileRow]]:
+    """Return the recipes and the files of an index by their numbers."""
+    rows: list[RecipeRow] = _whole_table(database, seals["recipe"], damages)
+    recipes = read_recipes(str(folder / DATABASE), database, rows, damages)
+    return recipes, {file.id: file for file in _whole_table(database, seals["file"], damages)}
+
+
+def _with_files(
+    state: IndexState, damages: list[Damage], before: IndexState | None = None
+) -> IndexState:
+    """Return a state with its files mapped into memory, and add their damage to a list."""
     maps = {}
-    for file in files.values():
-        mapped = _map(folder, file, before)
+    for file in state.files.values():
+        mapped = _map(state.folder, file, before)
         if mapped is not None:
             maps[file.id] = mapped
         if mapped is None or len(mapped) < file.size:
             damages.append(_torn(file, mapped))
-    state = IndexState(folder, seals, recipes, files, maps, shapes, descriptors, ())
-    return _without_torn(state, damages)
+    return _without_torn(replace(state, maps=maps), damages)
 
 
 def _lost_changes(committed: int, n_changes: int) -> list[Damage]:
@@ -408,52 +532,60 @@ def _lost_changes(committed: int, n_changes: int) -> list[Damage]:
 
 
 def _whole_table(database: sqlite3.Connection, seal: Seal, damages: list[Damage]) -> list[Any]:
-    return [row for rows in read_table(database, seal, damages) for row in rows]
+    return [row for chunk in read_table(database, seal, damages) for row in chunk.rows]
 
 
-def _appended(
+def _changed_tables(
     database: sqlite3.Connection,
     before: IndexState | None,
     seals: dict[str, Seal],
     files: dict[int, FileRow],
-) -> tuple[Shapes, np.ndarray] | None:
-    """Return the tables of before with what was added, or None if something else was changed."""
+) -> tuple[Shapes, np.ndarray, int] | None:
+    """Return the tables of before with what was changed, or None if all must be read."""
     if before is None or before.damages:
         return None
     generations = {file.id: file.generation for file in files.values()}
     if any(file.generation != generations.get(file.id) for file in before.files.values()):
         return None
-    shapes, descriptors = (
-        read_appended(database, before.seals[table], seals[table])
-        for table in ("shape", "descriptor")
-    )
+    try:
+        touched = read_touched(database, before.seals[CHANGES])
+        is_touched = np.isin(before.descriptors["shape"], touched)
+        left = {
+            "shape": before.shapes.texts_of(touched),
+            "descriptor": [row.tobytes() for row in before.descriptors[is_touched]],
+        }
+        shapes, descriptors = (
+            read_changed(database, before.seals[table], seals[table], touched, texts)
+            for table, texts in left.items()
+        )
+    except DAMAGE:
+        return None
     if shapes is None or descriptors is None:
         return None
-    added = _as_columns(descriptors)
-    return before.shapes.extended(iter([shapes])), np.concatenate([before.descriptors, added])
+    kept = before.shapes.without(touched) if touched else before.shapes
+    columns = np.concatenate([before.descriptors[~is_touched], _as_columns(descriptors)])
+    n_read = len(shapes.rows) + len(touched)
+    return kept.extended([shapes]), _by_number(columns), n_read
 
 
 def _all_rows(
     database: sqlite3.Connection, seals: dict[str, Seal], damages: list[Damage]
-) -> tuple[Shapes, np.ndarray]:
-    chunks = read_table(database, seals["shape"], damages)
-    shapes = _in_order(NO_SHAPES.extended(chunks))
+) -> tuple[Shapes, np.ndarray, int]:
+    shapes = NO_SHAPES.extended(read_table(database, seals["shape"], damages))
     parts = [_as_columns(rows) for rows in read_table(database, seals["descriptor"], damages)]
-    descriptors = np.concatenate(parts) if parts else _as_columns([])
-    return shapes, descriptors[np.argsort(descriptors["id"], kind="stable")]
+    descriptors = _by_number(np.concatenate([NO_DESCRIPTORS, *parts]))
+    return shapes, descriptors, len(shapes.ids)
 
 
-def _in_order(shapes: Shapes) -> Shapes:
-    """Return the shapes by their numbers; some that were salvaged come last otherwise."""
-    if (np.diff(shapes.ids) > 0).all():
-        return shapes
-    order = np.argsort(shapes.ids).tolist()
-    return NO_SHAPES.extended(iter([[shapes.row(place) for place in order]]))
+def _as_columns(rows: WholeRows) -> np.ndarray:
+    return np.frombuffer(b"".join(rows.texts), DESCRIPTORS)
 
 
-def _as_columns(rows: list[DescriptorRow]) -> np.ndarray:
-    numbers = np.array(rows, dtype=np.int64).reshape(-1, len(DescriptorRow._fields))
-    return numbers.view(DESCRIPTORS).ravel()
+def _by_number(descriptors: np.ndarray) -> np.ndarray:
+    """Return descriptors by their numbers: those that were salvaged or replaced come last."""
+    if (np.diff(descriptors["id"]) > 0).all():
+        return descriptors
+    return descriptors[np.argsort(descriptors["id"], kind="stable")]
 
 
 def _map(folder: Path, file: FileRow, before: IndexState | None) -> memoryview | None:
@@ -507,5 +639,4 @@ def _without_torn(state: IndexState, damages: list[Damage]) -> IndexState:
             what = "its descriptors cannot be read"
             damages.append(Damage(DATABASE, what, state.shapes.row(place).name))
     rows = rows[usable]
-    known = (state.folder, state.seals, state.recipes, state.files, state.maps, state.shapes)
-    return IndexState(*known, rows, tuple(damages))
+    return replace(state, descriptors=rows, damages=tuple(damages))
