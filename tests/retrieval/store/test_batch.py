@@ -96,6 +96,20 @@ def test_what_is_there_is_not_done_twice(index, tmp_path):
 
 
 @pytest.mark.long
+def test_a_damaged_shape_is_described_anew(index, tmp_path):
+    todo = items(tmp_path, a="1", b="2", c="3")
+    build(index, todo)
+    rows = index.folder / "rows-1.bin"
+    rows.write_bytes(b"?" + rows.read_bytes()[1:])
+    (damage,) = index.verify().damages
+    report = build(index, todo)
+    assert report.added == (damage.shape,)
+    assert len(report.skipped) == 2
+    assert index.verify().damages == ()
+    assert nearest(index, 1).name == "a"
+
+
+@pytest.mark.long
 def test_a_changed_file_replaces_what_it_was(index, tmp_path):
     todo = items(tmp_path, a="1", b="2")
     build(index, todo)
