@@ -27,7 +27,8 @@ from eigenshape._errors import EigenshapeError
 from eigenshape._text import html_repr, repr_of_changes
 
 T = TypeVar("T")
-P, R = TypeVar("P"), TypeVar("R")
+P = TypeVar("P")
+R = TypeVar("R")
 NO_WORKERS = (
     "Worker processes import the script that starts them, and must reach its end; all of them "
     "ended before they took a file. Put what the script does, from its first call of eigenshape "

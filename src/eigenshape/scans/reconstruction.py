@@ -17,7 +17,7 @@ from eigenshape.geometry.repair_report import RepairedMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import submesh, vertex_components
 
-FEWEST_POINTS = 100
+FEWEST_POINTS = 100  # below, a grid as fine as the points has about ten cells a side
 N_NEIGHBORS = 16  # of a point, which determine its plane
 # Width of a cell of the grid, in typical distances between neighboring points. A finer grid keeps
 # thinner limbs, and gives more vertices: at 1.25 about three for each point.
