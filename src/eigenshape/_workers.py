@@ -8,11 +8,12 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -26,6 +27,8 @@ from eigenshape._errors import EigenshapeError
 from eigenshape._text import html_repr, repr_of_changes
 
 T = TypeVar("T")
+P = TypeVar("P")
+R = TypeVar("R")
 NO_WORKERS = (
     "Worker processes import the script that starts them, and must reach its end; all of them "
     "ended before they took a file. Put what the script does, from its first call of eigenshape "
@@ -36,6 +39,8 @@ NO_WORKERS = (
 # Files of one task of an executor. Each task starts a process of its own, which takes about two
 # seconds to load the library: a twentieth of what it takes to describe so many files.
 FILES_A_TASK = 32
+FILES_AHEAD = 4  # files for each worker that wait for it, or whose results wait for us
+TASKS_AHEAD = 1024  # the same for all workers of an executor, in tasks: a task takes some 40 KB
 SECONDS_BETWEEN_LOOKS = 1.0  # after which the process of a task looks whether its worker lives
 
 
@@ -152,18 +157,41 @@ def run_in_workers(
         yield from _run_in_executor(work, items, workers.executor, workers)
         return
     pool = start_pool(workers, max(min(workers.count, len(items)), 1))
+
+    def submit(item: Item) -> "Future[Outcome[T]]":
+        return schedule_work(pool, work, item.path, workers)
+
     try:
-        futures = {schedule_work(pool, work, item.path, workers): item for item in items}
-        for number, future in enumerate(as_completed(futures)):
+        n_ahead = FILES_AHEAD * workers.count
+        for number, (item, future) in enumerate(_as_finished(submit, items, n_ahead, {})):
             if number == 0:
                 _require_started(future)
-            yield futures[future], outcome_of(future, workers)
+            yield item, outcome_of(future, workers)
         pool.close()
     except BaseException:
         pool.stop()
         raise
     finally:
         pool.join()
+
+
+def _as_finished(
+    submit: Callable[[P], "Future[R]"],
+    pieces: Iterable[P],
+    n_ahead: int,
+    futures: "dict[Future[R], P]",
+) -> Iterator[tuple[P, "Future[R]"]]:
+    """Yield pieces of work with their futures as these finish; `futures` holds those that are not.
+
+    Only some pieces are submitted ahead: the results of a million would fill the memory.
+    """
+    left = iter(pieces)
+    futures.update((submit(piece), piece) for piece in islice(left, n_ahead))
+    while futures:
+        for future in wait(futures, return_when=FIRST_COMPLETED).done:
+            piece = futures.pop(future)
+            futures.update((submit(following), following) for following in islice(left, 1))
+            yield piece, future
 
 
 def start_pool(
@@ -320,18 +348,20 @@ def _run_in_executor(
     """Yield items with their outcomes, from tasks of an executor."""
     each = replace(workers, count=1, executor=None)
     tasks: dict[Future[bytes], Sequence[Item]] = {}
+
+    def submit(files: Sequence[Item]) -> "Future[bytes]":
+        return executor.submit(run_apart, pickle.dumps((work, files, each)))
+
+    starts = range(0, len(items), FILES_A_TASK)
+    pieces = (items[start : start + FILES_A_TASK] for start in starts)
     try:
-        for first in range(0, len(items), FILES_A_TASK):
-            files = items[first : first + FILES_A_TASK]
-            order = pickle.dumps((work, files, each))
-            tasks[executor.submit(run_apart, order)] = files
-        for task in as_completed(tasks):
+        for files, task in _as_finished(submit, pieces, TASKS_AHEAD, tasks):
             error = task.exception()
             if error is None:
                 yield from pickle.loads(task.result())
                 continue
             lost: Outcome[T] = Outcome(error=f"its task was lost: {type(error).__name__}: {error}")
-            yield from ((item, lost) for item in tasks[task])
+            yield from ((item, lost) for item in files)
     finally:
         for task in tasks:
             task.cancel()

@@ -243,7 +243,10 @@ def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
             ("features", "{sphere}", "--method", "best"),
             "--method takes scale-free, thesis; it is 'best'",
         ),
-        (("info", "{sphere}", "--repair", "everything"), "--repair takes auto, weld"),
+        (
+            ("info", "{sphere}", "--repair", "everything"),
+            "Names of --repair must be among auto, weld",
+        ),
         (("query", "nowhere", "{sphere}"), "must be an index"),
         (("index", "add", "{folder}/db", "{folder}"), "There must be meshes"),
         (("demo", "--kind", "unicorn"), "--kind takes ant"),

@@ -3,9 +3,11 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import eigenshape as es
 from eigenshape.cli import app
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.heat.features import find_heat_features
@@ -212,6 +214,53 @@ def test_a_folder_and_a_shape_of_the_index_are_queries_too(meshes, index, tmp_pa
     assert "nobody is none of them" in run("query", index, "nobody", code=1).stderr
     only = run_json("query", index, "fish/a", "--filter", "label=bird")["matches"]
     assert {match["label"] for match in only} == {"bird"}
+
+
+def test_clouds_and_frames_become_surfaces_which_is_told(meshes, tmp_path):
+    folder, index = tmp_path / "scans", tmp_path / "index"
+    folder.mkdir()
+    bird, fish = (es.make_creature(kind, n_vertices=1500) for kind in ("bird", "fish"))
+    es.io.write_points(sampled(bird), folder / "bird.xyz")
+    write_frame(fish, folder / "fish.pcd")
+    (folder / "few.xyz").write_text("0 0 0\n1 0 0\n0 1 0\n")
+    report = run_json("index", "add", index, folder, *LIGHT, code=3)
+    assert report["added"] == ["bird", "fish"]
+    ((name, reason),) = report["failed"]
+    assert name == "few"
+    assert "at least 100 points" in reason
+    made = {name: done[0].split()[0] for name, done in report["repaired"]}
+    assert made == {"bird": "reconstruct_surface", "fish": "triangulate_frame"}
+    listed = {record["name"]: record for record in run_json("index", "ls", index)}
+    for name, done in report["repaired"]:
+        assert listed[name]["attributes"]["repairs"] == "; ".join(done)
+    es.write_mesh(bird, tmp_path / "bird.ply")
+    assert run_json("query", index, tmp_path / "bird.ply")["matches"][0]["name"] == "bird"
+    done = run("query", index, folder / "fish.pcd", "-n", 1, "--picture", tmp_path / "fish.png")
+    assert "repair: triangulate_frame joined" in done.stderr
+    assert "fish" in done.stdout
+
+
+def sampled(mesh):
+    points = es.geometry.sample_surface(mesh, 4000, rng=np.random.default_rng(0)).points
+    return es.PointCloud(points)
+
+
+def write_frame(mesh, path):
+    """Write the organized frame of a camera that sees a mesh, from the pixels of a scan."""
+    camera = es.scans.DepthCamera(resolution=96, noise=0, dropout_angle=84.9, dropout=0, n_holes=0)
+    scan = es.scans.simulate_scan(
+        mesh, np.random.default_rng(0), view=[0, 0, 1], camera=camera, all_pieces=True
+    )
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    away = camera.distance * np.linalg.norm(high - low)
+    frame = np.full((96, 96, 3), np.nan)
+    columns, rows = scan.pixels.T
+    frame[rows, columns] = scan.mesh.vertices - (low + high) / 2 - [0, 0, away]
+    path.write_text(
+        "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 96\nHEIGHT 96\n"
+        "POINTS 9216\nDATA ascii\n"
+        + "\n".join(" ".join(map(str, point)) for point in frame.reshape(-1, 3))
+    )
 
 
 def test_queries_that_cannot_be_read_are_named_and_the_others_answered(meshes, index, tmp_path):

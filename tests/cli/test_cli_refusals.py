@@ -78,7 +78,10 @@ def test_a_broken_file_is_named_with_what_is_wrong_in_it(tmp_path, verb):
             ("index", "add", "{folder}/db", "{missing}", "--method", "best"),
             "--method takes patches, scale-free, th",
         ),
-        (("index", "add", "{folder}/db", "{missing}", "--repair", "all"), "'all' is none of them"),
+        (
+            ("index", "add", "{folder}/db", "{missing}", "--repair", "weld,all"),
+            "name 1 is 'all'",
+        ),
     ],
 )
 def test_a_bad_option_is_refused_before_any_file_is_looked_at(tmp_path, arguments, message):

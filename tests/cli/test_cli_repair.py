@@ -82,7 +82,10 @@ def test_without_repairs_it_converts(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--repair", "polish", "-o", "{folder}/b.ply"), "--repair takes "),
+        (
+            ("--repair", "polish", "-o", "{folder}/b.ply"),
+            "Names of --repair must be among auto, weld",
+        ),
         (
             ("--repair", "weld", "-o", "{folder}/b.vtk"),
             "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb; ",

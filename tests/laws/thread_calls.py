@@ -618,6 +618,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_codebook": lambda v: es.retrieval.read_codebook(v.bytes),
     "read_edits": lambda v: es.io.read_edits(v.folder / "edits.json", v.animal),
     "read_mesh": lambda v: es.read_mesh(v.folder / "ball.ply"),
+    "read_surface": lambda v: es.io.read_surface(v.folder / "ball.ply"),
     "read_points": lambda v: es.read_points(v.folder / "cloud.ply"),
     "read_shape": lambda v: es.read_shape(v.folder / "square.mesh"),
     "reconstruct": lambda v: es.spectral.reconstruct(v.many_coefficients, v.many_spectrum),

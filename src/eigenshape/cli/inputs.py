@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.repair_names import CLOUD_REPAIRS, MESH_REPAIRS
+from eigenshape.geometry.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.retrieval.heat.recipe import PRESETS
 
@@ -34,7 +34,8 @@ IndexRepairOption = Annotated[
         help=(
             "Repairs to apply to each mesh first, in this order, separated by commas: "
             f"{', '.join(MESH_REPAIRS)}. auto does what is needed, but fills no hole and "
-            "drops no component; none refuses meshes that need repair. By default auto."
+            "drops no component; none refuses meshes that need repair. Clouds and frames of a "
+            "depth camera become a surface first. By default auto."
         ),
     ),
 ]
@@ -139,13 +140,8 @@ def repair_names(text: str) -> tuple[str, ...]:
     """Split a comma-separated list of repairs. An unknown name is an error before any file is read."""
     if text == NO_REPAIR:
         return ()
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    for name in names:
-        if name not in KNOWN_REPAIRS:
-            raise InvalidParameterError(
-                f"--repair takes {', '.join(KNOWN_REPAIRS)}; {name!r} is none of them."
-            )
-    return names
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    return require_repairs(names, KNOWN_REPAIRS, "Names of --repair")
 
 
 def memory_bytes(gigabytes: float | None) -> float | None:

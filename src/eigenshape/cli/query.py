@@ -72,8 +72,9 @@ def query(
     scan: Annotated[
         str,
         typer.Argument(
-            help="Mesh file to search for, a whole shape or a part of one, in any pose; a folder of "
-            "such files; or the name of a shape of the index."
+            help="File to search for: a mesh, a point cloud or a frame of a depth camera (.pcd), of a "
+            "whole shape or a part of one, in any pose; a folder of such files; or the name of a "
+            "shape of the index."
         ),
     ],
     *,
@@ -184,7 +185,7 @@ def _answer_file(
     n_matches: int,
     repair: str,
 ) -> _Answer:
-    mesh = steps.load_mesh(item.path, repair)
+    mesh = steps.load_surface(item.path, repair)
     began = perf_counter()
     with progress_bar("describe") as progress:
         colored = steps.color_query(mesh, recipe, progress)

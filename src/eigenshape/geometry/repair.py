@@ -5,13 +5,18 @@ from typing import Any, overload
 
 import numpy as np
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_shape
 from eigenshape.geometry.holes import fill_holes
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, SURFACE_REPAIRS
+from eigenshape.geometry.repair_names import (
+    CLOUD_REPAIRS,
+    MESH_REPAIRS,
+    SURFACE_REPAIRS,
+    require_repairs,
+)
 from eigenshape.geometry.repair_report import MeshT, RepairedCloud, RepairedMesh
 from eigenshape.geometry.repair_steps import (
     collapse_needles,
@@ -134,12 +139,7 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
     orient turned 80 faces over
     """
     shape = as_shape(shape)
-    known = names_of_repairs(shape)
-    for index, name in enumerate(names):
-        if name not in known:
-            raise InvalidParameterError(
-                f"Repairs of {shape!r} must be among {', '.join(known)}; name {index} is {name!r}."
-            )
+    names = require_repairs(names, names_of_repairs(shape), f"Repairs of {shape!r}")
     if isinstance(shape, PointCloud):
         done = RepairedCloud(shape, (), np.arange(shape.n_points))
         for _ in names:

@@ -1,5 +1,9 @@
 """The names of repairs. The command line reads them for its help, so this module is light."""
 
+from collections.abc import Sequence
+
+from eigenshape._errors import InvalidParameterError
+
 # Of meshes of any dimension and of surfaces, in the order in which messages and help list them.
 MESH_REPAIRS = (
     "auto",
@@ -15,3 +19,15 @@ MESH_REPAIRS = (
 )
 SURFACE_REPAIRS = ("orient", "largest_component", "fill_holes")  # of surfaces only
 CLOUD_REPAIRS = ("auto", "drop_duplicate_points")
+
+
+def require_repairs(
+    names: Sequence[str], known: Sequence[str] = MESH_REPAIRS, title: str = "Repairs"
+) -> tuple[str, ...]:
+    """Return names of repairs; raise an error if one is not among the known ones."""
+    for number, name in enumerate(names):
+        if name not in known:
+            raise InvalidParameterError(
+                f"{title} must be among {', '.join(known)}; name {number} is {name!r}."
+            )
+    return tuple(names)

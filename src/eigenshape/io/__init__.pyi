@@ -13,3 +13,4 @@ from .parsing import MESH_FORMATS as MESH_FORMATS
 from .shape_files import read_points as read_points
 from .shape_files import read_shape as read_shape
 from .shape_files import write_points as write_points
+from .surfaces import read_surface as read_surface

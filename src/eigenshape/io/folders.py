@@ -1,4 +1,4 @@
-"""Find the meshes of folders, with what is known of them, and index them."""
+"""Find the shapes of folders, with what is known of them, and index them."""
 
 import csv
 import warnings
@@ -14,8 +14,8 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers
-from eigenshape.io.mesh_files import read_mesh
-from eigenshape.io.parsing import MESH_FORMATS
+from eigenshape.io.shape_files import FORMATS
+from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.store.batch import Callback, build_index
 from eigenshape.retrieval.store.damage import StoreWarning
 from eigenshape.retrieval.store.index import ShapeIndex
@@ -29,7 +29,7 @@ def find_items(
     labels: str | Path | None = None,
     part: tuple[Integer, Integer] | None = None,
 ) -> list[Item]:
-    """Find the mesh files of folders and of the folders in them.
+    """Find the files of meshes and of points in folders and in the folders in them.
 
     A shape is named by its path below the given folder, without the suffix of the file unless two
     files differ only in the suffix. Its class is the name of the folder that holds it; a file that
@@ -38,7 +38,7 @@ def find_items(
     Parameters
     ----------
     sources : path, or sequence of paths
-        Folders, and mesh files.
+        Folders, and files of the formats of `read_shape`.
     labels : path, optional
         Table of comma-separated values with a header. The column ``name`` holds names of shapes or
         paths of files below the folder. ``label`` is the class, ``tags`` are separated by
@@ -56,7 +56,7 @@ def find_items(
     Raises
     ------
     InvalidParameterError
-        If two shapes have the same name, there is no mesh, or there is no such part.
+        If two shapes have the same name, there is no file, or there is no such part.
     FileFormatError
         If the table has no column ``name``, or names a shape that is not there.
     OSError
@@ -81,7 +81,7 @@ def find_items(
     items = [item for source in folders for item in _items_of(Path(source))]
     if not items:
         raise InvalidParameterError(
-            f"There must be meshes ({', '.join(MESH_FORMATS)}) to index; "
+            f"There must be meshes or points ({', '.join(FORMATS)}) to index; "
             f"{', '.join(map(str, folders)) or 'an empty list'} holds none."
         )
     items = _different_items(items)
@@ -100,7 +100,9 @@ def index_folder(  # noqa: PLR0913 - one keyword for each choice of a batch
     workers: Workers = Workers(),
     callback: Callback | None = None,
 ) -> ShapeIndex:
-    """Describe all meshes of a folder, and return an index of them.
+    """Describe all shapes of a folder, and return an index of them.
+
+    Point clouds and frames of depth cameras become surfaces, as by `read_surface`.
 
     Parameters
     ----------
@@ -149,7 +151,7 @@ def index_folder(  # noqa: PLR0913 - one keyword for each choice of a batch
     report = build_index(
         index,
         find_items(folder, labels=labels),
-        read_mesh,
+        read_surface,
         learn=True,
         repairs=repairs,
         n_views=n_views,
@@ -171,7 +173,7 @@ def _items_of(source: Path) -> Iterator[Item]:
         source.stat()  # raises OSError for a folder that is misspelled, before anything is described
         yield Item(source.stem, source)
         return
-    paths = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in MESH_FORMATS]
+    paths = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in FORMATS]
     stems = Counter(path.with_suffix("") for path in paths)
     for path in paths:
         named = path if stems[path.with_suffix("")] > 1 else path.with_suffix("")

@@ -85,15 +85,16 @@ def read_mesh(
     data = read_regular(path)
     with naming(path):
         points, simplices = parse_mesh(path, suffix, data, cells)
-        _require_surface(points, simplices)
+        require_surface(points, simplices)
         return TriangleMesh(points, simplices)
 
 
-def _require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
+def require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
+    """Raise an error if simplices are no triangles in R³."""
     if not len(simplices):
         raise FileFormatError(
             f"A mesh file must hold triangles; it holds {len(points)} points and no face. "
-            "read_points reads points."
+            "read_points reads points, and es.io.read_surface makes a surface of them."
         )
     n_corners, dim = simplices.shape[1], points.shape[1]
     if (n_corners, dim) != (3, 3):

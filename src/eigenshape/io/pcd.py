@@ -47,6 +47,24 @@ def parse(data: bytes) -> Float[np.ndarray, "n 3"]:
     )
 
 
+def n_rows(data: bytes) -> int:
+    """Return the rows of a frame of a depth camera, or 1 for points without an order."""
+    lines, _, _ = _split(data)
+    words = {text.split()[0]: (number, text) for number, text in lines}
+    if b"HEIGHT" not in words or b"WIDTH" not in words:
+        return 1
+    (height,), (width,) = (
+        _numbers(words[key], "A size")[:1] or (0,) for key in (b"HEIGHT", b"WIDTH")
+    )
+    n_points = _header(lines).n_points
+    if height > 1 and height * width != n_points:
+        raise FileFormatError(
+            f"A frame must have as many points as pixels; it declares {height} x {width} pixels "
+            f"and {n_points} points."
+        )
+    return max(height, 1)
+
+
 def _split(data: bytes) -> tuple[list[Line], bytes, bytes]:
     place = data.find(b"\nDATA ")
     if place < 0:

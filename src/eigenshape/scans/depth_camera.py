@@ -16,6 +16,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair_steps import faces_of_largest
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import submesh
+from eigenshape.scans.frames import pixel_faces
 from eigenshape.scans.partial import rotation_towards, unit_direction
 from eigenshape.scans.raster import rasterize
 
@@ -24,9 +25,6 @@ from eigenshape.scans.raster import rasterize
 SLANT_NOISE = 0.025
 LARGEST_SLANT_NOISE = 20.0  # upper bound of that growth, which is infinite at θ = π/2
 FULL_DROPOUT = np.deg2rad(85.0)  # slant from which no depth is measured
-# Neighboring pixels are connected if their depths differ by at most this many times the width of a
-# pixel at that depth. A larger value connects limbs with what lies behind them.
-LARGEST_JUMP = 4.0
 HOLE_SIZES = (0.01, 0.03)  # smallest and largest radius of a hole, as a share of the picture
 
 
@@ -287,26 +285,14 @@ def _noisy_depth(
 def _triangulate_pixels(
     picture: _Picture, depth: Float[np.ndarray, "h w"], kept: Bool[np.ndarray, "h w"]
 ) -> TriangleMesh:
-    """Make two triangles of each square of pixels, along the diagonal with the smaller jump."""
-    size = len(depth)
-    corner = np.arange(size * size).reshape(size, size)
-    a, b, c, d = (
-        part.ravel()
-        for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1])
-    )
-    flat = np.where(kept, depth, np.inf).ravel()
-    with np.errstate(invalid="ignore"):
-        along = ~(np.abs(flat[a] - flat[c]) > np.abs(flat[b] - flat[d]))
-    one = np.where(along[:, None], np.column_stack([a, b, c]), np.column_stack([a, b, d]))
-    two = np.where(along[:, None], np.column_stack([a, c, d]), np.column_stack([b, c, d]))
-    faces = np.concatenate([one, two])
-    faces = faces[np.isfinite(flat[faces]).all(axis=1)]
-    depths = flat[faces]
-    faces = faces[np.ptp(depths, axis=1) <= LARGEST_JUMP * depths.mean(axis=1) / picture.focal]
+    """Connect the pixels that are kept, where they see one surface."""
+    faces = pixel_faces(np.where(kept, depth, np.inf), picture.focal)
     if not len(faces):
         raise InvalidShapeError(
             "A scan must have a face; no three neighboring pixels see one surface from this view. "
             "Choose another view, or a camera with a higher resolution."
         )
-    points = (_rays(size, picture.focal) * np.where(kept, depth, 0)[:, :, None]).reshape(-1, 3)
+    points = (_rays(len(depth), picture.focal) * np.where(kept, depth, 0)[:, :, None]).reshape(
+        -1, 3
+    )
     return TriangleMesh(points, faces)

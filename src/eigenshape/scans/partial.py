@@ -13,7 +13,7 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
-from eigenshape.geometry.measure import mean_normals, scale_to_unit
+from eigenshape.geometry.measure import face_areas, mean_normals, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair_steps import faces_of_largest
 from eigenshape.geometry.topology import is_closed, submesh
@@ -141,7 +141,18 @@ def views_of(mesh: TriangleMesh, n_views: int) -> list[MeshPart]:
     """
     if not is_closed(mesh):
         return []
-    return [partial_scan(mesh, viewpoint(number)) for number in range(n_views)]
+    return [view_of(mesh, number) for number in range(n_views)]
+
+
+def view_of(mesh: TriangleMesh, number: int) -> MeshPart:
+    """Return what is visible of a shape from one of the viewpoints: the largest piece.
+
+    If no component has half of the area, all pieces are kept: the largest would be one of many
+    parts, and a scan of the shape shows many.
+    """
+    areas = face_areas(mesh)
+    is_of_parts = bool(areas[faces_of_largest(mesh)].sum() < areas.sum() / 2)
+    return partial_scan(mesh, viewpoint(number), all_pieces=is_of_parts)
 
 
 def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:

@@ -1,12 +1,13 @@
 import multiprocessing
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import textwrap
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from filelock import FileLock
 
 import eigenshape
 from eigenshape._errors import InvalidParameterError
-from eigenshape._workers import Item, Workers
+from eigenshape._workers import Item, Outcome, Workers
 from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.store.batch import (
@@ -93,6 +94,20 @@ def test_what_is_there_is_not_done_twice(index, tmp_path):
     report = build(index, todo)
     assert (report.added, report.skipped, report.failed) == (("b",), ("a",), ())
     assert index.records()[0].digest == content_digest(tmp_path / "a")
+
+
+@pytest.mark.long
+def test_a_damaged_shape_is_described_anew(index, tmp_path):
+    todo = items(tmp_path, a="1", b="2", c="3")
+    build(index, todo)
+    rows = index.folder / "rows-1.bin"
+    rows.write_bytes(b"?" + rows.read_bytes()[1:])
+    (damage,) = index.verify().damages
+    report = build(index, todo)
+    assert report.added == (damage.shape,)
+    assert len(report.skipped) == 2
+    assert index.verify().damages == ()
+    assert nearest(index, 1).name == "a"
 
 
 @pytest.mark.long
@@ -288,6 +303,37 @@ def test_an_executor_runs_the_work_and_loses_no_worker_to_a_file(index, tmp_path
     assert report.added == ("a", "b", "c")
     assert report.failed == tuple(bad.items())
     assert nearest(index, 2).name == "b"
+
+
+class CountingExecutor(Executor):
+    """Answers at once that there is nothing, and counts what it is given."""
+
+    n_tasks = 0
+
+    def submit(self, run, order):
+        self.n_tasks += 1
+        _, files, _ = pickle.loads(order)
+        done = Future()
+        done.set_result(pickle.dumps([(item, Outcome(error="none")) for item in files]))
+        return done
+
+
+def test_few_tasks_are_submitted_ahead_so_that_results_do_not_pile_up(index, tmp_path, monkeypatch):
+    monkeypatch.setattr("eigenshape._workers.FILES_A_TASK", 1)
+    monkeypatch.setattr("eigenshape._workers.TASKS_AHEAD", 3)
+    executor = CountingExecutor()
+    submitted = []
+    todo = items(tmp_path, **{f"s{number}": str(number) for number in range(9)})
+    report = build_index(
+        index,
+        todo,
+        read_by_content,
+        recipes=(RECIPE,),
+        workers=Workers(executor=executor),
+        callback=lambda *_: submitted.append(executor.n_tasks),
+    )
+    assert len(report.failed) == 9
+    assert submitted == [4, 5, 6, 7, 8, 9, 9, 9, 9]
 
 
 @pytest.mark.long

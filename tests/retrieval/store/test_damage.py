@@ -231,6 +231,44 @@ def test_a_damaged_recipe_is_named(sound, tmp_path):
         index.add_descriptors("new", [descriptor(1)])
 
 
+def described_again(seed):
+    name = f"shape {seed} {20 * 'n'}"
+    return DescribedShape(name, [descriptor(seed)], digest=64 * "d", thumbnail=b"picture")
+
+
+@pytest.mark.parametrize("name", ["rows-1.bin", "details-1.bin", "thumbnails.bin"])
+def test_a_damaged_shape_that_is_added_again_is_written_anew(sound, tmp_path, name):
+    index = es.ShapeIndex(shutil.copytree(sound, tmp_path / "index"))
+    path = index.folder / name
+    path.write_bytes(flip(path.read_bytes(), 8))
+    assert len(index.verify().damages) == 1
+    index.add_many([described_again(1)])
+    assert len(index.verify().damages) == 1, "a whole shape of the same digest is kept as it is"
+    index.add_many([described_again(0), described_again(0)])
+    assert index.verify().damages == ()
+    assert (len(index), index.query(descriptor(0), n_matches=1)[0].score) == (41, 0)
+    assert index.thumbnail(described_again(1).name) != b"picture"
+    assert index.thumbnail(described_again(0).name) == b"picture"
+
+
+def test_a_torn_file_and_damaged_rows_of_the_catalog_are_mended_too(sound, tmp_path):
+    index = es.ShapeIndex(shutil.copytree(sound, tmp_path / "index"))
+    path = index.folder / "rows-1.bin"
+    path.write_bytes(path.read_bytes()[:-8])
+    with closing(sqlite3.connect(index.folder / "index.sqlite")) as database, database:
+        database.execute("UPDATE shape SET label = 'other' WHERE id = 5")
+        database.execute("UPDATE descriptor SET rows_offset = 0 WHERE id = 9")
+    named = {damage.shape for damage in index.verify().damages}
+    assert named >= {described_again(4).name, described_again(8).name, "late"}
+    part = es.ShapeIndex.create(tmp_path / "part")
+    part.add_many([described_again(4), described_again(8)])
+    assert index.merge([part]) == 2
+    assert [damage.shape for damage in index.verify().damages] == ["late"]
+    index.add_descriptors("late", [descriptor(99)], digest="new", replace=True)
+    assert index.verify().damages == ()
+    assert index.query(descriptor(99), n_matches=1)[0].name == "late"
+
+
 def test_every_file_of_an_index_is_tried(sound):
     assert {path.name for path in sound.iterdir() if path.stat().st_size} == set(FILES)
     assert descriptor(3).recipe == RECIPE

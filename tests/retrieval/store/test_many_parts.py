@@ -6,6 +6,7 @@ import pytest
 import eigenshape as es
 from eigenshape.geometry.fragments import fragment_vertices
 from eigenshape.retrieval.patches.patches import surface_patches
+from eigenshape.scans.partial import views_of
 
 RECIPE = es.retrieval.HeatRecipe(n_modes=40)
 
@@ -123,6 +124,33 @@ def test_each_component_is_a_part_at_least(mesh):
     if mesh is SPECKED:
         alone = es.find_parts(BODY)
         assert len(owners) == len(alone.parts.features.vertices) + 70
+
+
+def test_views_of_a_shape_of_many_parts_show_many_and_those_of_a_body_one_piece():
+    for view in views_of(SOUP, 3):
+        n_pieces, labels = es.geometry.vertex_components(view.mesh)
+        assert n_pieces >= 10
+        assert len(np.unique(view.source_vertices // 42)) == n_pieces
+        assert len(np.unique(labels)) == n_pieces
+    for view in views_of(SPECKED, 2):
+        assert es.geometry.vertex_components(view.mesh)[0] == 1
+
+
+@pytest.mark.long
+def test_a_scan_of_a_shape_of_many_parts_finds_it():
+    """Rows of balls and of fish: neither is found by one of its parts alone."""
+    fish = es.make_creature("fish", 0, n_vertices=500)
+    length = np.ptp(fish.vertices, axis=0).max()
+    shoal = [
+        moved(fish, 2 / length, [3 * column, 3 * row, 0]) for column in range(5) for row in range(4)
+    ]
+    index = es.ShapeIndex.create(None)
+    index.add("soup", SOUP, recipe=RECIPE, n_views=2)
+    index.add("shoal", es.geometry.disjoint_union(*shoal), recipe=RECIPE, n_views=2)
+    assert len(index.descriptors("shoal", RECIPE)[0].vertices) == 20
+    for name, mesh in (("soup", SOUP), ("shoal", es.geometry.disjoint_union(*shoal))):
+        scan = es.partial_scan(mesh, [0.2, 0.3, 1], all_pieces=True).mesh
+        assert index.query(es.describe(scan, RECIPE))[0].name == name
 
 
 @pytest.mark.long

@@ -25,7 +25,7 @@ NewIndexArgument = Annotated[
     Path, typer.Argument(help="Folder of the index. It is created if it does not exist.")
 ]
 SourcesArgument = Annotated[
-    list[Path], typer.Argument(help="Mesh files, or folders to search for them.")
+    list[Path], typer.Argument(help="Files of meshes or points, or folders to search for them.")
 ]
 ViewsOption = Annotated[
     int | None,
@@ -106,11 +106,12 @@ def add(
     scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Describe meshes and add them to an index; a file that fails is named, and the others are still added.
+    """Describe shapes and add them to an index; a file that fails is named, and the others are still added.
 
     A shape is named by its path below the given folder; its class is the folder that holds it. Shapes that the index
     has already are skipped, also if their folder has moved. After Ctrl-C or a crash, the same command continues where
-    it stopped. The exit code is 3 if some files failed.
+    it stopped. Point clouds and frames of a depth camera (.pcd) become a surface first. The exit code is 3 if some
+    files failed.
     """
     require_method(method)
     repairs = repair_names(repair)

@@ -10,7 +10,7 @@ from eigenshape._errors import InvalidParameterError, MissingExtraError
 from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, err, progress_bar
 from eigenshape.cli.inputs import memory_bytes
-from eigenshape.io.mesh_files import read_mesh
+from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
@@ -78,7 +78,7 @@ def describe_all(
         report = build_index(
             shelf,
             items,
-            read_mesh,
+            read_surface,
             recipes=None if recipe is None else (recipe,),
             learn=recipe is None,
             repairs=repairs,
@@ -102,7 +102,7 @@ def learn_codebook(
     """Learn a codebook with a progress bar."""
     with progress_bar("codebook") as progress:
         return train_codebook_from_files(
-            items, read_mesh, repairs=repairs, workers=workers, callback=batch_reporter(progress)
+            items, read_surface, repairs=repairs, workers=workers, callback=batch_reporter(progress)
         )
 
 

@@ -15,12 +15,21 @@ from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.labels import read_labels, read_map
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.shape_files import read_shape
+from eigenshape.io.surfaces import read_surface
 
 
 def load_mesh(path: Path, repairs: str) -> TriangleMesh:
     """Read a mesh, apply the requested repairs, and print on stderr what they did."""
     done = repair(read_mesh(path), repair_names(repairs))
     print_repairs(done.report)
+    return done.mesh
+
+
+def load_surface(path: Path, repairs: str) -> TriangleMesh:
+    """Read a mesh, or make a surface of points; repair it, and print on stderr what was done."""
+    made = read_surface(path)
+    done = repair(made.mesh, repair_names(repairs))
+    print_repairs(made.report + done.report)
     return done.mesh
 
 
@@ -46,5 +55,5 @@ def read_partners(path: Path | None) -> Int[np.ndarray, " n"] | None:
 
 
 def read_repaired(path: Path, names: tuple[str, ...]) -> TriangleMesh:
-    """Read a mesh and apply repairs without printing, as for one of many."""
-    return repair(read_mesh(path), names).mesh
+    """Read a surface and apply repairs without printing, as for one of many."""
+    return repair(read_surface(path).mesh, names).mesh

@@ -25,7 +25,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.retrieval.heat.descriptor import HeatDescriptor
 from eigenshape.retrieval.heat.recipe import SCALE_FREE, HeatRecipe
-from eigenshape.scans.partial import MeshPart, partial_scan, viewpoint, views_of
+from eigenshape.scans.partial import MeshPart, view_of, views_of
 from eigenshape.spectral.signatures.approximate_heat import approximate_heat_signature
 from eigenshape.spectral.signatures.heat import heat_kernel_signature, reflection_free_signature
 from eigenshape.spectral.solve import solve_spectrum
@@ -245,7 +245,7 @@ def find_view_features(
     mesh: TriangleMesh, recipe: HeatRecipe, view: int
 ) -> tuple[MeshPart, HeatFeatures]:
     """Return what one of the viewpoints of `describe_views` sees, and its features."""
-    part = partial_scan(mesh, viewpoint(view))
+    part = view_of(mesh, view)
     return part, find_heat_features(part.mesh, recipe)
 
 

@@ -20,7 +20,8 @@ from eigenshape._workers import Workers as Workers  # noqa: PLC0414 - and this
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair
-from eigenshape.geometry.repair_names import MESH_REPAIRS
+from eigenshape.geometry.repair_names import require_repairs
+from eigenshape.geometry.repair_report import RepairedMesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, train_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descriptor
@@ -29,9 +30,10 @@ from eigenshape.retrieval.patches.patches import Patches, extract_patches
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.retrieval.store.records import Record
 from eigenshape.retrieval.store.thumbnails import draw_thumbnail
+from eigenshape.retrieval.store.upkeep import find_damaged
 from eigenshape.retrieval.store.writing import DescribedShape, describe_to_store
 
-Read = Callable[[Path], MeshLike]
+Read = Callable[[Path], MeshLike | RepairedMesh[TriangleMesh]]
 ReadRepaired = Callable[[Path], tuple[TriangleMesh, tuple[str, ...]]]
 Callback = Callable[[int, int, str, str | None], None]
 # Shapes that a codebook is learned from. A hundred closed ones have 45,000 patches for its 32
@@ -55,7 +57,8 @@ class BatchReport:
     failed : tuple of (str, str)
         Name and reason of each shape that could not be added.
     repaired : tuple of (str, tuple of str)
-        Name of each shape that was repaired before it was described, and what was done.
+        Name of each shape that was repaired, or made of points, before it was described, and what
+        was done.
 
     See Also
     --------
@@ -113,7 +116,8 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     the others go on. Only this process writes, at most 64 shapes and one second at a time: after
     Ctrl-C or a crash, the same call continues where it stopped. A file that the index has with the
     same content and recipes is skipped, but its path, label, tags and attributes are brought up to
-    date. A file whose content has changed replaces the old shape in one step.
+    date; its stored numbers are compared with their checksums, and a damaged shape is described
+    anew. A file whose content has changed replaces the old shape in one step.
 
     Parameters
     ----------
@@ -121,8 +125,9 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     items : sequence of Item
         Files, with the names and labels of their shapes.
     read : callable
-        Return the mesh of a path: ``es.read_mesh``, or a function of yours that a new process can
-        import by name.
+        Return the mesh of a path: ``es.read_mesh``; ``es.io.read_surface``, which also makes
+        surfaces of point clouds and of frames of depth cameras; or a function of yours that a new
+        process can import by name. It may return a `RepairedMesh`, whose report is kept.
     recipes : sequence of HeatRecipe or PatchRecipe, optional
         By default that of `ShapeIndex.default_recipe`.
     learn : bool
@@ -130,7 +135,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
         `train_codebook_from_files` does. Files that it learns from are read once.
     repairs : sequence of str
         Of `eigenshape.repair`, applied to each mesh before it is described; ``["auto"]`` does what
-        is needed. The attribute ``repairs`` of a shape tells what was done.
+        is needed. The attribute ``repairs`` of a shape tells what was done to it, also by `read`.
     n_views : int, optional
         As of `ShapeIndex.add`.
     workers : Workers
@@ -176,7 +181,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
             "Pass learn=False."
         )
     views = None if n_views is None else whole_number(n_views, "n_views", 0)
-    read_item = partial(_read_repaired, read, _known_repairs(repairs))
+    read_item = partial(_read_repaired, read, require_repairs(repairs))
     _require_different_names(items)
     callback = callback or _ignore
 
@@ -269,7 +274,7 @@ def train_codebook_from_files(
     """
     require_type(workers, Workers, "workers")
     require_each(items, Item, "items")
-    read_item = partial(_read_repaired, read, _known_repairs(repairs))
+    read_item = partial(_read_repaired, read, require_repairs(repairs))
     taught = _read_teachers(items, read_item, N_TRAINING_VIEWS, workers, callback or _ignore)
     return _learn_from(taught.values())
 
@@ -326,22 +331,14 @@ def _require_different_names(items: Sequence[Item]) -> None:
         paths[item.name] = item.path
 
 
-def _known_repairs(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names of repairs; an unknown one is an error before any file is read."""
-    for number, name in enumerate(names):
-        if name not in MESH_REPAIRS:
-            raise InvalidParameterError(
-                f"Repairs must be among {', '.join(MESH_REPAIRS)}; name {number} is {name!r}."
-            )
-    return tuple(names)
-
-
 def _read_repaired(
     read: Read, repairs: tuple[str, ...], path: Path
 ) -> tuple[TriangleMesh, tuple[str, ...]]:
-    """Return the mesh of a file after repairs, and what they did."""
-    done = repair(as_mesh(read(path)), repairs)
-    return done.mesh, done.report
+    """Return the mesh of a file after repairs, and what they and its reader did."""
+    found = read(path)
+    made = found if isinstance(found, RepairedMesh) else None
+    done = repair(as_mesh(found if made is None else made.mesh), repairs)
+    return done.mesh, (() if made is None else made.report) + done.report
 
 
 def _describe_file(
@@ -431,12 +428,18 @@ def _update_known(
 ) -> list[Item]:
     """Return the items that must be described; bring up to date what is known of the others."""
     known = {record.name: record for record in index.records()}
+    same = [
+        item.name
+        for item in items
+        if item.name in known and _is_known(item, known[item.name], recipes)
+    ]
+    whole = set(same) - find_damaged(index.folder, same)
     todo, changed = [], []
     for item in items:
-        record = known.get(item.name)
-        if record is None or not _is_known(item, record, recipes):
+        if item.name not in whole:
             todo.append(item)
             continue
+        record = known[item.name]
         attributes = dict(item.attributes)
         if REPAIRS in record.attributes:
             attributes[REPAIRS] = record.attributes[REPAIRS]

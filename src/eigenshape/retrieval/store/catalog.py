@@ -62,6 +62,7 @@ CREATE TABLE seal (
 # The default is for a value whose type was damaged. Rows are flat: none is inside itself.
 ENCODER = json.JSONEncoder(default=repr, check_circular=False)
 DESCRIPTOR = struct.Struct("<13q")  # the numbers of a row of that table, for its checksum
+Piece = tuple[int, int, int, int]  # file, offset, size and checksum of some bytes
 # The row of `seal` that counts committed changes; its last number is that of the table `touched`.
 CHANGES = "changes"
 
@@ -125,6 +126,19 @@ class DescriptorRow(NamedTuple):
     details_offset: int
     details_size: int
     details_checksum: int
+
+    def pieces(self, number_size: int) -> dict[str, Piece]:
+        """Return where the rows, of numbers of some bytes each, and the details are."""
+        size = self.n_rows * self.n_columns * number_size
+        return {
+            "rows": (self.rows_file, self.rows_offset, size, self.rows_checksum),
+            "details": (
+                self.details_file,
+                self.details_offset,
+                self.details_size,
+                self.details_checksum,
+            ),
+        }
 
 
 class Seal(NamedTuple):

@@ -9,13 +9,15 @@ from typing import Any, BinaryIO
 from zlib import crc32
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape.retrieval.kinds import AnyRecipe, kind_of
 from eigenshape.retrieval.store.catalog import (
     CHANGES,
     DATABASE,
     MODULUS,
     TABLES,
+    DescriptorRow,
     FileRow,
+    Piece,
     RecipeRow,
     Seal,
     ShapeRow,
@@ -116,6 +118,49 @@ class Change:
                 "one to keep what is whole."
             )
         return found
+
+    def find_whole_shape(self, name: str, digest: str | None) -> ShapeRow | None:
+        """Return the shape of a name; one of the same digest is deleted first if it is damaged.
+
+        What has the same digest is the same, so a damaged shape can be written anew.
+        """
+        shape = self.find_shape(name)
+        if shape is None or shape.digest is None or shape.digest != digest or self._is_whole(shape):
+            return shape
+        self.delete_shape(shape)
+        return None
+
+    def _is_whole(self, shape: ShapeRow) -> bool:
+        """Return whether a shape, its numbers and its picture agree with their checksums."""
+        query = "SELECT checksum FROM shape WHERE id = ?"
+        (checksum,) = self.database.execute(query, (shape.id,)).fetchone()
+        if row_checksum("shape", shape) != checksum:
+            return False
+        pieces: list[Piece] = [shape[-4:]]
+        columns = ", ".join(DescriptorRow._fields)
+        query = f"SELECT {columns}, checksum FROM descriptor WHERE shape = ?"
+        for *values, checksum in self.database.execute(query, (shape.id,)).fetchall():
+            row = DescriptorRow(*values)
+            if row_checksum("descriptor", row) != checksum:
+                return False
+            number_size = kind_of(self._recipes[row.recipe]).row_type.itemsize
+            pieces += row.pieces(number_size).values()
+        return all(self._holds(piece) for piece in pieces)
+
+    def _holds(self, piece: Piece) -> bool:
+        """Return whether a file holds bytes with their checksum."""
+        number, offset, size, checksum = piece
+        if not size:  # there is no picture
+            return True
+        file = self.files[number]
+        if number in self._handles:
+            self._handles[number].flush()
+        try:
+            with (self.folder / (file.folder or "") / file.name).open("rb") as handle:
+                handle.seek(offset)
+                return crc32(handle.read(size)) == checksum
+        except OSError:
+            return False
 
     def delete_shape(self, shape: ShapeRow) -> None:
         """Delete a shape and its descriptors; their bytes stay, since readers may need them."""

@@ -76,7 +76,7 @@ def warn_of_damage(place: str, damages: Sequence[Damage]) -> None:
     more = f"; and {len(damages) - MOST_NAMED} more" if len(damages) > MOST_NAMED else ""
     warnings.warn(
         f"{place} must hold what was written; {named}{more}. The rest is served. "
-        "ShapeIndex.verify lists all damage; remove the named shapes and index them again.",
+        "ShapeIndex.verify lists all damage; index the named shapes again.",
         StoreWarning,
         stacklevel=4,
     )

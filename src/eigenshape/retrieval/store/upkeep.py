@@ -10,17 +10,16 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
+from jaxtyping import Bool
 
 from eigenshape._errors import StoreError
 from eigenshape._text import html_repr, short_repr
-from eigenshape.retrieval.store.catalog import DATABASE, DescriptorRow, FileRow, ShapeRow
+from eigenshape.retrieval.store.catalog import DATABASE, DescriptorRow, FileRow, Piece, ShapeRow
 from eigenshape.retrieval.store.change import Change
 from eigenshape.retrieval.store.damage import Damage, warn_of_damage
 from eigenshape.retrieval.store.files import check_database, vacuum, writing
 from eigenshape.retrieval.store.records import Record
 from eigenshape.retrieval.store.snapshot import DamagedEntryError, IndexState, read_state
-
-Piece = tuple[int, int, int, int]  # file, offset, size and checksum of some bytes
 
 
 @dataclass(frozen=True)
@@ -61,20 +60,36 @@ class IndexReport:
 def verify_index(folder: Path) -> IndexReport:
     """Compare everything in an index with its checksums."""
     state = read_state(folder)
-    damages = [*state.damages, *(Damage(DATABASE, text) for text in check_database(folder))]
-    n_bytes = 0
-    for place in range(len(state.shapes.ids)):
+    of_database = [Damage(DATABASE, text) for text in check_database(folder)]
+    n_shapes = len(state.shapes.ids)
+    n_bytes, of_shapes = _check_shapes(state, np.ones(n_shapes, dtype=bool))
+    return IndexReport(n_shapes, n_bytes, (*state.damages, *of_database, *of_shapes))
+
+
+def find_damaged(folder: Path, names: Sequence[str]) -> set[str | None]:
+    """Return which of some shapes of an index differ from their checksums."""
+    state = read_state(folder)
+    chosen = np.zeros(len(state.shapes.ids), dtype=bool)
+    chosen[[state.names[name] for name in names if name in state.names]] = True
+    damages = [*state.damages, *_check_shapes(state, chosen)[1]]
+    return {damage.shape for damage in damages}.intersection(names)
+
+
+def _check_shapes(state: IndexState, chosen: Bool[np.ndarray, " n"]) -> tuple[int, list[Damage]]:
+    """Compare the numbers and the pictures of shapes with their checksums; count the bytes."""
+    n_bytes, damages = 0, []
+    for place in np.flatnonzero(chosen).tolist():
         try:
             n_bytes += len(state.thumbnail(place) or b"")
         except DamagedEntryError as err:
             damages.append(err.damage)
-    for entry in state.descriptors:
+    for entry in state.descriptors[chosen[state.shape_of]]:
         for part, piece in _pieces(state, _row(entry)).items():
             data = state.piece(*piece[:3])
             n_bytes += len(data)
             if crc32(data) != piece[3]:
                 damages.append(_damage(state, int(entry["shape"]), part, piece))
-    return IndexReport(len(state.shapes.ids), n_bytes, tuple(damages))
+    return n_bytes, damages
 
 
 def _row(entry: Any) -> DescriptorRow:
@@ -83,16 +98,7 @@ def _row(entry: Any) -> DescriptorRow:
 
 def _pieces(state: IndexState, row: DescriptorRow) -> dict[str, Piece]:
     """Return where the rows and the details of a descriptor are."""
-    size = row.n_rows * row.n_columns * state.row_size(row.recipe)
-    return {
-        "rows": (row.rows_file, row.rows_offset, size, row.rows_checksum),
-        "details": (
-            row.details_file,
-            row.details_offset,
-            row.details_size,
-            row.details_checksum,
-        ),
-    }
+    return row.pieces(state.row_size(row.recipe))
 
 
 def _damage(state: IndexState, shape: int, part: str, piece: Piece) -> Damage:
@@ -221,7 +227,7 @@ class _Merging:
             return 0
         pieces = [self._whole(row, shape.name) for row in rows]  # before anything is written
         picture = self.state.thumbnail(place)
-        old = change.find_shape(shape.name)
+        old = change.find_whole_shape(shape.name, shape.digest)
         same = old is not None and old.digest is not None and old.digest == shape.digest
         if old is not None and not same:
             if not self.replaces:

@@ -36,7 +36,7 @@ class DescribedShape:
         Class of the shape, and where it came from.
     digest : str, optional
         Hash of its content. If the name is in the index with the same digest, the shape gains the
-        recipes that it lacks, and keeps its descriptors by the others.
+        recipes that it lacks, and keeps its descriptors by the others, unless it is damaged.
     tags : sequence of str
         Words by which queries may choose shapes.
     attributes : mapping
@@ -198,7 +198,7 @@ def _keep_shape(
 ) -> int:
     """Return the number of a shape, which is added unless the index has the same."""
     name, digest = shape.name, shape.digest
-    old = change.find_shape(name)
+    old = change.find_whole_shape(name, digest)
     if old is not None and old.digest is not None and old.digest == digest:
         return old.id
     if old is not None and not replace:

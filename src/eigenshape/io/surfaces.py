@@ -1,0 +1,92 @@
+"""Read a surface from a file of any kind: a mesh as it is, and one made of points."""
+
+from pathlib import Path
+
+import numpy as np
+
+from eigenshape._files import read_regular
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repair import repair, suggest_repairs
+from eigenshape.geometry.repair_report import RepairedMesh
+from eigenshape.io import pcd
+from eigenshape.io.mesh_files import require_surface
+from eigenshape.io.parsing import naming, parse_mesh, suffix_of
+from eigenshape.io.shape_files import FORMATS, POINTS
+from eigenshape.scans.frames import triangulate_frame
+from eigenshape.scans.reconstruction import reconstruct_surface
+
+
+def read_surface(path: str | Path, *, file_format: str | None = None) -> RepairedMesh[TriangleMesh]:
+    r"""Read a mesh, or make a surface of a point cloud or of a frame of a depth camera.
+
+    A frame is a PCD file with more than one row: pixels that are neighbors on its grid and in space
+    are joined, as a camera at the origin sees them, and the surface faces the camera. Points
+    without an order become the surface whose normals fit theirs (Poisson reconstruction). It is
+    closed where they leave only small holes, and rounds off what is thinner than a few times the
+    distance between them. Points that are not finite, and all but the first of equal points, are
+    left out.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file of any format of `read_shape`.
+    file_format : str, optional
+        Suffix of the format. By default the suffix of the path.
+
+    Returns
+    -------
+    RepairedMesh
+        The surface, with a report that says what was made of points and is empty for a mesh. The
+        source of a vertex is its point in the file, or the nearest one.
+
+    Raises
+    ------
+    FileFormatError, InvalidShapeError, OSError
+        As in `read_mesh`, or if no surface can be made of the points: there are fewer than 100, or
+        it would miss more than a tenth of them.
+
+    See Also
+    --------
+    read_mesh : Read a mesh, and nothing else.
+    index_folder : Index such files.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "ball.xyz")
+    >>> es.io.write_points(es.PointCloud(es.icosphere(3).vertices), path)
+    >>> ball = es.io.read_surface(path)
+    >>> es.geometry.is_closed(ball.mesh)
+    True
+    >>> ball.report
+    ('reconstruct_surface made 2,000 vertices and 3,996 faces of 642 points',)
+    """
+    path = Path(path)
+    suffix = suffix_of(path, file_format, FORMATS)
+    data = read_regular(path)
+    with naming(path):
+        if suffix in POINTS:
+            points = POINTS[suffix](data)
+        else:
+            points, simplices = parse_mesh(path, suffix, data, None)
+            if len(simplices):
+                require_surface(points, simplices)
+                return RepairedMesh(TriangleMesh(points, simplices), (), np.arange(len(points)))
+        n_rows = pcd.n_rows(data) if suffix == ".pcd" else 1
+        if n_rows > 1:
+            return triangulate_frame(points.reshape(n_rows, -1, 3))
+        return _surface_of_cloud(points)
+
+
+def _surface_of_cloud(points: np.ndarray) -> RepairedMesh[TriangleMesh]:
+    finite = np.flatnonzero(np.isfinite(points).all(axis=1))
+    n_lost = len(points) - len(finite)
+    what = "point that is" if n_lost == 1 else "points that are"
+    lost = (f"left out {n_lost:,} {what} not finite",) if n_lost else ()
+    cloud = PointCloud(points[finite])
+    different = repair(cloud, suggest_repairs(cloud))
+    made = reconstruct_surface(different.cloud)
+    source = finite[different.source_points[made.source_vertices]]
+    return RepairedMesh(made.mesh, (*lost, *different.report, *made.report), source)

@@ -1,0 +1,219 @@
+"""Make a surface of a cloud of points: a level set of a field that their normals determine."""
+
+from itertools import permutations
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Bool, Float, Int
+from scipy import fft, ndimage
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+
+from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repair_report import RepairedMesh
+from eigenshape.geometry.simplices import size_one
+from eigenshape.geometry.topology import submesh, vertex_components
+
+FEWEST_POINTS = 100  # below, a grid as fine as the points has about ten cells a side
+N_NEIGHBORS = 16  # of a point, which determine its plane
+# Width of a cell of the grid, in typical distances between neighboring points. A finer grid keeps
+# thinner limbs, and gives more vertices: at 1.25 about three for each point.
+CELL_IN_SPACINGS = 1.25
+MOST_CELLS = 96  # along the largest extent: about 40,000 vertices at most
+MARGIN = 0.25  # free space around the points, in extents: the field is periodic
+SMOOTHING = 1.0  # standard deviation of the Gaussian that smooths the normals, in cells
+REACH = 3  # cells around a point in which there is a surface; it closes holes of this radius
+SUPPORT = 1.0  # cells between a face and the nearest point, above which the face has no support
+# A vertex keeps this share of an edge of the grid away from its ends, so no triangle is a needle.
+CLOSEST_TO_CORNER = 0.15
+LEAST_SPREAD = 0.05  # of the nearest points in the second direction, relative to the first
+# Share of points that a surface may miss, which means to be more than two cells away from them.
+MOST_MISSED, MISSED_CELLS = 0.1, 2.0
+
+CUBE = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+# Six tetrahedra around the diagonal of a cube; those of neighboring cubes fit together. An axis
+# takes 4, 2 or 1 steps in `CUBE`.
+TETRAHEDRA = np.array([[0, one, one + two, 7] for one, two, _ in permutations((4, 2, 1))])
+
+
+def reconstruct_surface(cloud: PointCloud) -> RepairedMesh[TriangleMesh]:
+    """Compute a surface near the points of a cloud, closed where the points leave only small holes.
+
+    The field is the one whose slopes fit the normals of the points best (Kazhdan, Bolitho and
+    Hoppe, "Poisson surface reconstruction", 2006, section 3), on a regular grid, where a Fourier
+    transform solves the equation. A normal is the thin direction of the nearest points; normals
+    are turned to the same side along the tree of the smoothest steps (Hoppe et al., "Surface
+    reconstruction from unorganized points", 1992). Parts of the level set without points are
+    dropped, so the scan of one side stays open.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        At least 100 different points of a surface in R³.
+
+    Returns
+    -------
+    RepairedMesh
+        The surface, the nearest point of each vertex, and a report of one sentence.
+
+    Raises
+    ------
+    InvalidShapeError
+        If there are too few points, more than a tenth of them is not near the surface, as where
+        limbs are thinner than the distance between points, or they lie on lines.
+    """
+    if cloud.n_points < FEWEST_POINTS or cloud.points.shape[1] != 3:
+        raise InvalidShapeError(
+            f"A cloud must have at least {FEWEST_POINTS} points in R^3 to become a surface; this "
+            f"is a {cloud!r}."
+        )
+    low = cloud.points.min(axis=0)
+    points, scale = size_one(cloud.points - low)
+    distances, neighbors = cKDTree(points).query(points, N_NEIGHBORS + 1)
+    normals = _oriented_normals(points, neighbors[:, 1:])
+    # The nearest k points fill a disc of k times the area of one.
+    areas = np.pi * distances[:, -1] ** 2 / N_NEIGHBORS
+    extent = float(points.max())
+    cell = max(CELL_IN_SPACINGS * float(np.sqrt(np.median(areas))), extent / MOST_CELLS)
+    places = (points + MARGIN * extent) / cell
+    counts = [
+        fft.next_fast_len(int(np.ceil(size + MARGIN * extent / cell)) + 1, real=True)
+        for size in places.max(axis=0)
+    ]
+    field = _field(places, -normals * areas[:, None] / cell**2, counts)
+    near = np.zeros(counts, dtype=bool)
+    near[tuple(places.astype(int).T)] = True
+    surface = _level_set(field, ndimage.binary_dilation(near, iterations=REACH))
+    mesh = _supported(surface, places, normals)
+    missed = np.mean(cKDTree(mesh.vertices).query(places)[0] > MISSED_CELLS)
+    if missed > MOST_MISSED:
+        raise InvalidShapeError(
+            f"A surface must reach the points of a cloud; it misses {100 * missed:.0f} % of these "
+            f"{cloud.n_points}, where parts are thinner than the distance between points. Give more "
+            "points, or a mesh that another program made of them."
+        )
+    vertices = (mesh.vertices * cell - MARGIN * extent) * scale + low
+    sentence = (
+        f"reconstruct_surface made {mesh.n_vertices:,} vertices and {mesh.n_faces:,} faces of "
+        f"{cloud.n_points:,} points"
+    )
+    nearest = cKDTree(places).query(mesh.vertices)[1]
+    return RepairedMesh(TriangleMesh(vertices, mesh.faces), (sentence,), nearest)
+
+
+def _oriented_normals(
+    points: Float[np.ndarray, "n 3"], neighbors: Int[np.ndarray, "n k"]
+) -> Float[np.ndarray, "n 3"]:
+    """Return unit normals that agree with those of neighbors, and point away from the middle."""
+    around = points[neighbors]
+    around -= around.mean(axis=1, keepdims=True)
+    spreads, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", around, around))
+    n_lines = np.count_nonzero(spreads[:, 1] < LEAST_SPREAD**2 * spreads[:, 2])
+    if n_lines > MOST_MISSED * len(points):
+        raise InvalidShapeError(
+            "The points around a point must spread in two directions; those of "
+            f"{n_lines} of {len(points)} lie on a line. Give points of a surface."
+        )
+    normals = axes[:, :, 0]
+    n, k = neighbors.shape
+    one, two = np.repeat(np.arange(n), k), neighbors.ravel()
+    bend = 1 - np.abs(np.einsum("ni,ni->n", normals[one], normals[two]))
+    # A stored weight of zero would be no edge.
+    graph = sp.csr_array((bend + 1e-3, (one, two)), shape=(n, n))
+    forest = csgraph.minimum_spanning_tree(graph.maximum(graph.T))
+    count, part = csgraph.connected_components(forest, directed=False)
+    for number in range(count):
+        members = np.flatnonzero(part == number)
+        order, before = csgraph.breadth_first_order(forest, members[0], directed=False)
+        for point in order[1:].tolist():
+            if normals[point] @ normals[before[point]] < 0:
+                normals[point] *= -1
+        outward = points[members] - points[members].mean(axis=0)
+        if np.einsum("ni,ni->", outward, normals[members]) < 0:
+            normals[members] *= -1
+    return normals
+
+
+def _field(
+    places: Float[np.ndarray, "n 3"], slopes: Float[np.ndarray, "n 3"], counts: list[int]
+) -> Float[np.ndarray, "x y z"]:
+    """Return the field on a grid whose slopes fit best; its median at the points is 0."""
+    first = places.astype(int)
+    rest = places - first
+    corners = [np.ravel_multi_index(tuple((first + corner).T), counts) for corner in CUBE]
+    shares = [np.prod(np.where(corner, rest, 1 - rest), axis=1) for corner in CUBE]
+    waves = np.meshgrid(
+        *(2 * np.pi * fft.fftfreq(count) for count in counts[:2]),
+        2 * np.pi * fft.rfftfreq(counts[2]),
+        indexing="ij",
+        sparse=True,
+    )
+    # div grad f = div v, so f^ = -i k.v^ / |k|^2; the mean of the field is free.
+    square = np.asarray(sum(wave**2 for wave in waves))
+    square[0, 0, 0] = 1
+    divergence = np.zeros(square.shape, dtype=complex)
+    for axis, wave in enumerate(waves):
+        total = np.zeros(np.prod(counts))
+        for corner, share in zip(corners, shares, strict=True):
+            total += np.bincount(corner, share * slopes[:, axis], len(total))
+        divergence += wave * fft.rfftn(total.reshape(counts))
+    smoothed = -1j * divergence * np.exp(-0.5 * SMOOTHING**2 * square) / square
+    field: Float[np.ndarray, "x y z"] = fft.irfftn(smoothed, s=counts)
+    flat = field.ravel()
+    at_points = sum(flat[corner] * share for corner, share in zip(corners, shares, strict=True))
+    return field - np.median(at_points)
+
+
+def _level_set(field: Float[np.ndarray, "x y z"], near: Bool[np.ndarray, "x y z"]) -> TriangleMesh:
+    """Return where a field is zero in some cells, in their unit; it faces lower values."""
+    counts, flat = field.shape, field.ravel()
+    cells = np.argwhere(near[:-1, :-1, :-1])
+    corners = np.ravel_multi_index(tuple(np.moveaxis(cells[:, None] + CUBE, -1, 0)), counts)
+    inside = flat[corners] > 0
+    crossed = inside.any(axis=1) & ~inside.all(axis=1)
+    ids = corners[crossed][:, TETRAHEDRA].reshape(-1, 4)
+    # Corners inside come first: then two kinds of cuts are left, a triangle and a quad.
+    order = np.argsort(flat[ids] <= 0, axis=1, kind="stable")
+    ids = np.take_along_axis(ids, order, axis=1)
+    n_inside = (flat[ids] > 0).sum(axis=1)
+    cuts = [
+        (1, [(0, 1), (0, 2), (0, 3)]),
+        (3, [(0, 3), (1, 3), (2, 3)]),
+        (2, [(0, 2), (0, 3), (1, 3)]),
+        (2, [(0, 2), (1, 3), (1, 2)]),
+    ]
+    edges = np.concatenate([ids[n_inside == number][:, cut] for number, cut in cuts])
+    ends, faces = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    values = flat[ends]
+    share = values[:, 0] / (values[:, 0] - values[:, 1])
+    share = np.clip(share, CLOSEST_TO_CORNER, 1 - CLOSEST_TO_CORNER)[:, None]
+    start, end = (
+        np.column_stack(np.unravel_index(ends[:, side], counts)).astype(float) for side in (0, 1)
+    )
+    vertices = start + share * (end - start)
+    outward = (end - start)[faces].sum(axis=1)
+    turned = np.einsum("fi,fi->f", area_vectors(vertices[faces]), outward) < 0
+    return TriangleMesh(vertices, np.where(turned[:, None], faces[:, ::-1], faces))
+
+
+def _supported(
+    mesh: TriangleMesh, places: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+) -> TriangleMesh:
+    """Drop large pieces whose faces are far from all points, or face away from the nearest."""
+    corners = mesh.vertices[mesh.faces]
+    facing = area_vectors(corners)
+    distance, nearest = cKDTree(places).query(corners.mean(axis=1))
+    bare = (np.einsum("fi,fi->f", facing, normals[nearest]) < 0) | (distance > SUPPORT)
+    if not bare.any():
+        return mesh
+    patches, _ = submesh(mesh, bare)
+    count, labels = vertex_components(patches)
+    owner = labels[patches.faces[:, 0]]
+    areas = np.bincount(owner, weights=np.linalg.norm(facing[bare], axis=1), minlength=count)
+    dropped = np.zeros(mesh.n_faces, dtype=bool)
+    dropped[bare] = areas[owner] > np.pi * REACH**2  # smaller ones close holes
+    return submesh(mesh, ~dropped)[0]
