@@ -32,6 +32,12 @@ def test_files_that_differ_only_in_their_suffix_keep_it(folder):
     assert names == {"felix.ply", "felix.obj", "old/tom"}
 
 
+def test_landmarks_beside_a_mesh_are_no_shape(tmp_path):
+    for name in ("cat.ply", "cat.pts", "scan.pts"):
+        (tmp_path / name).touch()
+    assert [item.name for item in find_items(tmp_path)] == ["cat", "scan"]
+
+
 def test_a_file_that_is_given_twice_counts_once(folder):
     cats = folder / "cats"
     assert len(find_items([cats, cats])) == len(find_items(cats))

@@ -14,7 +14,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers
-from eigenshape.io.shape_files import FORMATS
+from eigenshape.io.shape_files import FORMATS, POINTS
 from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.store.batch import Callback, build_index
 from eigenshape.retrieval.store.damage import StoreWarning
@@ -32,8 +32,9 @@ def find_items(
     """Find the files of meshes and of points in folders and in the folders in them.
 
     A shape is named by its path below the given folder, without the suffix of the file unless two
-    files differ only in the suffix. Its class is the name of the folder that holds it; a file that
-    lies directly in the given folder, or is given itself, has none.
+    files differ only in the suffix. Points beside a mesh of the same name, such as its landmarks,
+    are left out. The class of a shape is the name of the folder that holds it; a file that lies
+    directly in the given folder, or is given itself, has none.
 
     Parameters
     ----------
@@ -173,7 +174,13 @@ def _items_of(source: Path) -> Iterator[Item]:
         source.stat()  # raises OSError for a folder that is misspelled, before anything is described
         yield Item(source.stem, source)
         return
-    paths = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in FORMATS]
+    known = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in FORMATS]
+    meshes = {path.with_suffix("") for path in known if path.suffix.lower() not in POINTS}
+    paths = [
+        path
+        for path in known
+        if path.suffix.lower() not in POINTS or path.with_suffix("") not in meshes
+    ]
     stems = Counter(path.with_suffix("") for path in paths)
     for path in paths:
         named = path if stems[path.with_suffix("")] > 1 else path.with_suffix("")
