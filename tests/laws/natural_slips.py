@@ -257,6 +257,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "poses": lambda: {"rest": body()},
     "radius": lambda: 0.4,
     "read": lambda: es.read_mesh,
+    "query_indexes.folders": lambda: [shelf().folder],
     "read_edits.path": written_edits,
     "recover_geometry.eigenvalues": lambda: es.shapes.sphere_eigenvalues(60),
     "region": lambda: HEAD,

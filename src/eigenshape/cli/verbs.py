@@ -47,7 +47,7 @@ VERBS = {
     "find its kind.",
 }
 INDEX_VERBS = {
-    "add": "Describe meshes and add them to an index; a file that fails is named, and the others "
+    "add": "Describe shapes and add them to an index; a file that fails is named, and the others "
     "are still added.",
     "ls": "List the shapes of an index, with their labels, tags and attributes.",
     "rm": "Remove shapes from an index.",
