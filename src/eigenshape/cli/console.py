@@ -106,3 +106,9 @@ def batch_reporter(
             err.print(f"[yellow]not indexed:[/] {escape_text(name)}: {escape_text(error)}")
 
     return report
+
+
+def print_address(what: str, url: str) -> None:
+    """Say where a page is open, at once, so that a program that started us can read it."""
+    out.print(f"The {what} is open at {escape_text(url)}")
+    out.file.flush()

@@ -120,6 +120,10 @@ StoredMethodOption = Annotated[
     ),
 ]
 IndexArgument = Annotated[Path, typer.Argument(help="Folder of the index.")]
+HostOption = Annotated[
+    str,
+    typer.Option(help="Address to listen on; one that other machines reach needs --allow-remote."),
+]
 FilterOption = Annotated[
     list[str] | None,
     typer.Option(

@@ -1,5 +1,6 @@
 """eigenshape serve: a search service on an index, for programs and for the browser."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -7,19 +8,14 @@ import typer
 
 import eigenshape as es
 from eigenshape._studio import studio_module
-from eigenshape.cli.console import escape_text, out
-from eigenshape.cli.inputs import memory_bytes
+from eigenshape.cli.console import print_address
+from eigenshape.cli.inputs import HostOption, memory_bytes
 
 
 def serve(
     index: Annotated[Path, typer.Argument(help="Folder of the index.")],
     *,
-    host: Annotated[
-        str,
-        typer.Option(
-            help="Address to listen on; one that other machines reach needs --allow-remote."
-        ),
-    ] = "127.0.0.1",
+    host: HostOption = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any that is free.")
     ] = 8000,
@@ -76,10 +72,6 @@ def serve(
     """
     server = studio_module("service.server")
 
-    def announce(url: str) -> None:
-        out.print(f"The service is open at {escape_text(url)}")
-        out.file.flush()
-
     server.serve(
         index,
         host=host,
@@ -89,6 +81,6 @@ def serve(
         token=token,
         workers=es.retrieval.Workers(workers, timeout, memory_bytes(memory)),
         show_sources=show_sources,
-        announce=announce,
+        announce=partial(print_address, "service"),
         browse=browser,
     )

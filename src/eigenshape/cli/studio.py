@@ -1,5 +1,6 @@
 """eigenshape studio: a window in the browser."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -7,8 +8,8 @@ import typer
 
 from eigenshape._studio import studio_module
 from eigenshape.cli import steps
-from eigenshape.cli.console import escape_text, out
-from eigenshape.cli.inputs import UpOption, ViewOption
+from eigenshape.cli.console import print_address
+from eigenshape.cli.inputs import HostOption, UpOption, ViewOption
 
 
 def studio(
@@ -23,12 +24,7 @@ def studio(
     ] = None,
     view: ViewOption = "auto",
     up: UpOption = "auto",
-    host: Annotated[
-        str,
-        typer.Option(
-            help="Address to listen on; one that other machines reach needs --allow-remote."
-        ),
-    ] = "127.0.0.1",
+    host: HostOption = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any that is free.")
     ] = 0,
@@ -53,10 +49,6 @@ def studio(
     side = steps.parse_side(view, up)
     server = studio_module("server")
 
-    def announce(url: str) -> None:
-        out.print(f"The studio is open at {escape_text(url)}")
-        out.file.flush()
-
     server.serve(
         mesh,
         index=shelf,
@@ -64,6 +56,6 @@ def studio(
         host=host,
         port=port,
         allow_remote=allow_remote,
-        announce=announce,
+        announce=partial(print_address, "studio"),
         browse=browser,
     )
