@@ -1,0 +1,213 @@
+"""Pairs of points of a part and a whole that agree in distances and directions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Bool, Complex64, Float, Float32, Int
+from scipy.sparse.csgraph import connected_components
+
+from eigenshape.matching.match_loops import couple_pairs, nearest_rows, place_by_distances
+from eigenshape.matching.surface import Surface
+
+# All lengths are in units of `Surface` unless stated.
+N_CANDIDATES = 5  # partners that are tried for each point; ten found nothing more
+# Share of a distance by which two pairs may disagree and still support each other
+SLACK = 0.15
+SHORTEST = 0.05  # errors of shorter distances are shares of this
+# A distance that is longer on the part counts half: around a hole or a cut paths are longer.
+LONGER = 0.5
+LEAST_SUPPORT = 0.3  # of a pair, as a share of the largest, to be selected
+LEAST_AGREEMENT = 0.5  # the same, of the support by selected pairs, as a share of their median
+FIRST_ROUNDS = 30  # of the iteration from all candidates; it is steady after about 20
+NEXT_ROUNDS = 15  # near the images of the last round
+N_GROWTHS = 5  # times that pairs are selected, cleaned and extended; the fourth and fifth add little
+# Points nearer than this on the whole that are more than BLOCKED times as far on the part conflict.
+CROWDED = 0.07
+BLOCKED = 2.5
+OCCUPIED = 2.0  # cost of a place that a far point has taken, in median least costs of descriptors
+# A point may move this far from where its neighbors place it, plus the share WANDER of its distance
+# to the next kept pair.
+REACH = 0.07
+WANDER = 0.5
+# Two neighboring pairs agree if their distances differ by at most this share plus this length.
+NEIGHBOR_SHARE = 0.3
+NEIGHBOR_SLACK = 0.024
+N_NEIGHBORS = 8
+FEWEST_PAIRS = 4  # fewer do not make a map
+N_NEAR = 12  # pairs by which a point is placed
+SOFTNESS = 0.03  # added to distances before they are weighed
+CAP = 0.1  # largest error of a distance that counts, so that single wrong pairs count little
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Points of a part, by number, their partners on the whole, and the support of each pair."""
+
+    points: Int[np.ndarray, " p"]
+    partners: Int[np.ndarray, " p"]
+    support: Float[np.ndarray, " p"]
+
+    def select(self, chosen: Int[np.ndarray, " k"] | Bool[np.ndarray, " p"]) -> "Pairs":
+        """Return some of the pairs."""
+        return Pairs(self.points[chosen], self.partners[chosen], self.support[chosen])
+
+
+def descriptor_costs(part: Surface, whole: Surface) -> Float[np.ndarray, "m k"]:
+    """Return weighted mean squared differences of whitened numbers, 1 for the median best one."""
+    total, weights = 0.0, 0.0
+    for radius in range(part.numbers.shape[1]):
+        one, two = part.numbers[:, radius], whole.numbers[:, radius]
+        squares = (one**2).sum(axis=1)[:, None] - 2 * one @ two.T + (two**2).sum(axis=1)
+        share = part.weights[:, radius][:, None] * whole.weights[:, radius]
+        total = total + share * np.maximum(squares, 0)
+        weights = weights + share
+    costs = np.asarray(total / weights, dtype=np.float64)
+    return costs / max(float(np.median(costs.min(axis=1))), np.finfo(float).tiny)
+
+
+def first_candidates(costs: Float[np.ndarray, "m k"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the best partners of each point by descriptors alone: points and partners."""
+    partners = np.argsort(costs, axis=1, kind="stable")[:, :N_CANDIDATES]
+    return np.repeat(np.arange(len(costs)), partners.shape[1]), partners.ravel()
+
+
+def couplings(
+    part: Surface, whole: Surface, points: np.ndarray, partners: np.ndarray, *, mirrored: bool
+) -> Complex64[np.ndarray, "c c"]:
+    """Return how candidate pairs support each other; see `couple_pairs`.
+
+    Mirrored, directions on the part are those seen from its inside.
+    """
+    ways = np.conj(part.ways) if mirrored else part.ways
+    found = np.empty((len(points),) * 2, dtype=np.complex64)
+    one, two = (part.between, ways), (whole.between, whole.ways)
+    couple_pairs(points, partners, one, two, SLACK, SHORTEST, LONGER, found)
+    return found
+
+
+def supports(
+    coupling: Complex64[np.ndarray, "c c"], points: Int[np.ndarray, " c"], rounds: int
+) -> Float[np.ndarray, " c"]:
+    """Return the support of each candidate, in the sum of squares 1.
+
+    x_i ← |Σ_j c_ij x_j|: those that agree with a pair in distance must also agree in the turn that
+    takes directions on the part to directions on the whole. So pairs of a mirror image, whose turns
+    all differ, get little. The candidates of one point compete: each is multiplied by its share of
+    the best.
+    """
+    support = np.full(len(points), 1.0)
+    best = np.empty(points.max() + 1)
+    for _ in range(rounds):
+        found = np.abs(coupling @ support.astype(np.complex64)).astype(np.float64)
+        best[:] = np.finfo(float).tiny
+        np.maximum.at(best, points, found)
+        found *= found / best[points]
+        length = np.linalg.norm(found)
+        if length == 0:
+            break
+        support = found / length
+    return support
+
+
+def select_pairs(
+    coupling: Complex64[np.ndarray, "c c"],
+    points: Int[np.ndarray, " c"],
+    partners: Int[np.ndarray, " c"],
+    support: Float[np.ndarray, " c"],
+) -> tuple[Pairs, Int[np.ndarray, " p"]]:
+    """Return the best candidate of each point if it is well supported, and their numbers."""
+    order = np.argsort(-support, kind="stable")
+    order = order[support[order] > LEAST_SUPPORT * support[order[0]]]
+    first = np.unique(points[order], return_index=True)[1]
+    chosen = order[np.sort(first)]
+    ours = coupling[np.ix_(chosen, chosen)]
+    agreement = np.abs(ours @ support[chosen].astype(np.complex64))
+    chosen = chosen[agreement > LEAST_AGREEMENT * np.median(agreement)]
+    return Pairs(points[chosen], partners[chosen], support[chosen]), chosen
+
+
+def grow_pairs(
+    part: Surface, whole: Surface, costs: Float[np.ndarray, "m k"], pairs: Pairs
+) -> tuple[Pairs, float]:
+    """Keep what agrees, extend it to all points, and repeat; return also the share that agrees.
+
+    Of a start with a limb on the wrong side, the largest piece that is continuous stays, and the
+    limb is placed anew from where it joins that piece.
+    """
+    n_points = len(costs)
+    for _ in range(N_GROWTHS):
+        pairs = _continuous(part, whole, _without_conflicts(part, whole, pairs))
+        if len(pairs.points) < FEWEST_PAIRS:
+            return pairs, 0.0
+        places = place_points(part, whole, pairs, part.points)[0]
+        away = part.between[pairs.points].min(axis=0)
+        reach = (REACH + WANDER * away)[:, None]
+        moves = whole.distances.T[places]
+        wanted = costs + (moves / reach) ** 2 + OCCUPIED * _occupied(part, whole, pairs)
+        partners = np.argsort(wanted, axis=1, kind="stable")[:, :N_CANDIDATES]
+        nearby = np.take_along_axis(moves, partners, axis=1)
+        allowed = nearby <= np.maximum(2 * reach, nearby.min(axis=1, keepdims=True))
+        points = np.repeat(np.arange(n_points), allowed.sum(axis=1))
+        partners = partners[allowed]
+        coupling = couplings(part, whole, points, partners, mirrored=False)
+        support = supports(coupling, points, NEXT_ROUNDS)
+        pairs, _ = select_pairs(coupling, points, partners, support)
+    pairs = _without_conflicts(part, whole, pairs)
+    return pairs, len(_continuous(part, whole, pairs).points) / n_points
+
+
+def place_points(
+    part: Surface, whole: Surface, pairs: Pairs, vertices: Int[np.ndarray, " v"]
+) -> tuple[Int[np.ndarray, " v"], Float[np.ndarray, " v"]]:
+    """Place vertices of the part on vertices of the whole by distances to near pairs.
+
+    Returns the vertices and the root mean square error of distances, at most `CAP`.
+    """
+    rows = np.ascontiguousarray(part.distances[np.ix_(pairs.points, vertices)])
+    near = nearest_rows(rows, N_NEAR)
+    starts = whole.points[pairs.partners[near[:, 0]]]
+    misfits = np.empty(len(vertices))
+    columns = np.ascontiguousarray(whole.distances.T)
+    found = place_by_distances(
+        rows, pairs.partners, columns, near, starts, SOFTNESS, CAP**2, LONGER, misfits
+    )
+    return found, np.sqrt(misfits)
+
+
+def _without_conflicts(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
+    """Drop pairs whose place on the whole a better supported pair of a far point has taken."""
+    ours = part.between[np.ix_(pairs.points, pairs.points)]
+    theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
+    conflicts = (theirs < CROWDED) & (ours > BLOCKED * CROWDED)
+    kept = np.zeros(len(pairs.points), dtype=bool)
+    for number in np.argsort(-pairs.support, kind="stable"):
+        kept[number] = not (conflicts[number] & kept).any()
+    return pairs.select(kept)
+
+
+def _occupied(part: Surface, whole: Surface, pairs: Pairs) -> Bool[np.ndarray, "m k"]:
+    """Return, for each point of the part, which points of the whole pairs of far points take."""
+    far = (part.between[:, pairs.points] > BLOCKED * CROWDED).astype(np.float32)
+    taken = (whole.between[:, pairs.partners] < CROWDED).astype(np.float32)
+    return far @ taken.T > 0
+
+
+def _continuous(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
+    """Return the largest set of pairs that is connected by neighbors that keep their distances."""
+    n = len(pairs.points)
+    ours = part.between[np.ix_(pairs.points, pairs.points)]
+    theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
+    near = np.argsort(ours, axis=1, kind="stable")[:, 1 : N_NEIGHBORS + 1]
+    one, two = np.repeat(np.arange(n), near.shape[1]), near.ravel()
+    longest = np.maximum(ours[one, two], theirs[one, two])
+    with np.errstate(invalid="ignore"):  # infinite on both sides: other components
+        errors = np.abs(ours[one, two] - theirs[one, two])
+    agree = errors <= NEIGHBOR_SHARE * longest + NEIGHBOR_SLACK
+    agree &= np.isfinite(longest)
+    good = 2 * np.bincount(one, weights=agree, minlength=n) >= near.shape[1]
+    links = agree & good[one] & good[two]
+    graph = sp.coo_array((np.ones(links.sum()), (one[links], two[links])), shape=(n, n))
+    labels = connected_components(graph, directed=False)[1]
+    sizes = np.bincount(labels[good], minlength=n)
+    return pairs.select(good & (labels == sizes.argmax()))

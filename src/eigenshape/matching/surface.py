@@ -1,0 +1,148 @@
+"""Surfaces as matching sees them: points, their patches, and distances and directions from them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Complex64, Float, Float32, Int
+
+from eigenshape.geometry.geodesic import farthest_points
+from eigenshape.geometry.measure import mean_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import dual_volumes
+from eigenshape.geometry.topology import boundary_vertices, edge_table
+from eigenshape.operators.smoothing import denoise
+from eigenshape.geometry.orientation import orient_outward
+from eigenshape.retrieval.patches.codebook import BASES, default_codebook, whiten_numbers
+from eigenshape.retrieval.patches.patch_loops import NUMBERS, RINGS, describe_disc
+from eigenshape.retrieval.patches.patches import AT_BOUNDARY, LEAST_WEIGHT, RADII, Patches
+
+# The unit of length, in roots of the area of the whole. Patches are described in sides of a box,
+# which for animals is about 1.2 roots of the area; the box itself changes with the pose, from 0.7
+# for a cat that curls up to 1.3 for one that stretches.
+UNIT = 1.2
+MATCHED_RADII = RADII[list(BASES)]  # of the discs that are compared, in units
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A mesh in the unit of the whole, and m of its vertices with what matching compares.
+
+    `distances` are from the points to all vertices, `between` from point to point. `ways` holds the
+    direction at each point (row) of the shortest path to each other one, as a complex number of
+    modulus 1 at most in a tangent frame; it is shorter where several paths are about as short.
+    """
+
+    mesh: TriangleMesh
+    areas: Float[np.ndarray, " n"]
+    normals: Float[np.ndarray, "n 3"]
+    points: Int[np.ndarray, " m"]
+    distances: Float32[np.ndarray, "m n"]
+    nearest: Int[np.ndarray, " n"]
+    numbers: Float32[np.ndarray, "m r d"]
+    weights: Float32[np.ndarray, "m r"]
+    between: Float32[np.ndarray, "m m"]
+    ways: Complex64[np.ndarray, "m m"]
+
+    @property
+    def area(self) -> float:
+        """Area in square units."""
+        return float(self.areas.sum())
+
+
+def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
+    """Clean a surface, scale it, choose points, and describe them.
+
+    Faces are turned outward, and noise is removed as far as it is there, so that patches of a scan
+    compare with those of a clean shape.
+    """
+    clean = denoise(orient_outward(mesh))
+    mesh = TriangleMesh((clean.vertices - clean.vertices.mean(axis=0)) / unit, clean.faces)
+    count = min(n_points, mesh.n_vertices)
+    chosen, rows, nearest = farthest_points(mesh, count)
+    areas, normals = dual_volumes(mesh), mean_normals(mesh)
+    numbers = _describe_discs(mesh, chosen, rows, areas, normals)
+
+    rim = boundary_vertices(mesh)
+    away = rows[:, rim].min(axis=1) if len(rim) else np.full(count, np.inf)
+    weights = np.clip(away[:, None] / (AT_BOUNDARY * MATCHED_RADII), LEAST_WEIGHT, 1.0)
+    distances = rows.astype(np.float32)
+    between = np.ascontiguousarray(distances[:, chosen])
+    patches = Patches(numbers, weights.astype(np.float32), chosen, between)
+    codebook = default_codebook()
+    whitened = [whiten_numbers(patches, place, codebook, place) for place in range(len(BASES))]
+    return Surface(
+        mesh,
+        areas,
+        normals,
+        chosen,
+        distances,
+        nearest,
+        np.stack(whitened, axis=1).astype(np.float32),
+        patches.weights,
+        between,
+        _directions(mesh, chosen, rows, normals),
+    )
+
+
+def _describe_discs(
+    mesh: TriangleMesh,
+    points: Int[np.ndarray, " m"],
+    rows: Float[np.ndarray, "m n"],
+    areas: Float[np.ndarray, " n"],
+    normals: Float[np.ndarray, "n 3"],
+) -> Float32[np.ndarray, "m r c"]:
+    """Return the 64 numbers of the discs around points (`extract_patches`)."""
+    numbers = np.empty((len(points), len(MATCHED_RADII), NUMBERS), dtype=np.float32)
+    scratch = np.empty(RINGS), np.empty(RINGS)
+    surface = mesh.vertices, normals, areas
+    for point, distances, discs in zip(points, rows, numbers, strict=True):
+        reached = np.flatnonzero(distances <= MATCHED_RADII[-1])
+        order = reached[np.argsort(distances[reached], kind="stable")]
+        for radius, found in zip(MATCHED_RADII, discs, strict=True):
+            describe_disc(
+                distances, mesh.vertices[point], order, surface, radius, *scratch, found
+            )
+    return numbers
+
+
+def _directions(
+    mesh: TriangleMesh,
+    points: Int[np.ndarray, " m"],
+    rows: Float[np.ndarray, "m n"],
+    normals: Float[np.ndarray, "n 3"],
+) -> Complex64[np.ndarray, "m m"]:
+    """Return the direction at each point towards each other one: minus the gradient of a distance.
+
+    The gradient is fitted to the vertices of two rings around the point, in its tangent plane.
+    """
+    edges = edge_table(mesh).edges
+    ones = np.ones(len(edges))
+    links = sp.coo_array((ones, edges.T), shape=(mesh.n_vertices,) * 2).tocsr()
+    links = links + links.T
+    rings = (links + links @ links)[points].tocsr()
+    found = np.empty((len(points),) * 2, dtype=np.complex64)
+    for number, point in enumerate(points):
+        around = rings.indices[rings.indptr[number] : rings.indptr[number + 1]]
+        around = around[around != point]
+        arms = mesh.vertices[around] - mesh.vertices[point]
+        # Unfold the arms into the tangent plane, with their lengths.
+        frame = _tangent_frame(normals[point])
+        flat = arms @ frame.T
+        lengths = np.linalg.norm(flat, axis=1)
+        stretch = np.linalg.norm(arms, axis=1) / np.maximum(lengths, np.finfo(float).tiny)
+        flat *= stretch[:, None]
+        with np.errstate(invalid="ignore"):
+            rises = rows[:, around] - rows[:, [point]]
+        rises[~np.isfinite(rises)] = 0.0
+        slopes = np.linalg.lstsq(flat, rises.T, rcond=None)[0]
+        found[number] = -(slopes[0] + 1j * slopes[1])
+    return found / np.maximum(np.abs(found), 1)
+
+
+def _tangent_frame(normal: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "2 3"]:
+    """Return two unit vectors that with the normal form a right-handed frame."""
+    helper = np.eye(3)[np.argmin(np.abs(normal))]
+    first = np.cross(helper, normal)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
