@@ -13,6 +13,7 @@ features     merge trees, feature points, parts
 deformation  regions, motions, editing sessions, transfer of poses
 stability    how far two shapes and their spectra differ
 retrieval    descriptors, an index of shapes, search
+matching     dense correspondences of parts and wholes
 io           files, trimesh and PyVista
 plot         pictures
 types        annotations for your own signatures

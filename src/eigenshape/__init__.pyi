@@ -3,6 +3,7 @@ from . import deformation as deformation
 from . import features as features
 from . import geometry as geometry
 from . import io as io
+from . import matching as matching
 from . import operators as operators
 from . import plot as plot
 from . import retrieval as retrieval

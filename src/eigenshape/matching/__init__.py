@@ -1,1 +1,5 @@
-"""matching."""
+"""Dense correspondences between shapes, of a part or a whole with a whole."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

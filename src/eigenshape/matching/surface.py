@@ -1,6 +1,6 @@
 """Surfaces as matching sees them: points, their patches, and distances and directions from them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,7 +14,14 @@ from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.operators.smoothing import denoise
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.retrieval.patches.codebook import BASES, default_codebook, whiten_numbers
-from eigenshape.retrieval.patches.patch_loops import NUMBERS, RINGS, describe_disc
+from eigenshape.retrieval.patches.patch_loops import (
+    HEIGHT_BINS,
+    NUMBERS,
+    RING_NUMBERS,
+    RINGS,
+    TURN_BINS,
+    describe_disc,
+)
 from eigenshape.retrieval.patches.patches import AT_BOUNDARY, LEAST_WEIGHT, RADII, Patches
 
 # The unit of length, in roots of the area of the whole. Patches are described in sides of a box,
@@ -41,6 +48,7 @@ class Surface:
     nearest: Int[np.ndarray, " n"]
     numbers: Float32[np.ndarray, "m r d"]
     weights: Float32[np.ndarray, "m r"]
+    turned_numbers: Float32[np.ndarray, "m r d"]
     between: Float32[np.ndarray, "m m"]
     ways: Complex64[np.ndarray, "m m"]
 
@@ -69,8 +77,6 @@ def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
     distances = rows.astype(np.float32)
     between = np.ascontiguousarray(distances[:, chosen])
     patches = Patches(numbers, weights.astype(np.float32), chosen, between)
-    codebook = default_codebook()
-    whitened = [whiten_numbers(patches, place, codebook, place) for place in range(len(BASES))]
     return Surface(
         mesh,
         areas,
@@ -78,11 +84,43 @@ def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
         chosen,
         distances,
         nearest,
-        np.stack(whitened, axis=1).astype(np.float32),
+        _whiten(patches),
         patches.weights,
+        _whiten(replace(patches, numbers=_turned_numbers(numbers))),
         between,
         _directions(mesh, chosen, rows, normals),
     )
+
+
+def turn_over(surface: Surface) -> Surface:
+    """Return a surface turned inside out."""
+    mesh = surface.mesh
+    return replace(
+        surface,
+        mesh=TriangleMesh(mesh.vertices, mesh.faces[:, ::-1]),
+        normals=-surface.normals,
+        numbers=surface.turned_numbers,
+        turned_numbers=surface.numbers,
+        # A frame seen from the other side is mirrored.
+        ways=np.conj(surface.ways),
+    )
+
+
+def _whiten(patches: Patches) -> Float32[np.ndarray, "m r d"]:
+    """Whiten the numbers at each radius by the codebook that comes with the library."""
+    codebook = default_codebook()
+    rows = [whiten_numbers(patches, place, codebook, place) for place in range(len(BASES))]
+    return np.stack(rows, axis=1).astype(np.float32)
+
+
+def _turned_numbers(numbers: Float32[np.ndarray, "m r c"]) -> Float32[np.ndarray, "m r c"]:
+    """Return the numbers of discs of the surface turned inside out: heights change their signs."""
+    found = numbers.copy()
+    for ring in range(RINGS):
+        first = ring * RING_NUMBERS + TURN_BINS
+        heights = slice(first, first + HEIGHT_BINS)
+        found[:, :, heights] = numbers[:, :, heights][:, :, ::-1]
+    return found
 
 
 def _describe_discs(

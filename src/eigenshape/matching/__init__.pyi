@@ -1,0 +1,4 @@
+from .match import match_shapes as match_shapes
+from .shape_match import ShapeMatch as ShapeMatch
+from .target import MatchTarget as MatchTarget
+from .target import prepare_target as prepare_target
