@@ -137,7 +137,9 @@ def draw_pairs(half: dict[str, list[str]], kind: str, count: int, *, first_seed:
         rng = np.random.default_rng([seed, SETS.index(kind)])
         animal = sorted(half)[number % len(half)]
         poses = half[animal]
-        one, two = rng.choice(len(poses), 2, replace=False) if half is not RIGID else [number // 3 % 3] * 2
+        one, two = (
+            rng.choice(len(poses), 2, replace=False) if half is not RIGID else [number // 3 % 3] * 2
+        )
         found.append((animal, (poses[one], poses[two]), kind, seed))
     return found
 

@@ -4,11 +4,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import Integer
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.deformation.rigidity import edge_weights, fit_turns, free_part, nearest_rotations
 from eigenshape.deformation.rigidity_loops import turn_edges
@@ -17,7 +16,12 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes, size_one
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.maps.functional_map import FunctionalMap, point_areas, transfer_function
+from eigenshape.spectral.maps.point_maps import map_from_points
+from eigenshape.spectral.solve import solve_spectrum
 
+# Modes of a map that is given by vertices: a pose needs some 20 to 50, and higher ones carry errors
+# of single vertices (experiments/ch6_deformation).
+POSE_MODES = 50
 Turns = Float[np.ndarray, "n 3 3"]
 
 
@@ -26,7 +30,7 @@ def transfer_deformation(
     before: MeshLike,
     after: MeshLike,
     target: MeshLike,
-    mapping: FunctionalMap,
+    mapping: FunctionalMap | ArrayLike,
     *,
     n_modes: Integer | None = None,
 ) -> TriangleMesh:
@@ -45,8 +49,10 @@ def transfer_deformation(
         Two poses of the source, with the same faces.
     target : MeshLike
         The target, in a pose that corresponds to `before`.
-    mapping : FunctionalMap
-        From the modes of `before` to those of the target.
+    mapping : FunctionalMap or (n,) int
+        From the modes of `before` to those of the target; or a vertex of `before` for each vertex
+        of the target, such as ``match_shapes(target, before)``, from which a map of 50 modes is
+        computed.
     n_modes : int, optional
         Number of modes of the source to use; by default all modes of the map.
 
@@ -66,6 +72,7 @@ def transfer_deformation(
     See Also
     --------
     functional_map : Compute the map from pairs of corresponding points.
+    eigenshape.matching.match_shapes : Find corresponding points.
 
     Examples
     --------
@@ -85,8 +92,9 @@ def transfer_deformation(
     before = as_mesh(before, "before")
     after = as_mesh(after, "after")
     target = as_mesh(target, "target")
-    require_type(mapping, FunctionalMap, "mapping")
     require_poses(before, after)
+    if not isinstance(mapping, FunctionalMap):
+        mapping = _map_of_vertices(before, target, mapping)
     for mesh, spectrum, name in (
         (before, mapping.source, "source"),
         (target, mapping.target, "target"),
@@ -107,6 +115,15 @@ def transfer_deformation(
     stand = _rotation_between(source_on_target, target.vertices, point_areas(mapping.target))
     turned = _turn_edges(target, stand @ carried @ stand.T)
     return TriangleMesh(turned + _move_center(before, after, target, stand), target.faces)
+
+
+def _map_of_vertices(
+    before: TriangleMesh, target: TriangleMesh, vertices: ArrayLike
+) -> FunctionalMap:
+    """Return the functional map of 50 modes, or fewer on small meshes, of corresponding vertices."""
+    k = min(POSE_MODES, before.n_vertices // 2, target.n_vertices // 2)
+    source, other = (solve_spectrum(cotangent_laplacian(mesh), k) for mesh in (before, target))
+    return map_from_points(source, other, vertices, n_modes=k)
 
 
 def _rotation_between(

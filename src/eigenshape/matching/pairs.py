@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Complex64, Float, Float32, Int
+from jaxtyping import Bool, Complex64, Float, Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape.matching.match_loops import couple_pairs, nearest_rows, place_by_distances
@@ -13,7 +13,9 @@ from eigenshape.matching.surface import Surface
 # All lengths are in units of `Surface` unless stated.
 N_CANDIDATES = 5  # partners that are tried for each point; ten found nothing more
 # Share of a distance by which two pairs may disagree and still support each other
-SLACK = 0.3  # 0.15 had errors of 6.2, 0.25 of 4.6, 0.4 of 4.5 on poses that differ much, this one 4.5
+SLACK = (
+    0.3  # 0.15 had errors of 6.2, 0.25 of 4.6, 0.4 of 4.5 on poses that differ much, this one 4.5
+)
 SHORTEST = 0.05  # errors of shorter distances are shares of this
 # A distance that is longer on the part counts half: around a hole or a cut paths are longer.
 LONGER = 0.5
@@ -21,7 +23,9 @@ LEAST_SUPPORT = 0.3  # of a pair, as a share of the largest, to be selected
 LEAST_AGREEMENT = 0.5  # the same, of the support by selected pairs, as a share of their median
 FIRST_ROUNDS = 30  # of the iteration from all candidates; it is steady after about 20
 NEXT_ROUNDS = 15  # near the images of the last round
-N_GROWTHS = 5  # times that pairs are selected, cleaned and extended; the fourth and fifth add little
+N_GROWTHS = (
+    5  # times that pairs are selected, cleaned and extended; the fourth and fifth add little
+)
 # Points nearer than this on the whole that are more than BLOCKED times as far on the part conflict.
 CROWDED = 0.07
 BLOCKED = 2.5

@@ -1,9 +1,11 @@
 """A map from a part to a whole, with how sure it is of each vertex."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from numpy.typing import DTypeLike, NDArray
 
 from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
@@ -73,6 +75,10 @@ class ShapeMatch:
     def n_vertices(self) -> int:
         """Number of vertices of the part, n."""
         return len(self.vertices)
+
+    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
+        """Return `vertices`, so that functions that take a list of vertices take a match."""
+        return np.array(self.vertices, dtype=dtype)
 
     def pull(self, values: ArrayLike) -> Float[np.ndarray, "n ..."] | Int[np.ndarray, " n"]:
         """Give each vertex of the part the value of its point on the whole.

@@ -9,10 +9,10 @@ from jaxtyping import Complex64, Float, Float32, Int
 from eigenshape.geometry.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.operators.smoothing import denoise
-from eigenshape.geometry.orientation import orient_outward
 from eigenshape.retrieval.patches.codebook import BASES, default_codebook, whiten_numbers
 from eigenshape.retrieval.patches.patch_loops import (
     HEIGHT_BINS,
@@ -138,9 +138,7 @@ def _describe_discs(
         reached = np.flatnonzero(distances <= MATCHED_RADII[-1])
         order = reached[np.argsort(distances[reached], kind="stable")]
         for radius, found in zip(MATCHED_RADII, discs, strict=True):
-            describe_disc(
-                distances, mesh.vertices[point], order, surface, radius, *scratch, found
-            )
+            describe_disc(distances, mesh.vertices[point], order, surface, radius, *scratch, found)
     return numbers
 
 

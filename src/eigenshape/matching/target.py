@@ -3,10 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread

@@ -6,6 +6,7 @@ from .fields import figure_field as figure_field
 from .fields import figure_segments as figure_segments
 from .fields import part_colors as part_colors
 from .fields import value_colors as value_colors
+from .matches import figure_match as figure_match
 from .persistence import figure_diagram as figure_diagram
 from .persistence import figure_merge_tree as figure_merge_tree
 from .poses import figure_poses as figure_poses

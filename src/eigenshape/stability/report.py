@@ -174,7 +174,8 @@ def compare_shapes(
     plan : StabilityPlan, optional
         Number of eigenvalues, of samples, heat times and seed.
     partners : (n1,) int, optional
-        For each point of the first mesh, the corresponding point of the second.
+        For each point of the first mesh, the corresponding point of the second; for instance the
+        result of `eigenshape.matching.match_shapes`.
     progress : callable, optional
         Called as ``progress(fraction_done, message)``.
 
