@@ -28,8 +28,10 @@ VERBS = {
     "segment": "Cut a mesh into its parts: limbs, head, torso.",
     "label": "Copy the labels of one mesh to the matching parts of another: label a horse, and get "
     "a labeled camel.",
+    "match": "Find where each point of a part, a scan or a pose lies on a whole shape.",
     "deform": "Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows "
     "smoothly.",
+    "pose": "Bend a mesh into the pose of another one; what corresponds is found by itself.",
     "stability": "Compare two shapes: how close they are, how their spectra change, which heat times "
     "to trust.",
     "index": "Keep an index of shapes: add meshes, list and remove shapes, check, compact, export "

@@ -1,5 +1,6 @@
 """How good a map is: of the whole part, and of each vertex as a probability."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +14,13 @@ from eigenshape.matching.pairs import Pairs, couplings
 from eigenshape.matching.surface import Surface
 
 SMOOTHING = 10  # means over neighbors: local evidence is that of a disc of about three edges
+FARTHEST = 0.3  # units: longer distances say no more
+MOST_STRETCH = 5.0  # the same, for ratios of lengths
 TINY = np.finfo(float).tiny
 # Logistic regression on the tuning half of experiments/ch7_matching (`calibrate.py`): a constant,
 # then the columns of `vertex_evidence`.
-CALIBRATION = np.zeros(9)
+N_COLUMNS = 8
+CALIBRATION = np.zeros(1 + N_COLUMNS)
 
 
 @dataclass(frozen=True)
@@ -33,10 +37,28 @@ class Quality:
         return max(self.orientation, 0.0) * self.coverage**2 * self.support
 
 
+@dataclass(frozen=True, eq=False)
+class PlacedMap:
+    """A map of a connected part: vertices of the whole, from which pairs, and how good it is.
+
+    `kept` is the signed ratio of areas of each face of the part, between -1 and 1.
+    """
+
+    places: Int[np.ndarray, " n"]
+    misfits: Float[np.ndarray, " n"]
+    pairs: Pairs
+    quality: Quality
+    kept: Float[np.ndarray, " f"]
+
+
 def rate_map(
-    part: Surface, whole: Surface, places: Int[np.ndarray, " n"], pairs: Pairs
-) -> tuple[Quality, Float[np.ndarray, " f"]]:
-    """Rate a map of vertices to vertices; return also the signed area ratio of each face, -1 to 1."""
+    part: Surface,
+    whole: Surface,
+    pairs: Pairs,
+    places: Int[np.ndarray, " n"],
+    misfits: Float[np.ndarray, " n"],
+) -> PlacedMap:
+    """Rate a map of vertices to vertices."""
     faces = part.mesh.faces
     areas = np.linalg.norm(area_vectors(part.mesh.vertices[faces]), axis=1)
     moved = area_vectors(whole.mesh.vertices[places[faces]])
@@ -48,45 +70,38 @@ def rate_map(
     coupling = couplings(part, whole, pairs.points, pairs.partners)
     support = np.abs(coupling.sum(axis=1)).sum() / len(part.points) ** 2
     orientation = float(areas @ kept / areas.sum())
-    return Quality(orientation, float(min(covered, 1.0)), float(support)), kept
+    quality = Quality(orientation, float(min(covered, 1.0)), float(support))
+    return PlacedMap(places, misfits, pairs, quality, kept)
 
 
 def vertex_evidence(
-    part: Surface,
-    whole: Surface,
-    places: Int[np.ndarray, " n"],
-    pairs: Pairs,
-    rated: tuple[Quality, Float[np.ndarray, " f"]],
-    others: list[Int[np.ndarray, " n"]],
-    misfits: Float[np.ndarray, " n"],
+    part: Surface, whole: Surface, found: PlacedMap, others: Sequence[PlacedMap]
 ) -> Float[np.ndarray, "n c"]:
-    """Return what tells how sure each vertex is, in columns.
+    """Return what tells how sure each vertex is, in columns; see `ShapeMatch.evidence`.
 
-    Local orientation, local misfit of distances, distance to the next pair, distance to where other
-    starts put the vertex, local stretch, weight of the patch of the nearest point; and orientation
-    and support of the whole map.
+    Local columns are means over discs of about three edges.
     """
-    quality, kept = rated
+    places, kept = found.places, found.kept
     faces, n = part.mesh.faces, part.mesh.n_vertices
     flat = np.bincount(faces.ravel(), weights=np.repeat(kept, 3), minlength=n)
     local = flat / np.maximum(np.bincount(faces.ravel(), minlength=n), 1)
     edges = edge_table(part.mesh).edges
     ours = np.linalg.norm(np.subtract(*part.mesh.vertices[edges.T]), axis=1)
     theirs = np.linalg.norm(np.subtract(*whole.mesh.vertices[places[edges.T]]), axis=1)
-    jumps = np.minimum(theirs / np.maximum(ours, TINY), 5.0)
+    jumps = np.minimum(theirs / np.maximum(ours, TINY), MOST_STRETCH)
     stretch = np.bincount(edges.ravel(), weights=np.repeat(jumps, 2), minlength=n)
     stretch /= np.maximum(np.bincount(edges.ravel(), minlength=n), 1)
-    away = part.distances[pairs.points].min(axis=0)
+    away = part.distances[found.pairs.points].min(axis=0)
     spread = np.zeros(n)
     for other in others:
-        gaps = np.linalg.norm(whole.mesh.vertices[places] - whole.mesh.vertices[other], axis=1)
-        spread += np.minimum(gaps, 0.3) / len(others)
+        gap = whole.mesh.vertices[places] - whole.mesh.vertices[other.places]
+        spread += np.minimum(np.linalg.norm(gap, axis=1), FARTHEST) / len(others)
     mean = _neighbor_means(edges, n)
-    columns = [local, misfits, np.minimum(away, 0.5), spread, stretch]
+    columns = [local, found.misfits, np.minimum(away, FARTHEST), spread, stretch]
     for _ in range(SMOOTHING):
         columns = [mean @ column for column in columns]
     rim = part.weights.min(axis=1)[part.nearest]
-    whole_map = (quality.orientation, quality.support)
+    whole_map = (found.quality.orientation, found.quality.support)
     return np.column_stack([*columns, rim, *(np.full(n, value) for value in whole_map)])
 
 

@@ -15,7 +15,14 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import submesh, vertex_components
-from eigenshape.matching.evidence import Quality, confidence, rate_map, vertex_evidence
+from eigenshape.matching.evidence import (
+    N_COLUMNS,
+    PlacedMap,
+    Quality,
+    confidence,
+    rate_map,
+    vertex_evidence,
+)
 from eigenshape.matching.pairs import (
     FEWEST_PAIRS,
     FIRST_ROUNDS,
@@ -44,20 +51,6 @@ LEAST_AREA = 0.01
 AS_HANDED = 0.9
 # Sizes of the part that are tried, as shares of the longest side of the whole's box
 SIZES = 1.25 ** np.arange(1, -6, -1.0)
-
-
-@dataclass(frozen=True, eq=False)
-class _Map:
-    """A map of one connected part: vertices of the whole, and how good it is."""
-
-    places: Int[np.ndarray, " n"]
-    misfits: Float[np.ndarray, " n"]
-    pairs: Pairs
-    rated: tuple[Quality, Float[np.ndarray, " f"]]
-
-    @property
-    def score(self) -> float:
-        return self.rated[0].score
 
 
 @one_blas_thread()
@@ -183,7 +176,7 @@ def _find_scale(mesh: TriangleMesh, target: MatchTarget) -> float:
     for factor in factors:
         surface = describe_surface(largest, target.unit / factor, N_PART)
         maps = _grow_maps(surface, target.surface, 1)
-        scores.append(maps[0].score * np.sqrt(surface.area) if maps else 0.0)
+        scores.append(maps[0].quality.score * np.sqrt(surface.area) if maps else 0.0)
     best = float(factors[int(np.argmax(scores))])
     # Between the sizes that were tried, distances between pairs say how large the part is.
     surface = describe_surface(largest, target.unit / best, N_PART)
@@ -209,27 +202,39 @@ def _area_of(mesh: TriangleMesh, vertices: Int[np.ndarray, " k"]) -> float:
     return float(face_areas(mesh)[np.isin(mesh.faces[:, 0], vertices)].sum())
 
 
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """The map of a connected part; see `ShapeMatch`."""
+
+    faces: Int[np.ndarray, " n"]
+    weights: Float[np.ndarray, "n 3"]
+    confidence: Float[np.ndarray, " n"]
+    evidence: Float[np.ndarray, "n c"]
+    quality: Quality
+    handed: bool
+
+
 def _match_pieces(mesh: TriangleMesh, target: MatchTarget, factor: float) -> ShapeMatch:
     """Match each piece by itself; tiny ones go where their nearest neighbors in space go."""
     n = mesh.n_vertices
     faces, weights = np.zeros(n, dtype=np.int64), np.full((n, 3), 1 / 3)
-    sure, done = np.zeros(n), np.zeros(n, dtype=bool)
-    rows = []
+    sure, evidence, done = np.zeros(n), np.zeros((n, N_COLUMNS)), np.zeros(n, dtype=bool)
     least = LEAST_AREA * surface_area(target.mesh) / factor**2
     pieces = _pieces(mesh)
+    found: list[tuple[float, _Piece]] = []
     for vertices in pieces:
         area = _area_of(mesh, vertices)
-        if len(pieces) > 1 and area < least:
+        if len(pieces) == 1:
+            piece = _match_piece(mesh, target, factor)
+        elif area >= least:
+            part, _ = submesh(mesh, np.isin(mesh.faces[:, 0], vertices))
+            piece = _match_piece(part, target, factor)
+        else:
             continue
-        piece = mesh
-        if len(pieces) > 1:
-            piece, vertices = submesh(mesh, np.isin(mesh.faces[:, 0], vertices))
-        found, handed = _match_piece(piece, target, factor)
-        faces[vertices], weights[vertices], sure[vertices] = found[:3]
-        quality: Quality = found[3]
-        done[vertices] = True
-        rows.append((area, quality.score, quality.orientation, quality.coverage, handed))
-    if not rows:
+        faces[vertices], weights[vertices] = piece.faces, piece.weights
+        sure[vertices], evidence[vertices], done[vertices] = piece.confidence, piece.evidence, True
+        found.append((area, piece))
+    if not found:
         raise InvalidParameterError(
             f"A part must have a piece with {LEAST_AREA:.0%} of the area of the whole; "
             f'none of its {len(pieces)} pieces has. Pass scale="unknown" if units may differ.'
@@ -237,26 +242,31 @@ def _match_pieces(mesh: TriangleMesh, target: MatchTarget, factor: float) -> Sha
     if not done.all():
         nearest = np.flatnonzero(done)[cKDTree(mesh.vertices[done]).query(mesh.vertices[~done])[1]]
         faces[~done], weights[~done] = faces[nearest], weights[nearest]
-    areas, scores, orientations, coverages, handed_pieces = zip(*rows, strict=True)
     corners = target.mesh.faces[faces]
+    areas = [area for area, _ in found]
+
+    def mean(what: str) -> float:
+        return float(
+            np.average([getattr(piece.quality, what) for _, piece in found], weights=areas)
+        )
+
     return ShapeMatch(
-        freeze(corners[np.arange(n), weights.argmax(axis=1)]),
-        freeze(faces),
-        freeze(corners),
-        freeze(weights),
-        freeze(sure),
-        float(np.average(scores, weights=areas)),
-        float(np.average(orientations, weights=areas)),
-        float(np.average(coverages, weights=areas)),
-        all(handed_pieces),
-        factor,
+        vertices=freeze(corners[np.arange(n), weights.argmax(axis=1)]),
+        faces=freeze(faces),
+        corners=freeze(corners),
+        weights=freeze(weights),
+        confidence=freeze(sure),
+        evidence=freeze(evidence),
+        score=mean("score"),
+        orientation=mean("orientation"),
+        coverage=mean("coverage"),
+        handed=all(piece.handed for _, piece in found),
+        scale=factor,
     )
 
 
-def _match_piece(
-    mesh: TriangleMesh, target: MatchTarget, factor: float
-) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray, Quality], bool]:
-    """Return faces, weights, confidence and quality of the map of a connected part; if it is handed."""
+def _match_piece(mesh: TriangleMesh, target: MatchTarget, factor: float) -> _Piece:
+    """Match a connected part."""
     whole = target.surface
     part = describe_surface(mesh, target.unit / factor, N_PART)
     upright, turned = (_first_support(part, whole, turned=side) for side in (False, True))
@@ -264,21 +274,19 @@ def _match_piece(
     if handed and turned > upright:
         part = turn_over(part)
     maps = _grow_maps(part, whole, N_STARTS)
-    if not maps:
-        # Too few points agree for a map: take the most similar patch of each, and trust none.
-        partners = descriptor_costs(part, whole).argmin(axis=1)
-        places = whole.points[partners][part.nearest]
-        pairs = Pairs(np.arange(len(partners)), partners, np.ones(len(partners)))
-        quality, _ = rate_map(part, whole, places, pairs)
-        faces, weights = _at_vertices(target.mesh, places)
-        return (faces, weights, np.zeros(len(places)), quality), handed
-    best = maps[0]
-    evidence = vertex_evidence(
-        part, whole, best.places, best.pairs, best.rated, [m.places for m in maps[1:]], best.misfits
-    )
-    modes = modes_of_part(part.mesh, target.modes)
-    faces, weights = refine_places(modes, target.modes, whole.mesh, best.places)
-    return (faces, weights, confidence(evidence), best.rated[0]), handed
+    if maps:
+        evidence = vertex_evidence(part, whole, maps[0], maps[1:])
+        modes = modes_of_part(part.mesh, target.modes)
+        faces, weights = refine_places(modes, target.modes, whole.mesh, maps[0].places)
+        return _Piece(faces, weights, confidence(evidence), evidence, maps[0].quality, handed)
+    # Too few points agree for a map: take the most similar patch of each, and trust none.
+    partners = descriptor_costs(part, whole).argmin(axis=1)
+    places = whole.points[partners][part.nearest]
+    pairs = Pairs(np.arange(len(partners)), partners, np.ones(len(partners)))
+    quality = rate_map(part, whole, pairs, places, np.zeros(len(places))).quality
+    faces, weights = _at_vertices(target.mesh, places)
+    n = len(places)
+    return _Piece(faces, weights, np.zeros(n), np.zeros((n, N_COLUMNS)), quality, handed)
 
 
 def _first_support(part: Surface, whole: Surface, *, turned: bool) -> float:
@@ -286,13 +294,11 @@ def _first_support(part: Surface, whole: Surface, *, turned: bool) -> float:
     side = turn_over(part) if turned else part
     points, partners = first_candidates(descriptor_costs(side, whole))
     coupling = couplings(side, whole, points, partners)
-    pairs, chosen = select_pairs(
-        coupling, points, partners, supports(coupling, points, FIRST_ROUNDS)
-    )
+    _, chosen = select_pairs(coupling, points, partners, supports(coupling, points, FIRST_ROUNDS))
     return float(np.abs(coupling[np.ix_(chosen, chosen)].sum(axis=1)).sum())
 
 
-def _grow_maps(part: Surface, whole: Surface, n_starts: int) -> list[_Map]:
+def _grow_maps(part: Surface, whole: Surface, n_starts: int) -> list[PlacedMap]:
     """Return maps grown from several starts, the best first."""
     costs = descriptor_costs(part, whole)
     points, partners = first_candidates(costs)
@@ -310,8 +316,8 @@ def _grow_maps(part: Surface, whole: Surface, n_starts: int) -> list[_Map]:
         if len(pairs.points) < FEWEST_PAIRS:
             continue
         places, misfits = place_points(part, whole, pairs, every)
-        maps.append(_Map(places, misfits, pairs, rate_map(part, whole, places, pairs)))
-    return sorted(maps, key=lambda found: -found.score)
+        maps.append(rate_map(part, whole, pairs, places, misfits))
+    return sorted(maps, key=lambda found: -found.quality.score)
 
 
 def _at_vertices(

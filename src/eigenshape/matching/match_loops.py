@@ -30,7 +30,7 @@ def couple_pairs(points, images, part, whole, slack, least, longer, couplings):
             one, two = ours[p, r], theirs[q, s]
             if not (np.isfinite(one) and np.isfinite(two)):
                 continue
-            error = abs(one - two) / max(max(one, two), least)
+            error = abs(one - two) / max(one, two, least)
             if one > two:
                 error *= longer
             if error < slack:

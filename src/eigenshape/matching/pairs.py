@@ -20,7 +20,7 @@ SHORTEST = 0.05  # errors of shorter distances are shares of this
 # A distance that is longer on the part counts half: around a hole or a cut paths are longer.
 LONGER = 0.5
 LEAST_SUPPORT = 0.3  # of a pair, as a share of the largest, to be selected
-LEAST_AGREEMENT = 0.5  # the same, of the support by selected pairs, as a share of their median
+LEAST_AGREEMENT = 0.7  # the same, of the support by selected pairs, as a share of their median
 FIRST_ROUNDS = 30  # of the iteration from all candidates; it is steady after about 20
 NEXT_ROUNDS = 15  # near the images of the last round
 N_GROWTHS = (
@@ -33,7 +33,7 @@ OCCUPIED = 2.0  # cost of a place that a far point has taken, in median least co
 # A point may move this far from where its neighbors place it, plus the share WANDER of its distance
 # to the next kept pair.
 REACH = 0.07
-WANDER = 0.5
+WANDER = 0.8
 # Two neighboring pairs agree if their distances differ by at most this share plus this length.
 NEIGHBOR_SHARE = 0.3
 NEIGHBOR_SLACK = 0.024

@@ -15,6 +15,11 @@ from .indexing import learn_codebook as learn_codebook
 from .indexing import parse_part as parse_part
 from .indexing import prune as prune
 from .indexing import worker_processes as worker_processes
+from .maps import MAP_FILES as MAP_FILES
+from .maps import match_facts as match_facts
+from .maps import match_sentence as match_sentence
+from .maps import parse_scale as parse_scale
+from .maps import save_match as save_match
 from .outputs import require_mesh_path as require_mesh_path
 from .outputs import require_output as require_output
 from .outputs import require_picture as require_picture

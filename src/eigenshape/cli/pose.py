@@ -1,0 +1,69 @@
+"""eigenshape pose: a shape in the pose of another one."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import eigenshape as es
+from eigenshape.cli import steps
+from eigenshape.cli.console import out, print_json, progress_bar
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, UpOption, ViewOption
+
+
+def pose(
+    mesh: MeshArgument,
+    *,
+    like: Annotated[Path, typer.Option("--like", help="Mesh in the wanted pose.")],
+    rest: Annotated[
+        Path | None,
+        typer.Option(
+            "--rest",
+            help=(
+                "The shape of --like, with the same faces, in the pose that the mesh has now. The "
+                "mesh is then bent as that shape was bent from --rest to --like."
+            ),
+        ),
+    ] = None,
+    repair: RepairOption = "",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Write the bent mesh (PLY, OBJ, OFF, STL or GLB)."),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")
+    ] = None,
+    view: ViewOption = "auto",
+    up: UpOption = "auto",
+    as_json: JsonOption = False,
+) -> None:
+    """Bend a mesh into the pose of another one; what corresponds is found by itself.
+
+    Repairs are applied to the mesh that is bent.
+
+    For instance: eigenshape pose cat.ply --like lion.ply -o bent.ply --picture bent.png
+    """
+    steps.require_picture(picture)
+    side = steps.parse_side(view, up)
+    steps.require_mesh_path(output)
+    target, posed = steps.load_mesh(mesh, repair), steps.load_mesh(like, "")
+    source = steps.load_mesh(rest, "") if rest else posed
+    factor = np.sqrt(es.geometry.surface_area(source) / es.geometry.surface_area(target))
+    with progress_bar("match") as progress:
+        found = es.matching.match_shapes(target, source, scale=float(factor), progress=progress)
+        if rest:
+            bent = es.deformation.transfer_deformation(source, posed, target, found)
+        else:
+            bent = es.matching.take_pose(target, posed, match=found)
+    facts = steps.match_facts(found)
+    if as_json:
+        print_json({"path": str(mesh), "like": str(like), **facts})
+    else:
+        out.print(steps.match_sentence(facts))
+    if output:
+        steps.save_like(mesh, target, output, bent.vertices)
+    if picture:
+        moved = np.linalg.norm(bent.vertices - target.vertices, axis=1)
+        poses = {"before": target, "after": bent}
+        steps.save_picture(es.plot.figure_poses(poses, moved / moved.max(), **side), picture)
