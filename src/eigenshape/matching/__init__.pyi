@@ -1,5 +1,9 @@
+from .fusion import FusedScan as FusedScan
+from .fusion import fuse_scans as fuse_scans
 from .match import match_shapes as match_shapes
 from .posing import take_pose as take_pose
+from .registration import Registration as Registration
+from .registration import register_scans as register_scans
 from .shape_match import ShapeMatch as ShapeMatch
 from .target import MatchTarget as MatchTarget
 from .target import prepare_target as prepare_target

@@ -39,7 +39,9 @@ CUBE = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 TETRAHEDRA = np.array([[0, one, one + two, 7] for one, two, _ in permutations((4, 2, 1))])
 
 
-def reconstruct_surface(cloud: PointCloud) -> RepairedMesh[TriangleMesh]:
+def reconstruct_surface(
+    cloud: PointCloud, normals: Float[np.ndarray, "n 3"] | None = None
+) -> RepairedMesh[TriangleMesh]:
     """Compute a surface near the points of a cloud, closed where the points leave only small holes.
 
     The field is the one whose slopes fit the normals of the points best (Kazhdan, Bolitho and
@@ -53,6 +55,8 @@ def reconstruct_surface(cloud: PointCloud) -> RepairedMesh[TriangleMesh]:
     ----------
     cloud : PointCloud
         At least 100 different points of a surface in R³.
+    normals : (n, 3) float, optional
+        Outward unit normals, where they are known.
 
     Returns
     -------
@@ -73,7 +77,8 @@ def reconstruct_surface(cloud: PointCloud) -> RepairedMesh[TriangleMesh]:
     low = cloud.points.min(axis=0)
     points, scale = size_one(cloud.points - low)
     distances, neighbors = cKDTree(points).query(points, N_NEIGHBORS + 1)
-    normals = _oriented_normals(points, neighbors[:, 1:])
+    if normals is None:
+        normals = _oriented_normals(points, neighbors[:, 1:])
     # The nearest k points fill a disc of k times the area of one.
     areas = np.pi * distances[:, -1] ** 2 / N_NEIGHBORS
     extent = float(points.max())

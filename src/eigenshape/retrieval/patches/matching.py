@@ -212,7 +212,7 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     require_type(first, PatchPoints, "first")
     require_type(second, PatchPoints, "second")
     start = _best_start(first, second)
-    costs = _squared_distances(first, second, start.step)
+    costs = squared_distances(first, second, start.step)
     costs = costs + STRAIN_WEIGHT * np.median(costs) * _strain(first, second, start)
     points = _select_supported(_consistent(first, second, costs, start.step), LEAST_SUPPORT)
     vertices = np.column_stack([first.vertices[points[:, 0]], second.vertices[points[:, 1]]])
@@ -243,7 +243,7 @@ def _best_start(first: PatchPoints, second: PatchPoints) -> _Matches:
             f"numbers each, those of the second {second.numbers.shape[1:]}."
         )
     starts = [
-        _consistent(first, second, _squared_distances(first, second, step), step) for step in STEPS
+        _consistent(first, second, squared_distances(first, second, step), step) for step in STEPS
     ]
     return max(starts, key=lambda matches: matches.agreement)
 
@@ -311,7 +311,7 @@ def _strain(
     return np.asarray(np.minimum(errors**2, 1).mean(axis=2))
 
 
-def _squared_distances(
+def squared_distances(
     first: PatchPoints, second: PatchPoints, step: int
 ) -> Float32[np.ndarray, "m n"]:
     """Compare numbers at base radii of one shape with those some steps larger of the other."""
