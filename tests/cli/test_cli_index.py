@@ -79,11 +79,12 @@ def test_ls_lists_what_the_table_says(index):
         (["label=bird,fish", "height=0..9"], ["bird/a", "fish/a"]),
         (["label=7"], ["seven"]),  # a class is a text, whatever it looks like
         (["label=1..2"], ["range"]),
+        (['label="cup, small",7'], ["cup", "seven"]),
     ],
 )
 def test_filters_choose_shapes(index, filters, names):
     descriptor = find_heat_features(make_creature("fish", n_vertices=500)).descriptor
-    for name, label in (("seven", "7"), ("range", "1..2")):
+    for name, label in (("seven", "7"), ("range", "1..2"), ("cup", "cup, small")):
         ShapeIndex.open(index).add_descriptors(name, [descriptor], label=label)
     options = [part for text in filters for part in ("--filter", text)]
     assert [record["name"] for record in run_json("index", "ls", index, *options)] == names

@@ -143,7 +143,8 @@ def _print(
     if pruned:
         counts += f", {len(pruned)} removed"
     out.print(f"{counts}, {len(report.failed)} failed; the index holds {len(shelf)} shapes.")
-    for name, reason in report.failed:
+    # On a terminal each file was named when it failed.
+    for name, reason in () if out.is_terminal and err.is_terminal else report.failed:
         out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
     for one, two in doubles:
         out.print(f"  [yellow]{escape_text(two)}[/]: the same file content as {escape_text(one)}")
