@@ -303,6 +303,18 @@ def test_a_codebook_is_for_patches_and_is_a_codebook(meshes, index, tmp_path):
     assert run_json(*asked, learned, *options)["added"] == ["bird/a", "bird/b", "fish/a", "fish/b"]
 
 
+def test_all_shapes_of_an_index_have_as_many_frames(meshes, tmp_path):
+    new = tmp_path / "new"
+    asked = ("index", "add", new, meshes / "fish" / "a.ply", "--views", 0, "--workers", 1)
+    assert "is for --method patches" in run(*asked, "--frames", 2, *LIGHT, code=1).stderr
+    assert len(run_json(*asked, "--frames", 2)["added"]) == 1
+    recipe = ShapeIndex.open(new).default_recipe()
+    assert recipe.n_frames == 2
+    assert len(ShapeIndex.open(new).descriptors("a", recipe)[0].codes) == 3
+    assert "has 2 frames a shape" in run(*asked, "--frames", 1, code=1).stderr
+    assert run_json(*asked)["skipped"] == ["a"]
+
+
 def test_an_unreachable_cluster_is_named(meshes, tmp_path):
     pytest.importorskip("distributed")
     asked = ("index", "add", tmp_path / "new", meshes, "--scheduler", "nonsense://here:1")

@@ -14,7 +14,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers
-from eigenshape.io.shape_files import SHAPE_FORMATS, POINTS
+from eigenshape.io.shape_files import POINTS, SHAPE_FORMATS
 from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.store.batch import Callback, build_index
 from eigenshape.retrieval.store.damage import StoreWarning

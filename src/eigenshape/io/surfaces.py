@@ -12,7 +12,7 @@ from eigenshape.geometry.repair_report import RepairedMesh
 from eigenshape.io import pcd
 from eigenshape.io.mesh_files import require_surface
 from eigenshape.io.parsing import naming, parse_mesh, suffix_of
-from eigenshape.io.shape_files import SHAPE_FORMATS, POINTS
+from eigenshape.io.shape_files import POINTS, SHAPE_FORMATS
 from eigenshape.scans.frames import triangulate_frame
 from eigenshape.scans.reconstruction import reconstruct_surface
 

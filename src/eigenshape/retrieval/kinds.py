@@ -199,7 +199,8 @@ class _PatchKind(Kind[PatchRecipe, PatchDescriptor]):
     def describe_to_store(
         self, mesh: TriangleMesh, recipe: PatchRecipe, n_views: int
     ) -> list[PatchDescriptor]:
-        return [patch_descriptor(extract_patches(mesh, n_views=n_views), recipe)]
+        patches = extract_patches(mesh, n_views=n_views, n_frames=recipe.n_frames)
+        return [patch_descriptor(patches, recipe)]
 
     def rows(self, descriptor: PatchDescriptor, name: str) -> np.ndarray:
         return pack_codes(descriptor.codes.reshape(-1, descriptor.codes.shape[-1]))
@@ -239,13 +240,17 @@ class _PatchKind(Kind[PatchRecipe, PatchDescriptor]):
         return match_patches(first.points[0], second.points[0]).points
 
     def write_recipe(self, recipe: PatchRecipe) -> tuple[dict[str, Any], bytes | None]:
-        fields = {"codebook": recipe.codebook.digest, "clip": recipe.clip}
+        fields = {
+            "codebook": recipe.codebook.digest,
+            "clip": recipe.clip,
+            "n_frames": recipe.n_frames,
+        }
         return fields, write_codebook(recipe.codebook)
 
     def read_recipe(self, fields: dict[str, Any], codebook: bytes | None) -> PatchRecipe:
         if codebook is None:
             raise ValueError("its codebook is missing")
-        return PatchRecipe(read_codebook(codebook), float(fields["clip"]))
+        return PatchRecipe(read_codebook(codebook), float(fields["clip"]), fields["n_frames"])
 
 
 HEAT, PATCHES = _HeatKind(), _PatchKind()

@@ -99,6 +99,15 @@ def add(
     ] = False,
     method: MethodOption = PATCHES,
     views: ViewsOption = None,
+    frames: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=50,
+            help="Number of sides from which closed shapes are also described as a depth camera "
+            "sees them, for an index that is asked with single frames; 6 are a good choice.",
+        ),
+    ] = None,
     repair: IndexRepairOption = "auto",
     workers: WorkersOption = 2,
     timeout: TimeoutOption = 300.0,
@@ -117,8 +126,11 @@ def add(
     repairs = repair_names(repair)
     items = es.io.find_items(sources, labels=labels, part=steps.parse_part(part))
     shelf = es.ShapeIndex.open_or_create(index)
-    recipe = steps.index_recipe(shelf, method, codebook, in_parts=part is not None)
+    recipe = steps.index_recipe(shelf, method, codebook, in_parts=part is not None, n_frames=frames)
     with steps.worker_processes(workers, timeout, memory, scheduler) as processes:
+        if recipe is None and frames:
+            learned = steps.learn_codebook(items, processes, repairs)
+            recipe = es.retrieval.PatchRecipe(learned, n_frames=frames)
         report = steps.describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     pruned = steps.prune(shelf, sources) if prune else []
     doubles = steps.find_doubles(shelf, report.added)

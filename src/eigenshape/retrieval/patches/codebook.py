@@ -31,7 +31,6 @@ CLIP = 0.06
 DEFAULT = "default_codebook.npz"  # written by experiments/ch5_retrieval/make_codebook.py
 
 NO_COHORT = freeze(np.empty((0, 1, 1, 1), dtype=np.int8))
-NO_MEANS = freeze(np.zeros(2, dtype=np.float32))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,8 +52,6 @@ class PatchCodebook:
     cohort : (k, b, s, v) int8
         Codes of k closed shapes among those that it was learned from. How far a shape is from them
         tells how far it is from shapes in general (`PatchDescriptor.isolation`).
-    cohort_means : (2,) float32
-        Mean distance to the cohort of closed shapes, and of open ones.
 
     See Also
     --------
@@ -78,7 +75,6 @@ class PatchCodebook:
     centers: Float32[np.ndarray, "b w d"]
     variances: Float32[np.ndarray, "b w d"]
     cohort: Int8[np.ndarray, "k _ _ _"] = field(default_factory=lambda: NO_COHORT)
-    cohort_means: Float32[np.ndarray, "2"] = field(default_factory=lambda: NO_MEANS)
 
     _repr_html_ = html_repr
 

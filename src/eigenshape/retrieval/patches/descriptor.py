@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Int, Int8
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import freeze
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -38,11 +38,15 @@ class PatchRecipe:
     clip : float
         Largest entry of a Fisher vector of unit length that is told apart; entries are rounded to
         sevenths of it.
+    n_frames : int
+        Sides from which an index describes a closed shape as a depth camera sees it, beside its
+        views. Six find more for queries that are single frames of a depth camera, and take 49 KB
+        and 1 CPU second a shape.
 
     Raises
     ------
     InvalidParameterError
-        If `clip` is not positive and finite.
+        If `clip` is not positive and finite, or `n_frames` is negative.
 
     See Also
     --------
@@ -57,8 +61,10 @@ class PatchRecipe:
 
     codebook: PatchCodebook = field(default_factory=default_codebook)
     clip: float = CLIP
+    n_frames: int = 0
 
     def __post_init__(self) -> None:
+        whole_number(self.n_frames, "n_frames", 0)
         if not 0 < self.clip < inf:
             raise InvalidParameterError(
                 f"clip must be positive and finite; it is {self.clip}. The default is {CLIP}."
@@ -70,7 +76,8 @@ class PatchRecipe:
     @property
     def name(self) -> str:
         """Return a short name for messages and tables."""
-        return f"patches {self.codebook.digest[:8]}"
+        frames = f" with {self.n_frames} frames" if self.n_frames else ""
+        return f"patches {self.codebook.digest[:8]}{frames}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from eigenshape.retrieval.patches.codebook import (
     round_codes,
     standardize,
 )
-from eigenshape.retrieval.patches.cohort import FEWEST_MEMBERS, cohort_distance
+from eigenshape.retrieval.patches.cohort import FEWEST_MEMBERS
 from eigenshape.retrieval.patches.patches import Patches
 
 LEAST_SPREAD = 0.1  # standard deviation by which a number is divided at least, against noise
@@ -93,22 +93,13 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
 
 def _with_cohort(codebook: PatchCodebook, shapes: Sequence[Patches]) -> PatchCodebook:
     """Return a codebook with a cohort, spread evenly over the closed shapes in their order."""
-    codes = np.stack([round_codes(encode_patches(shape, codebook), CLIP) for shape in shapes])
     # Only near a boundary does the weight of a disc depend on its radius.
-    closed = np.array([(shape.weights == shape.weights[:, :1]).all() for shape in shapes])
-    wholes = np.flatnonzero(closed)
-    if len(wholes) < FEWEST_MEMBERS:
+    closed = [shape for shape in shapes if (shape.weights == shape.weights[:, :1]).all()]
+    if len(closed) < FEWEST_MEMBERS:
         return codebook
-    members = np.linspace(0, len(wholes) - 1, min(N_MEMBERS, len(wholes))).astype(np.int64)
-    cohort = codes[wholes[members]]
-    found = np.array([cohort_distance(each, cohort) for each in codes])
-    of_closed = found[closed].mean()
-    of_open = found[~closed].mean() if not closed.all() else of_closed
-    return replace(
-        codebook,
-        cohort=freeze(cohort),
-        cohort_means=freeze(np.array([of_closed, of_open], dtype=np.float32)),
-    )
+    places = np.linspace(0, len(closed) - 1, min(N_MEMBERS, len(closed))).astype(np.int64)
+    codes = [encode_patches(closed[place], codebook) for place in places.tolist()]
+    return replace(codebook, cohort=freeze(round_codes(np.stack(codes), CLIP)))
 
 
 def _train_at_radius(rows: Float32[np.ndarray, "p c"], seed: int) -> tuple[np.ndarray, ...]:
