@@ -40,7 +40,7 @@ class PatchRecipe:
         sevenths of it.
     n_frames : int
         Sides from which an index describes a closed shape as a depth camera sees it, beside its
-        views. Six find more for queries that are single frames of a depth camera, and take 49 KB
+        views. Six find more for queries that are single frames of a depth camera, and take 35 KB
         and 1 CPU second a shape.
 
     Raises
