@@ -171,7 +171,8 @@ def index_folder(  # noqa: PLR0913 - one keyword for each choice of a batch
 
 def _items_of(source: Path) -> Iterator[Item]:
     if not source.is_dir():
-        source.stat()  # raises OSError for a folder that is misspelled, before anything is described
+        # raises OSError for a folder that is misspelled, before anything is described
+        source.stat()
         yield Item(source.stem, source)
         return
     known = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in SHAPE_FORMATS]

@@ -143,7 +143,8 @@ def read_upload(path: Path, n_faces: int) -> es.geometry.RepairedMesh[es.Triangl
     Raises
     ------
     FileFormatError
-        If no surface can be made of it, or it has too many faces, or coordinates beyond single precision.
+        If no surface can be made of it, or it has too many faces, or coordinates beyond single
+        precision.
     """
     try:
         found = es.io.read_surface(path)

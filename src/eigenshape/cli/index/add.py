@@ -117,10 +117,10 @@ def add(
 ) -> None:
     """Describe shapes and add them to an index; a file that fails is named, and the others are still added.
 
-    A shape is named by its path below the given folder; its class is the folder that holds it. Shapes that the index
-    has already are skipped, also if their folder has moved. After Ctrl-C or a crash, the same command continues where
-    it stopped. Point clouds and frames of a depth camera (.pcd) become a surface first. The exit code is 3 if some
-    files failed.
+    A shape is named by its path below the given folder; its class is the folder that holds it.
+    Shapes that the index has already are skipped, also if their folder has moved. After Ctrl-C or a
+    crash, the same command continues where it stopped. Point clouds and frames of a depth camera
+    (.pcd) become a surface first. The exit code is 3 if some files failed.
     """
     require_method(method)
     repairs = repair_names(repair)

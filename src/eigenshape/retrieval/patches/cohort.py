@@ -16,8 +16,8 @@ FEWEST_MEMBERS = 1 + N_NEAREST
 USUAL_DISTANCE, USUAL_OPEN_DISTANCE = 0.77, 0.84
 # Exponent of the factor of isolation. On the tuning half a share of 0.5 raised the mean average
 # precision of complete queries in a mixed database from 71.5 to 74.1 (default codebook) and from
-# 75.9 to 78.6 (learned), and one of 1 to 75.0 and 80.0, but lost some first matches. A difference in
-# place of a factor found as much, and may be negative.
+# 75.9 to 78.6 (learned), and one of 1 to 75.0 and 80.0, but lost some first matches. A difference
+# in place of a factor found as much, and may be negative.
 ISOLATION_SHARE = 0.5
 # Isolations are whole multiples of this, as an index stores them.
 ISOLATION_STEP = 1e-6

@@ -33,8 +33,8 @@ LEAST_VARIANCE = 1e-3  # of an entry; whitened numbers have variance 1
 LEAST_COUNT = 1e-9  # patches, added to the count of each entry so that none is divided by 0
 ROUNDS = 60  # of expectation and maximization at most
 CONVERGED = 1e-5  # gain of the mean log-likelihood below which the fit ends
-# Members of a cohort at most; each takes 6 KB of the codebook's file. 48 members found no more on the
-# tuning half of experiments/ch5_retrieval.
+# Members of a cohort at most; each takes 6 KB of the codebook's file. 48 members found no more on
+# the tuning half of experiments/ch5_retrieval.
 N_MEMBERS = 24
 
 

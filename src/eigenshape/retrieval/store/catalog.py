@@ -25,8 +25,9 @@ MODULUS = 2**63  # of sums of checksums, so that SQLite stores them as integers
 ROWS_AT_ONCE = 20_000  # rows of a table in memory at a time: 10 MB
 # Errors that a damaged file causes: SQLite quotes bytes of it in messages, which may be no text.
 DAMAGE = (sqlite3.Error, UnicodeError)
-# The number of a row is never used twice: `seal` has the last one of each table. `touched` lists the
-# shapes that were removed or replaced, 12 bytes each: a reader reads these alone, not the tables.
+# The number of a row is never used twice: `seal` has the last one of each table. `touched` lists
+# the shapes that were removed or replaced, 12 bytes each: a reader reads these alone, not the
+# tables.
 SCHEMA = """
 CREATE TABLE recipe (
     id INTEGER PRIMARY KEY, fields TEXT NOT NULL UNIQUE, n_columns INTEGER NOT NULL,

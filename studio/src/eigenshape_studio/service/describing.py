@@ -73,7 +73,8 @@ class Described:
     n_vertices, n_faces : int
         After the repairs.
     repairs : tuple of str
-        How a surface was made of points, and what the repairs did. The numbers of vertices are those after the repairs.
+        How a surface was made of points, and what the repairs did. The numbers of vertices are
+        those after the repairs.
     picture : dict, optional
         For the page: the image as a data address; place and color of each described vertex.
     """
@@ -95,7 +96,9 @@ def describe_upload(recipe: Recipe, with_picture: bool, path: Path) -> Described
     mesh = repaired.mesh
     descriptor = es.describe(mesh, recipe)
     picture = _picture_of_query(mesh, descriptor.vertices) if with_picture else None
-    return Described(descriptor, mesh.n_vertices, mesh.n_faces, (*surface.report, *repaired.report), picture)
+    return Described(
+        descriptor, mesh.n_vertices, mesh.n_faces, (*surface.report, *repaired.report), picture
+    )
 
 
 def _picture_of_query(mesh: es.TriangleMesh, vertices: np.ndarray) -> dict[str, Any]:
