@@ -1,7 +1,7 @@
 """The command `eigenshape`: Ctrl-C ends it with one line and exit code 130, also while its libraries are imported.
 
-This module lies beside the package, not in it: whatever is imported from the package imports all of it first, which
-takes a second, and this module must be there before.
+This module lies beside the package, not in it: whatever is imported from the package imports all of
+it first, which takes a second, and this module must be there before.
 """
 
 import os

@@ -54,9 +54,9 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 class _CompilationListener(event.Listener):  # type: ignore[misc]
     """What happens while a loop of ours compiles, which one that is loaded from the disk never does.
 
-    The garbage collector pauses: it would go through the thousands of objects that the compiler keeps again and again,
-    for an eighth of all its time. numba compiles one function at a time, under a lock; those that one calls are
-    compiled within it.
+    The garbage collector pauses: it would go through the thousands of objects that the compiler
+    keeps again and again, for an eighth of all its time. numba compiles one function at a time,
+    under a lock; those that one calls are compiled within it.
     """
 
     def __init__(self) -> None:

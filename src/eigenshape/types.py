@@ -1,6 +1,7 @@
 """Annotations for the signatures of your own functions.
 
-`MeshLike` is what every public function takes for a mesh, and `ShapeLike` also includes point clouds.
+`MeshLike` is what every public function takes for a mesh, and `ShapeLike` also includes point
+clouds.
 """
 
 from eigenshape._progress import Progress

@@ -189,6 +189,14 @@ def test_shapes_are_listed_with_what_is_known_and_by_filters(service):
     assert (fish["tags"], fish["attributes"]) == (["swims"], {"legs": 0})
 
 
+def test_points_become_a_surface_and_the_answer_says_so(service):
+    mesh = es.make_creature("fish", n_vertices=4000)
+    data = "\n".join(f"{x} {y} {z}" for x, y, z in mesh.vertices).encode()
+    found = service.query(data, "fish.xyz").json()
+    assert "4,000 points" in found["scan"]["repairs"][0]
+    assert found["matches"][0]["name"] == "zoo/fish"
+
+
 def test_a_mesh_is_repaired_and_the_answer_says_so(service):
     mesh = es.make_creature("fish", n_vertices=500)
     lines = [f"v {x} {y} {z}" for x, y, z in [*mesh.vertices, [9.0, 9.0, 9.0]]]

@@ -235,6 +235,14 @@ def test_an_opened_file_becomes_the_shape(page):
     np.testing.assert_array_equal(page.array("vertices"), ball.vertices.astype("<f4"))
 
 
+def test_opened_points_become_a_surface_and_the_page_is_told(page):
+    text = "\n".join(f"{x} {y} {z}" for x, y, z in es.icosphere(3).vertices)
+    data = np.frombuffer(text.encode(), np.uint8)
+    facts, _ = page.call("finish", {"kind": "open", "name": "ball.xyz"}, {"file": data})
+    assert facts["state"]["n_faces"] > 100
+    assert any("642 points" in warning for warning in facts["warnings"])
+
+
 def test_a_repair_is_suggested_and_done():
     ball = es.icosphere(2)
     page = Page(Workspace(es.TriangleMesh(ball.vertices, ball.faces[1:, ::-1])))

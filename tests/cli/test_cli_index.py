@@ -79,11 +79,12 @@ def test_ls_lists_what_the_table_says(index):
         (["label=bird,fish", "height=0..9"], ["bird/a", "fish/a"]),
         (["label=7"], ["seven"]),  # a class is a text, whatever it looks like
         (["label=1..2"], ["range"]),
+        (['label="cup, small",7'], ["cup", "seven"]),
     ],
 )
 def test_filters_choose_shapes(index, filters, names):
     descriptor = find_heat_features(make_creature("fish", n_vertices=500)).descriptor
-    for name, label in (("seven", "7"), ("range", "1..2")):
+    for name, label in (("seven", "7"), ("range", "1..2"), ("cup", "cup, small")):
         ShapeIndex.open(index).add_descriptors(name, [descriptor], label=label)
     options = [part for text in filters for part in ("--filter", text)]
     assert [record["name"] for record in run_json("index", "ls", index, *options)] == names
@@ -300,6 +301,18 @@ def test_a_codebook_is_for_patches_and_is_a_codebook(meshes, index, tmp_path):
     assert "too few shapes" in done.stderr
     options = ("--views", 0, "--workers", 1)
     assert run_json(*asked, learned, *options)["added"] == ["bird/a", "bird/b", "fish/a", "fish/b"]
+
+
+def test_all_shapes_of_an_index_have_as_many_frames(meshes, tmp_path):
+    new = tmp_path / "new"
+    asked = ("index", "add", new, meshes / "fish" / "a.ply", "--views", 0, "--workers", 1)
+    assert "is for --method patches" in run(*asked, "--frames", 2, *LIGHT, code=1).stderr
+    assert len(run_json(*asked, "--frames", 2)["added"]) == 1
+    recipe = ShapeIndex.open(new).default_recipe()
+    assert recipe.n_frames == 2
+    assert len(ShapeIndex.open(new).descriptors("a", recipe)[0].codes) == 3
+    assert "has 2 frames a shape" in run(*asked, "--frames", 1, code=1).stderr
+    assert run_json(*asked)["skipped"] == ["a"]
 
 
 def test_an_unreachable_cluster_is_named(meshes, tmp_path):

@@ -92,7 +92,8 @@ def deform(
 ) -> None:
     """Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows smoothly.
 
-    For instance: eigenshape deform scan.ply --region 'y>60%' --rotate 'x by 30' -o bent.ply --picture bent.png
+    For instance: eigenshape deform scan.ply --region 'y>60%' --rotate 'x by 30' -o bent.ply
+    --picture bent.png
     """
     steps.require_picture(picture)
     side = steps.parse_side(view, up)

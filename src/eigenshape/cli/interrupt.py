@@ -13,8 +13,9 @@ from typing import Any
 def interruptible() -> Iterator[None]:
     """Let Ctrl-C raise KeyboardInterrupt while the block runs, so that what is half done is cleared away.
 
-    Python cannot raise it everywhere: in a finalizer or in a callback from C, of which compiling has many, it prints
-    a traceback and goes on. There Ctrl-C is repeated; and an error that comes after it counts as its consequence.
+    Python cannot raise it everywhere: in a finalizer or in a callback from C, of which compiling
+    has many, it prints a traceback and goes on. There Ctrl-C is repeated; and an error that comes
+    after it counts as its consequence.
     """
     before, report = signal.getsignal(signal.SIGINT), sys.unraisablehook
     if not callable(before) or threading.current_thread() is not threading.main_thread():

@@ -65,8 +65,9 @@ def serve(
 ) -> None:
     """Serve an index: upload a scan, by a page or a program, and get the most similar shapes.
 
-    Needs the package eigenshape-studio. Programs send the header `Authorization: Bearer TOKEN`; the address /docs
-    lists the calls. Ctrl-C or SIGTERM ends the service when the queries that run have ended.
+    Needs the package eigenshape-studio. Programs send the header `Authorization: Bearer TOKEN`; the
+    address /docs lists the calls. Ctrl-C or SIGTERM ends the service when the queries that run have
+    ended.
 
     For instance: eigenshape serve my-index
     """

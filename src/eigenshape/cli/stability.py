@@ -79,8 +79,8 @@ def stability(
 ) -> None:
     """Compare two shapes: how close they are, how their spectra change, which heat times to trust.
 
-    Meshes with the same faces correspond vertex by vertex. Others correspond by --map, or by random points that are
-    matched by their distances in space.
+    Meshes with the same faces correspond vertex by vertex. Others correspond by --map, or by random
+    points that are matched by their distances in space.
 
     For instance: eigenshape stability clean.ply noisy.ply --picture report.png
     """

@@ -10,6 +10,7 @@ from .folders import index_folder as index_folder
 from .mesh_files import read_mesh as read_mesh
 from .mesh_files import write_mesh as write_mesh
 from .parsing import MESH_FORMATS as MESH_FORMATS
+from .shape_files import SHAPE_FORMATS as SHAPE_FORMATS
 from .shape_files import read_points as read_points
 from .shape_files import read_shape as read_shape
 from .shape_files import write_points as write_points

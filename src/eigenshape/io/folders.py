@@ -14,7 +14,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers
-from eigenshape.io.shape_files import FORMATS, POINTS
+from eigenshape.io.shape_files import POINTS, SHAPE_FORMATS
 from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.store.batch import Callback, build_index
 from eigenshape.retrieval.store.damage import StoreWarning
@@ -82,7 +82,7 @@ def find_items(
     items = [item for source in folders for item in _items_of(Path(source))]
     if not items:
         raise InvalidParameterError(
-            f"There must be meshes or points ({', '.join(FORMATS)}) to index; "
+            f"There must be meshes or points ({', '.join(SHAPE_FORMATS)}) to index; "
             f"{', '.join(map(str, folders)) or 'an empty list'} holds none."
         )
     items = _different_items(items)
@@ -171,10 +171,11 @@ def index_folder(  # noqa: PLR0913 - one keyword for each choice of a batch
 
 def _items_of(source: Path) -> Iterator[Item]:
     if not source.is_dir():
-        source.stat()  # raises OSError for a folder that is misspelled, before anything is described
+        # raises OSError for a folder that is misspelled, before anything is described
+        source.stat()
         yield Item(source.stem, source)
         return
-    known = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in FORMATS]
+    known = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in SHAPE_FORMATS]
     meshes = {path.with_suffix("") for path in known if path.suffix.lower() not in POINTS}
     paths = [
         path

@@ -19,7 +19,7 @@ from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
 
 POINTS = {".pts": points.parse, ".xyz": points.parse, ".pcd": pcd.parse}
 WRITERS = {".xyz": points.format_text, ".pts": points.format_counted, ".ply": ply.format_points}
-FORMATS = (*MESH_FORMATS, *POINTS)
+SHAPE_FORMATS = (*MESH_FORMATS, *POINTS)
 
 
 def read_shape(
@@ -92,7 +92,7 @@ def read_shape(
     (1, [[0, 1], [1, 2]])
     """
     path = Path(path)
-    suffix = suffix_of(path, file_format, FORMATS)
+    suffix = suffix_of(path, file_format, SHAPE_FORMATS)
     require_kind(cells)
     data = read_regular(path)
     with naming(path):

@@ -12,7 +12,7 @@ from eigenshape.geometry.repair_report import RepairedMesh
 from eigenshape.io import pcd
 from eigenshape.io.mesh_files import require_surface
 from eigenshape.io.parsing import naming, parse_mesh, suffix_of
-from eigenshape.io.shape_files import FORMATS, POINTS
+from eigenshape.io.shape_files import POINTS, SHAPE_FORMATS
 from eigenshape.scans.frames import triangulate_frame
 from eigenshape.scans.reconstruction import reconstruct_surface
 
@@ -64,7 +64,7 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
     ('reconstruct_surface made 2,000 vertices and 3,996 faces of 642 points',)
     """
     path = Path(path)
-    suffix = suffix_of(path, file_format, FORMATS)
+    suffix = suffix_of(path, file_format, SHAPE_FORMATS)
     data = read_regular(path)
     with naming(path):
         if suffix in POINTS:

@@ -8,7 +8,8 @@ from jaxtyping import Float, Int
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators import flip_loops
 
-TOLERANCE = 1e-12  # a pair of cotangents that sums to less below zero is cocircular, relative to the terms in it
+# a pair of cotangents that sums to less below zero is cocircular, relative to the terms in it
+TOLERANCE = 1e-12
 # Smallest margin of the triangle inequalities, in mean edge lengths (Sharp and Crane 2020).
 MOLLIFY = 1e-5
 MOST_FLIPS = 1000  # a side: far more than any shape takes, which is about one

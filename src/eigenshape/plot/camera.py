@@ -53,7 +53,8 @@ VIEWS = {
 # Sine of the angle between the view and the upward direction below which the view counts as along
 # it, so that another direction must point up in the picture.
 ALONG_UP = 1e-6
-# Length of the mean normal above which a surface counts as a scan. A closed surface has 0, a flat piece 1.
+# Length of the mean normal above which a surface counts as a scan. A closed surface has 0, a flat
+# piece 1.
 ONE_WAY = 0.3
 MARGIN = 0.04  # share of the picture that is left free on each side
 # Points at most this share of the longest side of the box above the lowest point carry the shape.
@@ -97,17 +98,18 @@ class Camera:
 def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> Camera:
     """Return a camera that shows a shape upright, from its front left and a little from above.
 
-    The front is +z if y is up, as in most collections and in glTF; +x if z is up; +y if x is up. If the opposite side
-    is clearly more curved, that side is the front, because a face is more curved than the back of a head. An open
-    surface that mostly faces one way is taken for a scan, and is shown from there.
+    The front is +z if y is up, as in most collections and in glTF; +x if z is up; +y if x is up. If
+    the opposite side is clearly more curved, that side is the front, because a face is more curved
+    than the back of a head. An open surface that mostly faces one way is taken for a scan, and is
+    shown from there.
 
     Parameters
     ----------
     mesh : MeshLike
     up : {"auto", "x", "y", "z", "-x", "-y", "-z"} or (3,) float
-        The upward direction. "auto" takes y, or z if the shape would fall over along y and would stand along z on a
-        base more than four times as large. It is a guess: of 243 real shapes whose upright pose is known, it shows 183
-        upright, and y alone shows 143.
+        The upward direction. "auto" takes y, or z if the shape would fall over along y and would
+        stand along z on a base more than four times as large. It is a guess: of 243 real shapes
+        whose upright pose is known, it shows 183 upright, and y alone shows 143.
     size : int
         Width and height of the picture in pixels.
 

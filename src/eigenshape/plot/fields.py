@@ -58,7 +58,8 @@ def figure_eigenfunctions(
     Raises
     ------
     InvalidParameterError
-        If the spectrum is of another number of points, or a column is out of range or none is given.
+        If the spectrum is of another number of points, or a column is out of range or none is
+        given.
 
     See Also
     --------

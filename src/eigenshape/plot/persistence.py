@@ -83,8 +83,8 @@ def figure_merge_tree(
 ) -> Figure:
     """Draw which region merges into which, and at which persistence.
 
-    Regions merge from the bottom to the top, as in `segment`. A cut is a horizontal line: the regions whose stems cross
-    it remain, in the colors that `figure_segments` gives them.
+    Regions merge from the bottom to the top, as in `segment`. A cut is a horizontal line: the
+    regions whose stems cross it remain, in the colors that `figure_segments` gives them.
 
     Parameters
     ----------

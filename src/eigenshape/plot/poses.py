@@ -38,8 +38,8 @@ def figure_poses(
     poses : mapping of titles to MeshLike
         Poses of one mesh, or of meshes of one shape.
     shares : (n,) float, optional
-        How much of a motion each vertex follows, from 0 to 1, such as `Binding.shares`. It sets the colors of all
-        poses, which must then have n vertices.
+        How much of a motion each vertex follows, from 0 to 1, such as `Binding.shares`. It sets the
+        colors of all poses, which must then have n vertices.
     camera : Camera, optional
         Instead of `view` and `up`.
     view : str or (3,) float

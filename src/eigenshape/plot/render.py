@@ -22,7 +22,8 @@ LIGHT = np.array([-0.35, -0.55, 0.76])  # from the upper left, towards the viewe
 AMBIENT = 0.42  # brightness, of 1, of what faces away from the light
 INK = 0.12  # brightness of lines
 LINE = 1.6  # their width, in shown pixels
-BEHIND = 0.02  # share of the picture's size that a point may lie behind what is seen and still count as seen
+# share of the picture's size that a point may lie behind what is seen and still count as seen
+BEHIND = 0.02
 GRAY_PAIR = 7  # of matplotlib's tab20, left to what has no label
 
 Image = Float[np.ndarray, "h w 4"]

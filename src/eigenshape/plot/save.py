@@ -35,8 +35,8 @@ def require_picture_path(path: str | Path) -> Path:
 def save_figure(figure: Figure, path: str | Path) -> None:
     """Write a figure to a PNG, SVG or PDF file.
 
-    The file appears complete or not at all. The same figure gives the same bytes as PNG and as PDF; in SVG,
-    Matplotlib gives elements random names.
+    The file appears complete or not at all. The same figure gives the same bytes as PNG and as PDF;
+    in SVG, Matplotlib gives elements random names.
 
     Parameters
     ----------

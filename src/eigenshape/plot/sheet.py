@@ -32,7 +32,8 @@ class Panel:
     title : str
         One or two lines.
     colors : (f,) int
-        Number of the color of each face. Equal numbers have the same color on all panels; negative ones are gray.
+        Number of the color of each face. Equal numbers have the same color on all panels; negative
+        ones are gray.
     vertices : (m,) int
         Vertices to mark by dots.
 

@@ -41,7 +41,8 @@ def figure_spectrum(
     area : float, optional
         Area of the surface, in length². If given, Weyl's law λ_i ≈ 4π i / area is drawn too.
     brackets : Brackets, optional
-        Of the same shape. If given, the interval that holds each eigenvalue of the shape itself is drawn too.
+        Of the same shape. If given, the interval that holds each eigenvalue of the shape itself is
+        drawn too.
 
     Returns
     -------
@@ -120,7 +121,8 @@ def figure_spectra(
 ) -> Figure:
     """Plot several spectra by number, and their relative differences from the first one.
 
-    Bars show the bounds of each eigenvalue, by residuals or brackets. Most are too short to be seen.
+    Bars show the bounds of each eigenvalue, by residuals or brackets. Most are too short to be
+    seen.
 
     Parameters
     ----------
@@ -140,8 +142,8 @@ def figure_spectra(
     Raises
     ------
     InvalidParameterError
-        If there are fewer than two spectra, one does not begin with the lowest eigenvalue, or the title of brackets
-        is not the title of a spectrum.
+        If there are fewer than two spectra, one does not begin with the lowest eigenvalue, or the
+        title of brackets is not the title of a spectrum.
 
     Examples
     --------

@@ -32,8 +32,8 @@ def figure_stability(
 ) -> Figure:
     """Draw a report on two shapes.
 
-    It shows the shapes colored by the distance from each other, their spectra, the change at each heat time, and the
-    angles between their eigenspaces.
+    It shows the shapes colored by the distance from each other, their spectra, the change at each
+    heat time, and the angles between their eigenspaces.
 
     Parameters
     ----------

@@ -14,7 +14,6 @@ from .label_transfer import transfer_labels as transfer_labels
 from .patches.codebook import PatchCodebook as PatchCodebook
 from .patches.codebook import default_codebook as default_codebook
 from .patches.codebook import read_codebook as read_codebook
-from .patches.codebook import train_codebook as train_codebook
 from .patches.codebook import write_codebook as write_codebook
 from .patches.descriptor import PatchDescriptor as PatchDescriptor
 from .patches.descriptor import PatchRecipe as PatchRecipe
@@ -24,6 +23,7 @@ from .patches.matching import PatchPoints as PatchPoints
 from .patches.matching import match_patches as match_patches
 from .patches.patches import Patches as Patches
 from .patches.patches import extract_patches as extract_patches
+from .patches.training import train_codebook as train_codebook
 from .patches.verification import patch_scores as patch_scores
 from .search.coarse import CoarseRows as CoarseRows
 from .search.engines import FaissEngine as FaissEngine

@@ -17,6 +17,7 @@ from eigenshape.retrieval.heat.features import N_VIEWS, describe_views, find_hea
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.heat.score import match_features, matching_scores
 from eigenshape.retrieval.patches.codebook import read_codebook, write_codebook
+from eigenshape.retrieval.patches.cohort import normalized_distances
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe, patch_descriptor
 from eigenshape.retrieval.patches.distance import packed_distances
 from eigenshape.retrieval.patches.matching import match_patches
@@ -82,9 +83,15 @@ class Kind(ABC, Generic[R, D]):
     def as_stored(self, descriptor: D) -> D:
         """Return a descriptor whose numbers are rounded as those of an index are."""
 
+    def isolation(self, descriptor: D) -> float:
+        """Return how much farther a shape is from others than usual, to be stored with its rows."""
+        return 0.0
+
     @abstractmethod
-    def scores(self, query: D, rows: Sequence[np.ndarray]) -> Float[np.ndarray, " k"]:
-        """Score a query against the rows of k descriptors."""
+    def scores(
+        self, query: D, rows: Sequence[np.ndarray], isolations: Float[np.ndarray, " k"]
+    ) -> Float[np.ndarray, " k"]:
+        """Score a query against the rows and the isolations of k descriptors."""
 
     @abstractmethod
     def verify(
@@ -148,7 +155,12 @@ class _HeatKind(Kind[HeatRecipe, HeatDescriptor]):
         rows = self.rows(descriptor, "the query")
         return self.restore(rows, self.details(descriptor), descriptor.recipe)
 
-    def scores(self, query: HeatDescriptor, rows: Sequence[np.ndarray]) -> Float[np.ndarray, " k"]:
+    def scores(
+        self,
+        query: HeatDescriptor,
+        rows: Sequence[np.ndarray],
+        isolations: Float[np.ndarray, " k"],
+    ) -> Float[np.ndarray, " k"]:
         starts = np.cumsum([0, *(len(each) for each in rows)])[:-1]
         vectors = np.concatenate(rows).astype(np.float64)
         scores, _ = matching_scores(query.vectors, vectors, starts, query.recipe)
@@ -187,7 +199,8 @@ class _PatchKind(Kind[PatchRecipe, PatchDescriptor]):
     def describe_to_store(
         self, mesh: TriangleMesh, recipe: PatchRecipe, n_views: int
     ) -> list[PatchDescriptor]:
-        return [patch_descriptor(extract_patches(mesh, n_views=n_views), recipe)]
+        patches = extract_patches(mesh, n_views=n_views, n_frames=recipe.n_frames)
+        return [patch_descriptor(patches, recipe)]
 
     def rows(self, descriptor: PatchDescriptor, name: str) -> np.ndarray:
         return pack_codes(descriptor.codes.reshape(-1, descriptor.codes.shape[-1]))
@@ -202,8 +215,16 @@ class _PatchKind(Kind[PatchRecipe, PatchDescriptor]):
     def as_stored(self, descriptor: PatchDescriptor) -> PatchDescriptor:
         return descriptor  # whose numbers were rounded when it was made
 
-    def scores(self, query: PatchDescriptor, rows: Sequence[np.ndarray]) -> Float[np.ndarray, " k"]:
-        return packed_distances(query.codes, rows)
+    def isolation(self, descriptor: PatchDescriptor) -> float:
+        return descriptor.isolation
+
+    def scores(
+        self,
+        query: PatchDescriptor,
+        rows: Sequence[np.ndarray],
+        isolations: Float[np.ndarray, " k"],
+    ) -> Float[np.ndarray, " k"]:
+        return normalized_distances(query.codes, packed_distances(query.codes, rows), isolations)
 
     def verify(
         self,
@@ -219,13 +240,17 @@ class _PatchKind(Kind[PatchRecipe, PatchDescriptor]):
         return match_patches(first.points[0], second.points[0]).points
 
     def write_recipe(self, recipe: PatchRecipe) -> tuple[dict[str, Any], bytes | None]:
-        fields = {"codebook": recipe.codebook.digest, "clip": recipe.clip}
+        fields = {
+            "codebook": recipe.codebook.digest,
+            "clip": recipe.clip,
+            "n_frames": recipe.n_frames,
+        }
         return fields, write_codebook(recipe.codebook)
 
     def read_recipe(self, fields: dict[str, Any], codebook: bytes | None) -> PatchRecipe:
         if codebook is None:
             raise ValueError("its codebook is missing")
-        return PatchRecipe(read_codebook(codebook), float(fields["clip"]))
+        return PatchRecipe(read_codebook(codebook), float(fields["clip"]), fields["n_frames"])
 
 
 HEAT, PATCHES = _HeatKind(), _PatchKind()

@@ -1,7 +1,7 @@
 """Body plans of the synthetic creatures, as tables.
 
-A creature faces +x and stands upright along +z; its left is +y. It is about two units long. A plan is a
-list of limbs.
+A creature faces +x and stands upright along +z; its left is +y. It is about two units long. A plan
+is a list of limbs.
 """
 
 from math import cos, pi, sin

@@ -17,8 +17,8 @@ from eigenshape.spectral.certificate import Certificate
 # residual. The second says so where all known eigenvalues are small beside the rounding of W.
 NULL = 1e-9
 ZERO_RESIDUALS = 4
-# Approximate pairs have residuals near the root of the error of their values, above eigenvalues that
-# are not 0. There the residual counts only up to this share of the largest eigenvalue.
+# Approximate pairs have residuals near the root of the error of their values, above eigenvalues
+# that are not 0. There the residual counts only up to this share of the largest eigenvalue.
 APPROXIMATE_NULL = 1e-6
 
 

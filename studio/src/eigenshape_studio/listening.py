@@ -19,8 +19,9 @@ LOCAL = ("127.0.0.1", "localhost")
 ALL_ADDRESSES = ("0.0.0.0", "::")
 MOST_CONNECTIONS = 128
 HEADER_SECONDS = 10.0  # within which a header must have come, once it or its connection has begun
-# A connection without a request is kept longer than browsers keep it (Chromium for 300 s). Otherwise
-# the server may close it while a call is on its way, and Firefox does not send a POST a second time.
+# A connection without a request is kept longer than browsers keep it (Chromium for 300 s).
+# Otherwise the server may close it while a call is on its way, and Firefox does not send a POST a
+# second time.
 KEEP_SECONDS = 330
 
 

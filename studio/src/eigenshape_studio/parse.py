@@ -43,17 +43,21 @@ def display_name(name: object) -> str:
     return "".join(letter for letter in text if letter.isprintable())[:LONGEST_NAME] or "shape"
 
 
-def mesh_suffix(name: str) -> str:
-    """Return the suffix of a mesh file's name; raise FileFormatError if it is not one of a mesh."""
+def shape_suffix(name: str) -> str:
+    """Return the suffix of a file's name; raise FileFormatError if it is not one of a shape."""
     suffix = Path(name).suffix.lower()
-    if suffix not in es.io.MESH_FORMATS:
-        known = ", ".join(es.io.MESH_FORMATS)
-        raise es.FileFormatError(f"A mesh file must end in {known}; {display_name(name)} does not.")
+    if suffix not in es.io.SHAPE_FORMATS:
+        known = ", ".join(es.io.SHAPE_FORMATS)
+        raise es.FileFormatError(
+            f"A file of a shape must end in {known}; {display_name(name)} does not."
+        )
     return suffix
 
 
-def parse_mesh(name: str, data: bytes, limits: Limits | None = None) -> es.TriangleMesh:
-    """Parse a mesh file in a child process.
+def parse_surface(
+    name: str, data: bytes, limits: Limits | None = None
+) -> es.geometry.RepairedMesh[es.TriangleMesh]:
+    """Parse a file of a mesh, or of points that become a surface, in a child process.
 
     Parameters
     ----------
@@ -64,7 +68,8 @@ def parse_mesh(name: str, data: bytes, limits: Limits | None = None) -> es.Trian
 
     Returns
     -------
-    TriangleMesh
+    RepairedMesh
+        As of `es.io.read_surface`.
 
     Raises
     ------
@@ -72,7 +77,7 @@ def parse_mesh(name: str, data: bytes, limits: Limits | None = None) -> es.Trian
         If the suffix is unknown, the file does not hold a mesh, or a limit is reached.
     """
     limits = limits or Limits()
-    suffix = mesh_suffix(name)
+    suffix = shape_suffix(name)
     command = [sys.executable, "-m", "eigenshape_studio.parse", suffix]
     numbers = [limits.seconds, limits.memory, limits.n_faces]
     try:
@@ -95,7 +100,8 @@ def parse_mesh(name: str, data: bytes, limits: Limits | None = None) -> es.Trian
         ) from err
     if "error" in meta:
         raise es.FileFormatError(meta["error"])
-    return es.TriangleMesh(arrays["vertices"], arrays["faces"])
+    mesh = es.TriangleMesh(arrays["vertices"], arrays["faces"])
+    return es.geometry.RepairedMesh(mesh, tuple(meta["report"]), arrays["source"].astype(np.int64))
 
 
 def main() -> None:
@@ -106,8 +112,13 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, f"shape{suffix}")
             path.write_bytes(sys.stdin.buffer.read())
-            mesh = read_upload(path, int(n_faces))
-        message = encode({}, {"vertices": mesh.vertices, "faces": mesh.faces.astype("<u4")})
+            found = read_upload(path, int(n_faces))
+        arrays = {
+            "vertices": found.mesh.vertices,
+            "faces": found.mesh.faces.astype("<u4"),
+            "source": found.source_vertices.astype("<u4"),
+        }
+        message = encode({"report": list(found.report)}, arrays)
     except MemoryError:
         message = encode({"error": "The file takes more memory than a mesh may."})
     except (es.EigenshapeError, OSError) as error:
@@ -126,27 +137,29 @@ def _limit(seconds: float, memory: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def read_upload(path: Path, n_faces: int) -> es.TriangleMesh:
+def read_upload(path: Path, n_faces: int) -> es.geometry.RepairedMesh[es.TriangleMesh]:
     """Read a file from outside, whose path is ours and is not shown in errors.
 
     Raises
     ------
     FileFormatError
-        If it does not hold a mesh, has too many faces, or coordinates beyond single precision.
+        If no surface can be made of it, or it has too many faces, or coordinates beyond single
+        precision.
     """
     try:
-        mesh = es.read_mesh(path)
+        found = es.io.read_surface(path)
     except es.EigenshapeError as error:
         # The folder is ours; the person knows the file by another name.
         text = str(error).replace(str(path), "The file")
         raise es.FileFormatError(text) from error
+    mesh = found.mesh
     if mesh.n_faces > n_faces:
         raise es.FileFormatError(
             f"A mesh may have {n_faces:,} faces; the file has {mesh.n_faces:,}."
         )
     if not np.abs(mesh.vertices).max() < np.finfo(np.float32).max:
         raise es.FileFormatError("Coordinates must fit into single precision; some do not.")
-    return mesh
+    return found
 
 
 if __name__ == "__main__":

@@ -55,7 +55,8 @@ def write_report(  # noqa: PLR0913  one for each option of the command
 ) -> None:
     """Write a report on a shape.
 
-    The file appears complete or not at all. Eigenfunctions are in half precision, with three digits.
+    The file appears complete or not at all. Eigenfunctions are in half precision, with three
+    digits.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class Shelf:
         source = sources[name]
         if source is None:
             raise es.StoreError(f"{name!r} was added to the index without its file.")
-        return es.read_mesh(source)
+        return es.io.read_surface(source).mesh
 
     def query(
         self, mesh: es.TriangleMesh, n_matches: int
@@ -85,7 +85,7 @@ def _picture(source: str | None) -> tuple[bytes | None, dict[str, list[float]]]:
 @lru_cache(maxsize=N_KEPT)
 def _draw_file(source: str, _changed: int) -> tuple[bytes, dict[str, list[float]]]:
     """Draw a mesh file; a file that changes is drawn again."""
-    mesh = es.read_mesh(source)
+    mesh = es.io.read_surface(source).mesh
     camera = es.plot.three_quarter_view(mesh, size=THUMBNAIL)
     file = BytesIO()
     imsave(file, es.plot.draw(mesh, camera).image, format="png")

@@ -196,5 +196,5 @@ def _first_workspace(
         creature = es.make_creature("quadruped", n_vertices=2500)
         return Workspace(creature, "quadruped", index=index, shared=True)
     if isinstance(mesh, str | Path):
-        return Workspace(es.read_mesh(mesh), Path(mesh).name, index=index, shared=True)
+        return Workspace(es.io.read_surface(mesh).mesh, Path(mesh).name, index=index, shared=True)
     return Workspace(mesh, index=index, shared=True)

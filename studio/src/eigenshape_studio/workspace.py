@@ -15,7 +15,7 @@ import numpy as np
 import eigenshape as es
 from eigenshape_studio.analysis import N_MODES, Analysis, cut_rows, diagram_rows, vertex_labels
 from eigenshape_studio.jobs import NO_JOB
-from eigenshape_studio.parse import display_name, parse_mesh
+from eigenshape_studio.parse import display_name, parse_surface
 from eigenshape_studio.poses import carry_pose
 from eigenshape_studio.search import Shelf
 from eigenshape_studio.wire import WireError, decode, encode
@@ -169,7 +169,7 @@ class Workspace:
             "n_faces": analysis.mesh.n_faces,
             **analysis.view(),
             "capabilities": capabilities,
-            "suffixes": ",".join(es.io.MESH_FORMATS),
+            "suffixes": ",".join(es.io.SHAPE_FORMATS),
             "health": analysis.health_facts(),
             "values": [_field_facts(name, field) for name, field in self.fields.items()],
             "spectrum": analysis.spectrum_facts(),
@@ -482,7 +482,7 @@ class Workspace:
         self._require_session()
         source = None
         if "source" in arrays:
-            source = parse_mesh(str(meta.get("source")), _bytes(arrays, "source"))
+            source = self._surface_of(str(meta.get("source")), _bytes(arrays, "source"))
         with TemporaryDirectory() as folder:
             path = Path(folder, "edits.json")
             path.write_text(json.dumps(meta.get("edits")))
@@ -507,7 +507,13 @@ class Workspace:
             self._show(self._require_shelf().mesh(name), name)
             return
         name = display_name(meta.get("name"))
-        self._show(parse_mesh(name, _bytes(arrays, "file")), name)
+        self._show(self._surface_of(name, _bytes(arrays, "file")), name)
+
+    def _surface_of(self, name: str, data: bytes) -> es.TriangleMesh:
+        """Read a file from outside; what had to be made of points is told with the answer."""
+        found = parse_surface(name, data)
+        self._warnings += found.report
+        return found.mesh
 
     def _solve(self, meta: dict[str, Any], _arrays: Arrays) -> None:
         most = min(MOST_MODES, self.analysis.mesh.n_vertices)
@@ -517,7 +523,7 @@ class Workspace:
         """Bend another shape as this one was bent; the result becomes the shape."""
         session = self._require_session()
         name = display_name(meta.get("name"))
-        target = parse_mesh(name, _bytes(arrays, "file"))
+        target = self._surface_of(name, _bytes(arrays, "file"))
         source = self.analysis.mesh
         pairs = arrays["pairs"].astype(np.int64) if "pairs" in arrays else None
         bent = carry_pose(source, session.mesh, target, pairs)
@@ -537,7 +543,7 @@ class Workspace:
         n_matches = whole(meta, "n_matches", 1, 100, 5)
         mesh = self.mesh
         if "file" in arrays:
-            mesh = parse_mesh(display_name(meta.get("name")), _bytes(arrays, "file"))
+            mesh = self._surface_of(display_name(meta.get("name")), _bytes(arrays, "file"))
         found = shelf.query(mesh, n_matches)
         self.matches = [match["name"] for match in found[0]["matches"]]
         return found

@@ -6,8 +6,8 @@ from sklearn.mixture import GaussianMixture
 
 import eigenshape as es
 from eigenshape.retrieval.patches import codebook as codes
-from eigenshape.retrieval.patches.codebook import encode_patches, train_codebook
-from eigenshape.retrieval.patches.descriptor import CLIP, round_codes
+from eigenshape.retrieval.patches import training
+from eigenshape.retrieval.patches.codebook import CLIP, encode_patches, round_codes
 from eigenshape.retrieval.patches.distance import (
     SIZE_PRICE,
     packed_distances,
@@ -32,7 +32,9 @@ def creatures():
 
 @pytest.fixture(scope="module")
 def book(creatures):
-    return train_codebook([patches for (_, seed), patches in creatures.items() if seed == 1])
+    return training.train_codebook(
+        [patches for (_, seed), patches in creatures.items() if seed == 1]
+    )
 
 
 @pytest.mark.long
@@ -49,7 +51,7 @@ def test_another_pose_is_the_nearest(creatures, book):
 def test_vectors_are_gradients_of_the_likelihood(creatures, book):
     shape = creatures["hand", 2]
     place, radius, step = 1, codes.BASES[1], 1e-5
-    points = codes._standardize(
+    points = codes.standardize(
         shape.numbers[:, radius].astype(float), book.means[place], book.spreads[place]
     )
     points = points @ book.axes[place]
@@ -61,7 +63,7 @@ def test_vectors_are_gradients_of_the_likelihood(creatures, book):
     )
 
     def likelihood(centers, spreads):
-        joint = codes._log_joint(points, book.shares[place].astype(float), centers, spreads**2)
+        joint = codes.log_joint(points, book.shares[place].astype(float), centers, spreads**2)
         return float(weights @ np.log(np.exp(joint).sum(axis=1)))
 
     found = codes._fisher(shape, radius, book, place).reshape(2, *book.centers[place].shape)
@@ -79,9 +81,9 @@ def test_vectors_are_gradients_of_the_likelihood(creatures, book):
 def test_the_mixture_is_as_likely_as_another_librarys():
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(place, 0.5 + 0.1 * place, (200, 4)) for place in range(8)])
-    shares, centers, variances = codes._fit_mixture(points, 0)
+    shares, centers, variances = training._fit_mixture(points, 0)
     ours = np.log(
-        np.exp(codes._log_joint(points, shares, centers, variances)).sum(axis=1)
+        np.exp(codes.log_joint(points, shares, centers, variances)).sum(axis=1)
     ).mean() - 2 * np.log(2 * np.pi)
     theirs = GaussianMixture(
         codes.N_ENTRIES,
@@ -152,7 +154,7 @@ def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
 
 
 def test_the_same_again(creatures):
-    one, two = (train_codebook(list(creatures.values()), seed=3) for _ in range(2))
+    one, two = (training.train_codebook(list(creatures.values()), seed=3) for _ in range(2))
     for name in ("means", "spreads", "axes", "shares", "centers", "variances"):
         assert np.array_equal(getattr(one, name), getattr(two, name))
 
@@ -167,4 +169,4 @@ def test_too_few_patches_are_refused():
     with pytest.raises(
         es.InvalidParameterError, match="takes at least 64 patches; 2 shapes have 6"
     ):
-        train_codebook([few, few])
+        training.train_codebook([few, few])

@@ -7,8 +7,7 @@ import pytest
 
 import eigenshape as es
 from eigenshape.retrieval.kinds import recipe_from_text, recipe_to_text
-from eigenshape.retrieval.patches.codebook import encode_patches
-from eigenshape.retrieval.patches.descriptor import CLIP, round_codes
+from eigenshape.retrieval.patches.codebook import CLIP, encode_patches, round_codes
 from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.retrieval.store import batch
 from eigenshape.retrieval.store.writing import describe_to_store

@@ -6,6 +6,7 @@ import pytest
 import eigenshape as es
 from eigenshape.retrieval.patches.patch_loops import HEIGHT_BINS, NUMBERS, RING_NUMBERS, TURN_BINS
 from eigenshape.retrieval.patches.patches import RADII, extract_patches, surface_patches
+from eigenshape.scans.partial import viewpoint
 
 
 def rings(patches):
@@ -130,3 +131,21 @@ def test_bad_input_is_named():
         match="must have an area to be described by patches; all its faces have none",
     ):
         surface_patches(line)
+
+
+def test_a_closed_shape_is_also_described_as_a_depth_camera_sees_it():
+    ball = es.icosphere(3)
+    whole, _view, *frames = extract_patches(ball, n_samples=40, n_views=1, n_frames=2)
+    assert len(frames) == 2
+    assert np.ptp(whole.weights, axis=1).max() == 0
+    for number, frame in enumerate(frames):
+        # The camera is in front of the viewpoint, and what it sees faces it.
+        heights = ball.vertices[frame.vertices] @ viewpoint(number)
+        assert heights.min() > 0
+        assert np.ptp(frame.weights, axis=1).max() > 0  # it has a boundary
+    same = extract_patches(ball, n_samples=40, n_views=0, n_frames=1)[1]
+    assert same.numbers.tobytes() == frames[0].numbers.tobytes()
+    part = es.partial_scan(ball, [0, 0, 1]).mesh
+    assert len(extract_patches(part, n_samples=40, n_views=1, n_frames=2)) == 1
+    with pytest.raises(es.InvalidParameterError, match="n_frames must be at least 0; it is -1"):
+        extract_patches(ball, n_frames=-1)

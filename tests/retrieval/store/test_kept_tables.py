@@ -10,6 +10,7 @@ from describers import descriptor
 import eigenshape as es
 from eigenshape.retrieval import DescribedShape
 from eigenshape.retrieval.store import kept_tables, snapshot
+from eigenshape.retrieval.store.catalog import FORMAT
 from eigenshape.retrieval.store.kept_tables import TABLES_FILE, open_state
 from eigenshape.retrieval.store.snapshot import read_state
 
@@ -103,7 +104,7 @@ def test_a_damaged_copy_is_made_again(index, damage):
     open_state(index.folder)
     path = index.folder / TABLES_FILE
     data = path.read_bytes()
-    older = data.replace(b"[6, [[", b"[5, [[")
+    older = data.replace(b"[%d, [[" % FORMAT, b"[5, [[")
     path.write_bytes({"cut": data[:-9], "empty": b"", "other": b"no", "older": older}[damage])
     check_opened(index, N_SHAPES)
     check_opened(index, 0)

@@ -99,6 +99,15 @@ def add(
     ] = False,
     method: MethodOption = PATCHES,
     views: ViewsOption = None,
+    frames: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=50,
+            help="Number of sides from which closed shapes are also described as a depth camera "
+            "sees them, for an index that is asked with single frames; 6 are a good choice.",
+        ),
+    ] = None,
     repair: IndexRepairOption = "auto",
     workers: WorkersOption = 2,
     timeout: TimeoutOption = 300.0,
@@ -108,17 +117,20 @@ def add(
 ) -> None:
     """Describe shapes and add them to an index; a file that fails is named, and the others are still added.
 
-    A shape is named by its path below the given folder; its class is the folder that holds it. Shapes that the index
-    has already are skipped, also if their folder has moved. After Ctrl-C or a crash, the same command continues where
-    it stopped. Point clouds and frames of a depth camera (.pcd) become a surface first. The exit code is 3 if some
-    files failed.
+    A shape is named by its path below the given folder; its class is the folder that holds it.
+    Shapes that the index has already are skipped, also if their folder has moved. After Ctrl-C or a
+    crash, the same command continues where it stopped. Point clouds and frames of a depth camera
+    (.pcd) become a surface first. The exit code is 3 if some files failed.
     """
     require_method(method)
     repairs = repair_names(repair)
     items = es.io.find_items(sources, labels=labels, part=steps.parse_part(part))
     shelf = es.ShapeIndex.open_or_create(index)
-    recipe = steps.index_recipe(shelf, method, codebook, in_parts=part is not None)
+    recipe = steps.index_recipe(shelf, method, codebook, in_parts=part is not None, n_frames=frames)
     with steps.worker_processes(workers, timeout, memory, scheduler) as processes:
+        if recipe is None and frames:
+            learned = steps.learn_codebook(items, processes, repairs)
+            recipe = es.retrieval.PatchRecipe(learned, n_frames=frames)
         report = steps.describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     pruned = steps.prune(shelf, sources) if prune else []
     doubles = steps.find_doubles(shelf, report.added)
@@ -143,7 +155,8 @@ def _print(
     if pruned:
         counts += f", {len(pruned)} removed"
     out.print(f"{counts}, {len(report.failed)} failed; the index holds {len(shelf)} shapes.")
-    for name, reason in report.failed:
+    # On a terminal each file was named when it failed.
+    for name, reason in () if out.is_terminal and err.is_terminal else report.failed:
         out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
     for one, two in doubles:
         out.print(f"  [yellow]{escape_text(two)}[/]: the same file content as {escape_text(one)}")

@@ -32,8 +32,8 @@ def learn(
 ) -> None:
     """Learn a codebook from meshes, for indexes that are built in parts.
 
-    At most 100 meshes are read. Shapes with different codebooks do not compare, so learn one and pass it to every
-    `eigenshape index add --part` with --codebook.
+    At most 100 meshes are read. Shapes with different codebooks do not compare, so learn one and
+    pass it to every `eigenshape index add --part` with --codebook.
     """
     repairs = repair_names(repair)
     steps.require_output(output, (".npz",), "A codebook")

@@ -36,8 +36,8 @@ def merge(
 ) -> None:
     """Make one index of several, by copying them or by reference.
 
-    What is damaged in the others is left out with a warning. Shapes with different codebooks do not compare: build the
-    others with --codebook.
+    What is damaged in the others is left out with a warning. Shapes with different codebooks do not
+    compare: build the others with --codebook.
     """
     parts = [es.ShapeIndex.open(other) for other in others]
     shelf = es.ShapeIndex.open_or_create(index)

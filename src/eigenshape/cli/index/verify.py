@@ -15,8 +15,8 @@ DAMAGED = 1  # exit code
 def verify(index: IndexArgument, *, as_json: JsonOption = False) -> None:
     """Read every byte of an index and name what is damaged.
 
-    The exit code is 1 if anything is. Index the named shapes again, or merge the index into a new one, which keeps
-    what is whole.
+    The exit code is 1 if anything is. Index the named shapes again, or merge the index into a new
+    one, which keeps what is whole.
     """
     report = es.ShapeIndex.open(index).verify()
     if as_json:

@@ -73,7 +73,8 @@ def displacement_shares(
 ) -> Float[np.ndarray, " n"]:
     """Return, for each vertex, by how much it follows: 1 moves fully, 0 not at all.
 
-    After one edit these are the shares of the binding, after several the displacements over the largest.
+    After one edit these are the shares of the binding, after several the displacements over the
+    largest.
     """
     if len(edits) == 1:
         edit = edits[0]

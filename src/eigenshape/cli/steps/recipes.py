@@ -1,5 +1,6 @@
 """The recipe of each method of describing shapes, for an index or a query."""
 
+from dataclasses import replace
 from pathlib import Path
 from pickle import UnpicklingError
 from zipfile import BadZipFile
@@ -21,18 +22,24 @@ def heat_recipe(name: str) -> HeatRecipe:
 
 
 def index_recipe(
-    shelf: ShapeIndex, name: str, codebook: Path | None, *, in_parts: bool
+    shelf: ShapeIndex, name: str, codebook: Path | None, *, in_parts: bool, n_frames: int | None
 ) -> AnyRecipe | None:
-    """Return the recipe by which an index describes shapes, or None if it is to learn one."""
+    """Return the recipe by which an index describes shapes, or None if it is to learn a codebook."""
     if name != PATCHES:
-        if codebook is not None:
-            raise InvalidParameterError(
-                f"--codebook is for --method {PATCHES}; the method is {name}. Leave one of them out."
-            )
+        for option, value in (("--codebook", codebook), ("--frames", n_frames)):
+            if value is not None:
+                raise InvalidParameterError(
+                    f"{option} is for --method {PATCHES}; the method is {name}. Leave one of them out."
+                )
         return PRESETS[name]
     kept = _patch_recipe(shelf)
+    if kept is not None and n_frames not in (None, kept.n_frames):
+        raise InvalidParameterError(
+            f"All shapes of an index are described alike; {shelf.folder} has {kept.n_frames} frames "
+            f"a shape. Leave --frames out, or choose another index."
+        )
     if codebook is not None:
-        asked = _read_recipe(codebook)
+        asked = _read_recipe(codebook, kept.n_frames if kept else n_frames or 0)
         if kept not in (None, asked):
             raise InvalidParameterError(
                 f"An index has one codebook; {shelf.folder} has another one than {codebook}. "
@@ -44,19 +51,19 @@ def index_recipe(
             "codebook: the one that comes with eigenshape, so that the parts can be merged; "
             "`eigenshape index learn` makes another one"
         )
-        return PatchRecipe()
+        return PatchRecipe(n_frames=n_frames or 0)
     return kept
 
 
-def _read_recipe(path: Path) -> PatchRecipe:
+def _read_recipe(path: Path, n_frames: int) -> PatchRecipe:
     """Return the recipe of a codebook file, or that of another index."""
     if path.is_dir():
         recipe = _patch_recipe(ShapeIndex.open(path))
         if recipe is None:
             raise StoreError(f"--codebook takes an index that has a codebook; {path} has none.")
-        return recipe
+        return replace(recipe, n_frames=n_frames)
     try:
-        return PatchRecipe(read_codebook(path.read_bytes()))
+        return PatchRecipe(read_codebook(path.read_bytes()), n_frames=n_frames)
     except (ValueError, TypeError, BadZipFile, UnpicklingError) as error:
         raise FileFormatError(
             f"--codebook takes a file of `eigenshape index learn`; {path} is none: {error}."

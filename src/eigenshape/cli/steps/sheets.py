@@ -27,7 +27,8 @@ from eigenshape.retrieval.store.records import Match
 CAPTION = "corresponding parts have one color; a lower score is more similar"
 N_CELLS = 12  # of the query by patches
 N_EXPLAINED = 12  # pairs of points of an explanation: as many colors as people tell apart
-REACH = 3.0  # times what a patch has of the surface, in length: farther from a matched patch nothing is known
+# times what a patch has of the surface, in length: farther from a matched patch nothing is known
+REACH = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +86,9 @@ def contact_sheet(
 ) -> Figure:
     """Draw a query beside its matches, read from their files.
 
-    The parts of the query have colors of their own; a part of a match has the color of the query's part that it
-    corresponds to, and is gray where there is none. A match whose file cannot be read is named on stderr, and its
-    place stays empty.
+    The parts of the query have colors of their own; a part of a match has the color of the query's
+    part that it corresponds to, and is gray where there is none. A match whose file cannot be read
+    is named on stderr, and its place stays empty.
     """
     first = Panel(
         query.mesh, f"query: {title}", query.labels, query.descriptor.vertices[query.dots]

@@ -2,24 +2,27 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import inf
 
 import numpy as np
-from jaxtyping import Float32, Int, Int8
+from jaxtyping import Int, Int8
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import freeze
+from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
-from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, encode_patches
+from eigenshape.retrieval.patches.codebook import (
+    CLIP,
+    PatchCodebook,
+    default_codebook,
+    encode_patches,
+    round_codes,
+)
+from eigenshape.retrieval.patches.cohort import isolation
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
 from eigenshape.retrieval.patches.patches import Patches
-
-LARGEST_CODE = 7  # the largest entry of a rounded code: two entries fit a byte
-# Entries of Fisher vectors of unit length are clipped here: 5 % of them are larger. Hit rates of
-# experiments/ch5_retrieval (tuning half) were the same from 0.05 to 0.08, and those of float32.
-CLIP = 0.06
 
 
 @dataclass(frozen=True)
@@ -35,11 +38,15 @@ class PatchRecipe:
     clip : float
         Largest entry of a Fisher vector of unit length that is told apart; entries are rounded to
         sevenths of it.
+    n_frames : int
+        Sides from which an index describes a closed shape as a depth camera sees it, beside its
+        views. Six find more for queries that are single frames of a depth camera, and take 35 KB
+        and 1 CPU second a shape.
 
     Raises
     ------
     InvalidParameterError
-        If `clip` is not positive and finite.
+        If `clip` is not positive and finite, or `n_frames` is negative.
 
     See Also
     --------
@@ -54,8 +61,10 @@ class PatchRecipe:
 
     codebook: PatchCodebook = field(default_factory=default_codebook)
     clip: float = CLIP
+    n_frames: int = 0
 
     def __post_init__(self) -> None:
+        whole_number(self.n_frames, "n_frames", 0)
         if not 0 < self.clip < inf:
             raise InvalidParameterError(
                 f"clip must be positive and finite; it is {self.clip}. The default is {CLIP}."
@@ -67,7 +76,8 @@ class PatchRecipe:
     @property
     def name(self) -> str:
         """Return a short name for messages and tables."""
-        return f"patches {self.codebook.digest[:8]}"
+        frames = f" with {self.n_frames} frames" if self.n_frames else ""
+        return f"patches {self.codebook.digest[:8]}{frames}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +121,14 @@ class PatchDescriptor:
     def vertices(self) -> Int[np.ndarray, " m"]:
         """Return the vertex of each patch of the whole shape."""
         return self.points[0].vertices
+
+    @cached_property
+    def isolation(self) -> float:
+        """Return how much farther the shape is from the codebook's cohort than shapes usually are.
+
+        Below 0 for a shape that is near to many others, whatever the query.
+        """
+        return isolation(self.codes[0], self.recipe.codebook, is_closed=len(self.codes) > 1)
 
 
 def patch_descriptor(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor:
@@ -157,8 +175,3 @@ def patch_descriptor(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDe
         )
         points = tuple(patch_points(each, recipe.codebook) for each in patches)
     return PatchDescriptor(freeze(codes), points, recipe)
-
-
-def round_codes(codes: Float32[np.ndarray, "*k v"], clip: float) -> Int8[np.ndarray, "*k v"]:
-    """Return codes in 15 steps from -clip to clip: the same matches in an eighth of the memory."""
-    return np.rint(LARGEST_CODE * np.clip(codes / clip, -1, 1)).astype(np.int8)

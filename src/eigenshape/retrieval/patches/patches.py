@@ -19,10 +19,11 @@ from eigenshape.geometry.normalize import normalize_box
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.requirements import require_describable, require_oriented
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import boundary_vertices, submesh
+from eigenshape.geometry.topology import boundary_vertices, is_closed, submesh
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.patch_loops import NUMBERS, RINGS, describe_disc
-from eigenshape.scans.partial import views_of
+from eigenshape.scans.depth_camera import simulate_scan
+from eigenshape.scans.partial import viewpoint, views_of
 
 N_SAMPLES = 150  # points of a surface; time and stored bytes grow with their square
 # Viewpoints from which a closed shape is described beside the whole. Each costs one more
@@ -77,6 +78,7 @@ def extract_patches(
     *,
     n_samples: SupportsIndex = N_SAMPLES,
     n_views: SupportsIndex = N_VIEWS,
+    n_frames: SupportsIndex = 0,
     clean: bool = True,
 ) -> list[Patches]:
     """Describe geodesic discs around points of a surface, and of what single viewpoints see of it.
@@ -98,6 +100,9 @@ def extract_patches(
         Points at most; never more than vertices.
     n_views : int
         Viewpoints, spread evenly around the shape, if it is closed. An open shape has none.
+    n_frames : int
+        Of these viewpoints, how many are described once more as a depth camera sees the shape from
+        there (`simulate_scan`), with its noise and its gaps, so that single frames find the shape.
     clean : bool
         Whether to describe a copy that is turned outward (`orient_outward`) and smoothed as far as
         its noise requires (`denoise`), so that a scan compares with clean shapes. If False, faces
@@ -106,12 +111,12 @@ def extract_patches(
     Returns
     -------
     list of Patches
-        The whole first, then the views. All points lie at vertices of the whole.
+        The whole first, then the views, then the frames. All points lie at vertices of the whole.
 
     Raises
     ------
     InvalidParameterError
-        If n_samples is not positive, or n_views is negative.
+        If n_samples is not positive, or n_views or n_frames is negative.
     InvalidShapeError
         If a face has no area or occurs twice, a vertex has no face, the mesh is a soup (faces lie
         edge on edge without sharing vertices), or neighboring faces disagree and `clean` is False.
@@ -130,6 +135,7 @@ def extract_patches(
     mesh = as_mesh(mesh)
     count = whole_number(n_samples, "n_samples", 1)
     n_viewpoints = whole_number(n_views, "n_views", 0)
+    n_shots = whole_number(n_frames, "n_frames", 0)
     require_describable(mesh)
     if clean:
         mesh = denoise(orient_outward(mesh))
@@ -137,7 +143,17 @@ def extract_patches(
     for part in views_of(mesh, n_viewpoints):
         patches = surface_patches(part.mesh, n_samples=count)
         found.append(replace(patches, vertices=freeze(part.source_vertices[patches.vertices])))
+    if n_shots and is_closed(mesh):
+        found += [_frame_patches(mesh, number, count, clean=clean) for number in range(n_shots)]
     return found
+
+
+def _frame_patches(mesh: TriangleMesh, number: int, n_samples: int, *, clean: bool) -> Patches:
+    """Describe what a depth camera sees of a shape from one of the viewpoints."""
+    scan = simulate_scan(mesh, np.random.default_rng(number), view=viewpoint(number))
+    patches = surface_patches(denoise(scan.mesh) if clean else scan.mesh, n_samples=n_samples)
+    seen = mesh.faces[scan.source_faces[patches.vertices], 0]
+    return replace(patches, vertices=freeze(seen))
 
 
 def surface_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patches:

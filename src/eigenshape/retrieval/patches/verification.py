@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._threads import one_blas_thread
+from eigenshape.retrieval.patches.cohort import normalized_distances
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.patches.distance import patch_distances, view_distances
 from eigenshape.retrieval.patches.matching import patch_agreement
@@ -39,7 +40,7 @@ def verified_scores(
     other : callable
         Return the descriptor of a shape by its number below k; called for the nearest only.
     distances : (k,) float
-        Of `view_distances`.
+        Of `normalized_distances`.
     n_verified : int
         Nearest shapes to verify; the agreement of the others counts as 0.
 
@@ -94,7 +95,11 @@ def patch_scores(
     require_type(query, PatchDescriptor, "query")
     require_each(others, PatchDescriptor, "others")
     with one_blas_thread():
-        distances = view_distances(query.codes, [other.codes for other in others])
+        distances = normalized_distances(
+            query.codes,
+            view_distances(query.codes, [other.codes for other in others]),
+            np.array([other.isolation for other in others]),
+        )
         return verified_scores(query, others.__getitem__, distances) if verify else distances
 
 

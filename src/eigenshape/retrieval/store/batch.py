@@ -23,10 +23,11 @@ from eigenshape.geometry.repair import repair
 from eigenshape.geometry.repair_names import require_repairs
 from eigenshape.geometry.repair_report import RepairedMesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
-from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook, train_codebook
+from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descriptor
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
 from eigenshape.retrieval.patches.patches import Patches, extract_patches
+from eigenshape.retrieval.patches.training import train_codebook
 from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.retrieval.store.records import Record
 from eigenshape.retrieval.store.thumbnails import draw_thumbnail

@@ -1,5 +1,6 @@
 """Which shapes of an index a filter chooses."""
 
+import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -46,9 +47,9 @@ def parse_filters(texts: Sequence[str] | None) -> dict[str, Any] | None:
 
 def _parse_condition(text: str, key: str, value: str) -> Any:
     if key in RESERVED:  # also "7" and "1..2", which are good names of folders
-        return [part.strip() for part in value.split(",")]
+        return _split(value)
     if RANGE not in value:
-        return [_number_or_text(part.strip()) for part in value.split(",")]
+        return [_number_or_text(part) for part in _split(value)]
     ends = [_number_or_text(part.strip()) if part.strip() else None for part in value.split(RANGE)]
     if len(ends) != 2 or any(isinstance(end, str) for end in ends):
         raise InvalidParameterError(
@@ -56,6 +57,11 @@ def _parse_condition(text: str, key: str, value: str) -> Any:
             f"height=1.5..; it is {text!r}."
         )
     return tuple(ends)
+
+
+def _split(value: str) -> list[str]:
+    """Return the values between commas; one in double quotes may have commas itself."""
+    return [part.strip() for part in next(csv.reader([value], skipinitialspace=True))]
 
 
 def _number_or_text(text: str) -> float | str:

@@ -82,7 +82,8 @@ class Match:
         Share of unrelated shapes that would score as well or better: below 0.001 the match is
         hardly a coincidence. Measured for patches; None for heat.
     distance : float or None
-        Of codes of patches, before points were matched: the score if none agree. None for heat.
+        Of codes of patches, normalized by isolation, before points were matched: the score if
+        none agree. None for heat.
 
     See Also
     --------

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.kinds import Descriptor, kind_of
+from eigenshape.retrieval.patches.cohort import ISOLATION_STEP
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search.candidates import Candidates
 from eigenshape.retrieval.search.chances import chances, nothing_alike
@@ -41,7 +42,8 @@ def search_candidates(
     while len(places):
         # An exact search reads all shapes one after the other in any case.
         stored = snapshot.rows_of(places, read_ahead=candidates.method != "exact")
-        distances = kind.scores(query, stored)
+        isolations = ISOLATION_STEP * snapshot.columns["isolation"][places]
+        distances = kind.scores(query, stored, isolations)
         try:
             for bad in places[~np.isfinite(distances)].tolist():
                 snapshot.verify(bad)

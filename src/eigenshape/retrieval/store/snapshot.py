@@ -287,7 +287,7 @@ class Snapshot:
     def __post_init__(self) -> None:
         object.__setattr__(self, "row_type", kind_of(self.recipe).row_type)
         columns = self.state.descriptors
-        if len(self.entries) < len(columns):  # else no copy of 104 bytes a shape
+        if len(self.entries) < len(columns):  # else no copy of 112 bytes a shape
             columns = columns[self.entries]
         object.__setattr__(self, "columns", columns)
 

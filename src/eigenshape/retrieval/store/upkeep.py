@@ -255,9 +255,8 @@ class _Merging:
             at, offset, _, checksum = self._carry(found["rows"], f"rows-{recipe}", rows_data)
             where = self._carry(found["details"], f"details-{recipe}", details_data)
             size = (row.n_rows, row.n_columns)
-            change.insert(
-                "descriptor", number, recipe, row.view, at, offset, *size, checksum, *where
-            )
+            fields = (number, recipe, row.view, row.isolation)
+            change.insert("descriptor", *fields, at, offset, *size, checksum, *where)
         return int(not same)
 
     def _require_columns(self, recipe: int, row: DescriptorRow, shape: ShapeRow) -> None:

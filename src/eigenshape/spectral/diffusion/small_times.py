@@ -16,8 +16,8 @@ from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_low
 
 # Eigenvalues that are needed at least. With fewer, the shortest times are as long as the shape.
 FEWEST = 50
-# In a list without residuals, an eigenvalue up to this share of the largest is 0: other solvers than
-# ours stop at about 1e-8.
+# In a list without residuals, an eigenvalue up to this share of the largest is 0: other solvers
+# than ours stop at about 1e-8.
 ZERO = 1e-7
 # The first and last time of the fit, times the largest eigenvalue. Shorter times see the end of the
 # list, longer ones see the shape as a whole, which the expansion at t = 0 does not describe. Chosen

@@ -216,7 +216,8 @@ def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
     )
     line = min(max(FIRST_LINE, 4 * energy), LARGEST_ZERO)
     while (zeros := _zeros(pencil, line)) < n_parts and line < LARGEST_ZERO:
-        line *= 10  # what rounding makes of a zero may lie farther out; a larger interval holds no fewer
+        # what rounding makes of a zero may lie farther out; a larger interval holds no fewer
+        line *= 10
     explanation = (
         f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; "
         f"components of W: {n_parts}."

@@ -50,7 +50,9 @@ LARGEST_EXPONENT = 900
 LEAST_ROUNDING = 1e-12
 # Perturbations of the coordinates by which rounding is measured.
 JIGGLES = 3
-HEADROOM = 32  # over what jiggles by rounding change: an entry takes ten roundings or more, that may all go one way
+# over what jiggles by rounding change: an entry takes ten roundings or more, that may all go one
+# way
+HEADROOM = 32
 
 
 @dataclass(frozen=True, eq=False)

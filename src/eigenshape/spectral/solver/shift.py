@@ -17,13 +17,15 @@ ACCEPTED_SHARES = (0.45, 0.78)
 # Trial factors before the highest shift with fewer than k eigenvalues below it is used.
 SHIFT_TRIALS = 12
 UNIFORM_MESH = 3.6  # λ_k ≈ 3.6 (k/n) trace W / trace B on a surface of equilateral triangles
-LOWEST = 1e-6  # of the first guess: where more eigenvalues than wanted lie lower still, they form a cluster at 0
+# of the first guess: where more eigenvalues than wanted lie lower still, they form a cluster at 0
+LOWEST = 1e-6
 # Shares of a shift that are tried if no factor near the shift itself is good enough.
 LOWER_SHARES = (1.0, 0.7, 0.4, 0.2)
 # Multiples of a shift that are tried if a pivot is poor or an eigenvalue is too close to it.
 SHIFT_NUDGES = (1.0, 1.01, 0.985, 1.03, 0.96)
 BACKWARD_ERROR = 1e-8  # of a solve, entry by entry; a poor pivot shows here
-CLEAR = 1e-5  # relative distance of the shift to an eigenvalue, below which rounding shows in the others
+# relative distance of the shift to an eigenvalue, below which rounding shows in the others
+CLEAR = 1e-5
 
 
 def shift_inside(pencil: Pencil, k: int) -> Factor:

@@ -174,7 +174,8 @@ def count_clusters(spectrum: Spectrum, most: int | None = None) -> int:
     and the next one is not (von Luxburg 2007, section 8.3). This is the c ≥ 2 with the largest
     λ_{c+1} / λ_c, or the number of components if there are several. Differences instead of ratios
     would depend on how many eigenvalues there are, because these grow apart: on the five toy data
-    sets of scikit-learn, at four seeds each, ratios find the number 12 times and differences 5 times.
+    sets of scikit-learn, at four seeds each, ratios find the number 12 times and differences 5
+    times.
 
     It is a guess. A connected shape is taken to have at least two clusters, and neighboring
     clusters that overlap are often counted as one.

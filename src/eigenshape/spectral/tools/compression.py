@@ -50,8 +50,8 @@ N_CHECK = 16
 # Bits of the quantization that can be requested: below 4 nothing is left of a shape, and beyond 24
 # the basis is no longer precise enough.
 FEWEST_BITS, MOST_BITS = 4, 24
-# Memory that a vertex or a face takes while a file is read, in bytes, and the share of the machine's
-# memory that a file may ask for.
+# Memory that a vertex or a face takes while a file is read, in bytes, and the share of the
+# machine's memory that a file may ask for.
 BYTES_PER_ELEMENT, SHARE_OF_READING = 1200, 0.5
 # Most symbols per face: a side that opens takes one, and a face at which a walk starts three.
 SYMBOLS_PER_FACE = 6
@@ -113,18 +113,18 @@ def compress_mesh(
 ) -> CompressedMesh:
     """Compress a mesh by the spectral coefficients of its coordinates (Karni and Gotsman 2000).
 
-    The mesh is cut into patches of at most 400 vertices. In each, the coordinates are written in the
-    eigenvectors of the graph Laplacian, and the coefficients are rounded to multiples of a step: the
-    longest side of the bounding box divided by 2^bits. Most of those of high frequency become 0 or
-    ±1, which take little space. Rounding moves vertices by at most √3/2 of the step (root mean
-    square), because the basis is orthonormal.
+    The mesh is cut into patches of at most 400 vertices. In each, the coordinates are written in
+    the eigenvectors of the graph Laplacian, and the coefficients are rounded to multiples of a
+    step: the longest side of the bounding box divided by 2^bits. Most of those of high frequency
+    become 0 or ±1, which take little space. Rounding moves vertices by at most √3/2 of the step
+    (root mean square), because the basis is orthonormal.
 
     The basis is not stored: the reader computes it from the faces. A potential of hashed numbers
     makes all eigenvalues of a patch differ, and the writer checks that they differ by far more than
     rounding on any machine, so that every machine finds the same vectors up to rounding errors.
 
-    Faces are written as a walk over the mesh. So vertices and faces come back in another order, with
-    the same orientation; `vertex_order` translates.
+    Faces are written as a walk over the mesh. So vertices and faces come back in another order,
+    with the same orientation; `vertex_order` translates.
 
     Parameters
     ----------

@@ -68,8 +68,8 @@ def write_faces(
 ) -> tuple[bytes, list[int], Int[np.ndarray, " n"], Int[np.ndarray, "f 3"]]:
     """Walk over all faces, and return what a reader needs to walk the same way.
 
-    Each face is entered through an open side, in the spirit of Edgebreaker (Rossignac 1999), but the
-    front is one set of sides whatever the topology, and what it does not foresee is an explicit
+    Each face is entered through an open side, in the spirit of Edgebreaker (Rossignac 1999), but
+    the front is one set of sides whatever the topology, and what it does not foresee is an explicit
     reference. So any list of faces can be written: with boundaries, handles, non-manifold edges,
     neighbors of opposite orientation, repeated faces or corners.
 

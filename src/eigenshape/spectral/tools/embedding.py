@@ -42,8 +42,8 @@ def spectral_embedding(
 
     Modes of eigenvalue 0 are constant on each component of a shape and are left out. Eigenvectors
     are determined up to sign, and up to rotation if an eigenvalue is multiple. So compare distances
-    between points, and coordinates only of one spectrum. If the d-th eigenvalue is multiple, include
-    all its eigenvectors.
+    between points, and coordinates only of one spectrum. If the d-th eigenvalue is multiple,
+    include all its eigenvectors.
 
     Parameters
     ----------

@@ -10,19 +10,19 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.graph import adjacency_matrix
 
-# Most vertices of a patch. A dense basis of 400 takes 0.04 s; with 800 files are 2 % smaller and take
-# four times as long (experiment ch1_compression).
+# Most vertices of a patch. A dense basis of 400 takes 0.04 s; with 800 files are 2 % smaller and
+# take four times as long (experiment ch1_compression).
 PATCH_SIZE = 400
-# Size of the potential that is added to the graph Laplacian, whose eigenvalues lie in 0..2 × degree.
-# It splits the multiple eigenvalues of symmetric patches.
+# Size of the potential that is added to the graph Laplacian, whose eigenvalues lie in 0..2 ×
+# degree. It splits the multiple eigenvalues of symmetric patches.
 POTENTIAL = 1e-2
-# Least gap of two eigenvalues of a patch. LAPACK's kernels differ by some 1e-14 in the matrix, so by
-# 1e-8 in eigenvectors at most.
+# Least gap of two eigenvalues of a patch. LAPACK's kernels differ by some 1e-14 in the matrix, so
+# by 1e-8 in eigenvectors at most.
 LEAST_GAP = 1e-6
 # Least component of an eigenvector along the direction that decides its sign; far above 1e-8.
 LEAST_COMPONENT = 1e-5
-# Potentials to try for a patch; one byte in the file names the one that is used. Nearly always it is
-# the first.
+# Potentials to try for a patch; one byte in the file names the one that is used. Nearly always it
+# is the first.
 N_SEEDS = 256
 # Multipliers of the finalizer of MurmurHash3 as in splitmix64 (Steele, Lea and Flood 2014).
 GOLDEN, MIX_1, MIX_2 = 0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB

@@ -76,9 +76,9 @@ def fit_gradient(
 ) -> tuple[sp.csr_array, sp.csr_array]:
     """Return the matrices of the two components of the gradient, in 1/length.
 
-    The gradient g at point i minimizes Σ_j (g · e_ij - (f_j - f_i))² over its neighbors j, with e_ij
-    the edge in the frame of i. Of several minimizers, where all edges lie on one line, it is the
-    shortest.
+    The gradient g at point i minimizes Σ_j (g · e_ij - (f_j - f_i))² over its neighbors j, with
+    e_ij the edge in the frame of i. Of several minimizers, where all edges lie on one line, it is
+    the shortest.
     """
     scaled, scale = size_one(points)
     tails, heads = edges

@@ -21,8 +21,8 @@ from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.spectral.solve import solve_spectrum
 
-# Root mean square by which a mark moves a surface by default, as a share of the diagonal of the box:
-# below what is seen, and found under noise of twice the size (experiment ch1_watermark).
+# Root mean square by which a mark moves a surface by default, as a share of the diagonal of the
+# box: below what is seen, and found under noise of twice the size (experiment ch1_watermark).
 DEFAULT_STRENGTH = 5e-4
 # Largest strength: beyond it the shape is another.
 MOST_STRENGTH = 0.1
@@ -165,8 +165,8 @@ def detect_watermark(
     incomplete beta function I. This is exact, whatever was done to the suspect.
 
     The mark survives similarity transformations, smoothing, noise and quantization. It does not
-    survive what takes the correspondence of vertices: remeshing, simplification, cropping or another
-    order of the vertices. Bending hides it, because the difference then is the bend.
+    survive what takes the correspondence of vertices: remeshing, simplification, cropping or
+    another order of the vertices. Bending hides it, because the difference then is the bend.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from starlette.routing import Route
 import eigenshape as es
 from eigenshape.retrieval.store.filters import parse_filters
 from eigenshape_studio.guard import App, Guard, Rules
-from eigenshape_studio.parse import display_name, mesh_suffix
+from eigenshape_studio.parse import display_name, shape_suffix
 from eigenshape_studio.service import openapi
 from eigenshape_studio.service.describing import Describers, MeshRefusedError, Picture
 from eigenshape_studio.service.metrics import Metrics, count_requests
@@ -103,7 +103,7 @@ class Service:
         wanted = read_parameters(request, openapi.QUERY)
         where = _conditions(wanted)
         try:
-            suffix = mesh_suffix(wanted["name"])
+            suffix = shape_suffix(wanted["name"])
         except es.FileFormatError as error:
             raise RequestError(400, str(error)) from error
         data = await request.body()

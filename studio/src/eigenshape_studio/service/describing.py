@@ -73,7 +73,8 @@ class Described:
     n_vertices, n_faces : int
         After the repairs.
     repairs : tuple of str
-        What the repairs did. The numbers of vertices are those after the repairs.
+        How a surface was made of points, and what the repairs did. The numbers of vertices are
+        those after the repairs.
     picture : dict, optional
         For the page: the image as a data address; place and color of each described vertex.
     """
@@ -90,11 +91,14 @@ Describe = Callable[[Recipe, bool, Path], Described]
 
 def describe_upload(recipe: Recipe, with_picture: bool, path: Path) -> Described:
     """Read an uploaded file, repair what is needed, and describe it."""
-    repaired = es.repair(read_upload(path, Limits().n_faces), REPAIRS)
+    surface = read_upload(path, Limits().n_faces)
+    repaired = es.repair(surface.mesh, REPAIRS)
     mesh = repaired.mesh
     descriptor = es.describe(mesh, recipe)
     picture = _picture_of_query(mesh, descriptor.vertices) if with_picture else None
-    return Described(descriptor, mesh.n_vertices, mesh.n_faces, repaired.report, picture)
+    return Described(
+        descriptor, mesh.n_vertices, mesh.n_faces, (*surface.report, *repaired.report), picture
+    )
 
 
 def _picture_of_query(mesh: es.TriangleMesh, vertices: np.ndarray) -> dict[str, Any]:
@@ -111,7 +115,7 @@ def _picture_of_query(mesh: es.TriangleMesh, vertices: np.ndarray) -> dict[str, 
 
 def draw_file(path: Path) -> Picture:
     """Draw a file of the index; its vertices are those that were described."""
-    return _draw(es.repair(es.read_mesh(path), REPAIRS).mesh)
+    return _draw(es.repair(es.io.read_surface(path).mesh, REPAIRS).mesh)
 
 
 def _draw(mesh: es.TriangleMesh) -> Picture:

@@ -20,7 +20,7 @@ QUERY = (
     Parameter(
         "name",
         "string",
-        f"Name of the file; its suffix says the format: {', '.join(es.io.MESH_FORMATS)}.",
+        f"Name of the file; its suffix says the format: {', '.join(es.io.SHAPE_FORMATS)}.",
         REQUIRED,
     ),
     Parameter("n", "integer", "Matches to return at most.", 5, 1, MOST_MATCHES),

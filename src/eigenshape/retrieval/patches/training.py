@@ -1,0 +1,138 @@
+"""Learn a codebook of patches from shapes without labels."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg as sl
+from jaxtyping import Float, Float32
+from scipy.cluster.vq import kmeans2
+from scipy.special import logsumexp
+
+from eigenshape._arguments import require_each
+from eigenshape._arrays import freeze
+from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
+from eigenshape.retrieval.patches.codebook import (
+    BASES,
+    CLIP,
+    N_AXES,
+    N_ENTRIES,
+    PatchCodebook,
+    encode_patches,
+    log_joint,
+    round_codes,
+    standardize,
+)
+from eigenshape.retrieval.patches.cohort import FEWEST_MEMBERS
+from eigenshape.retrieval.patches.patches import Patches
+
+LEAST_SPREAD = 0.1  # standard deviation by which a number is divided at least, against noise
+LEAST_EIGENVALUE = 1e-9  # of the covariance, so that whitening stays finite
+LEAST_VARIANCE = 1e-3  # of an entry; whitened numbers have variance 1
+LEAST_COUNT = 1e-9  # patches, added to the count of each entry so that none is divided by 0
+ROUNDS = 60  # of expectation and maximization at most
+CONVERGED = 1e-5  # gain of the mean log-likelihood below which the fit ends
+# Members of a cohort at most; each takes 6 KB of the codebook's file. 48 members found no more on
+# the tuning half of experiments/ch5_retrieval.
+N_MEMBERS = 24
+
+
+def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook:
+    """Learn a codebook from the patches of shapes without labels.
+
+    At each base radius the numbers are scaled to unit variance, turned to their 20 principal axes
+    and whitened. A mixture of 32 Gaussians with diagonal covariance is then fitted by expectation
+    and maximization. Codes of up to 24 of the closed shapes are kept, as the cohort by which
+    distances are normalized.
+
+    Parameters
+    ----------
+    shapes : sequence of Patches
+        Of `extract_patches`, of whole shapes and partial views.
+    seed : int
+        Of the random choice of the first centers.
+
+    Returns
+    -------
+    PatchCodebook
+
+    Raises
+    ------
+    InvalidParameterError
+        If there are fewer than 64 patches, two for each Gaussian.
+
+    See Also
+    --------
+    train_codebook_from_files, default_codebook
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> fish = es.make_creature("fish", n_vertices=500)
+    >>> codebook = es.retrieval.train_codebook(es.retrieval.extract_patches(fish, n_views=0))
+    >>> codebook.centers.shape
+    (3, 32, 20)
+    """
+    require_each(shapes, Patches, "shapes")
+    count = sum(len(shape.vertices) for shape in shapes)
+    if count < 2 * N_ENTRIES:
+        raise InvalidParameterError(
+            f"A codebook takes at least {2 * N_ENTRIES} patches; {len(shapes)} shapes have {count}."
+        )
+    with one_blas_thread():
+        books = [
+            _train_at_radius(np.concatenate([shape.numbers[:, base] for shape in shapes]), seed)
+            for base in BASES
+        ]
+        codebook = PatchCodebook(
+            *(freeze(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True))
+        )
+        return _with_cohort(codebook, shapes)
+
+
+def _with_cohort(codebook: PatchCodebook, shapes: Sequence[Patches]) -> PatchCodebook:
+    """Return a codebook with a cohort, spread evenly over the closed shapes in their order."""
+    # Only near a boundary does the weight of a disc depend on its radius.
+    closed = [shape for shape in shapes if (shape.weights == shape.weights[:, :1]).all()]
+    if len(closed) < FEWEST_MEMBERS:
+        return codebook
+    places = np.linspace(0, len(closed) - 1, min(N_MEMBERS, len(closed))).astype(np.int64)
+    codes = [encode_patches(closed[place], codebook) for place in places.tolist()]
+    return replace(codebook, cohort=freeze(round_codes(np.stack(codes), CLIP)))
+
+
+def _train_at_radius(rows: Float32[np.ndarray, "p c"], seed: int) -> tuple[np.ndarray, ...]:
+    """Return means, spreads, axes, shares, centers and variances of p patches at one radius."""
+    numbers = rows.astype(np.float64)
+    mean = numbers.mean(axis=0)
+    spread = np.maximum(numbers.std(axis=0), LEAST_SPREAD)
+    scaled = standardize(numbers, mean, spread)
+    values, vectors = sl.eigh(scaled.T @ scaled / len(scaled))
+    lengths = np.sqrt(np.maximum(values[::-1][:N_AXES], LEAST_EIGENVALUE))
+    axes = vectors[:, ::-1][:, :N_AXES] / lengths
+    return mean, spread, axes, *_fit_mixture(scaled @ axes, seed)
+
+
+def _fit_mixture(
+    points: Float[np.ndarray, "p d"], seed: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fit shares, centers and variances of a mixture of Gaussians with diagonal covariance.
+
+    Expectation and maximization (Dempster, Laird and Rubin 1977), from the clusters of k-means++.
+    """
+    centers, labels = kmeans2(points, N_ENTRIES, minit="++", rng=np.random.default_rng(seed))
+    belief, before = np.eye(N_ENTRIES)[labels], -np.inf
+    for _ in range(ROUNDS):
+        counts = belief.sum(axis=0) + LEAST_COUNT
+        centers = belief.T @ points / counts[:, None]
+        squares = belief.T @ points**2 / counts[:, None]
+        variances = np.maximum(squares - centers**2, LEAST_VARIANCE)
+        shares = counts / counts.sum()
+        joint = log_joint(points, shares, centers, variances)
+        likelihood = logsumexp(joint, axis=1, keepdims=True)
+        belief, mean = np.exp(joint - likelihood), float(likelihood.mean())
+        if mean - before < CONVERGED:
+            break
+        before = mean
+    return shares, centers, variances
