@@ -13,7 +13,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit codes: 0 done, 1 an error named on stderr, 2 wrong usage, 3 some shapes could not be indexed, "
+    epilog="Exit codes: 0 done, 1 an error named on stderr, 2 wrong usage, 3 some of several inputs failed, "
     "130 stopped by Ctrl-C.",
 )
 

@@ -18,6 +18,7 @@ from eigenshape._text import printable
 out = Console(highlight=False, soft_wrap=True)
 err = Console(stderr=True, highlight=False, soft_wrap=True)
 
+SOME_FAILED = 3  # exit code where some of several inputs failed, and the others are done
 NUMBERS = "+-.0123456789"  # first characters of a number
 LONGEST_NUMBER = 16  # characters of a column that stay however narrow the terminal is
 

@@ -18,6 +18,7 @@ from eigenshape._errors import EigenshapeError, InvalidParameterError, StoreErro
 from eigenshape._text import literal
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
+    SOME_FAILED,
     err,
     escape_text,
     out,
@@ -42,7 +43,6 @@ from eigenshape.cli.inputs import (
 AnyRecipe = Any
 Descriptor = Any
 Ask = Callable[..., Any]  # returns the matches of a descriptor
-SOME_FAILED = 3  # exit code where some of several queries could not be answered
 COLUMNS = (
     "query",
     "rank",

@@ -38,6 +38,7 @@ VERBS = {
     "and merge.",
     "query": "Find the shapes of an index that are most like a scan, and which features "
     "correspond.",
+    "fuse": "Join scans of one shape from several sides, in any places, to one surface.",
     "compress": "Write a mesh as a small file, by the spectral coefficients of its coordinates.",
     "decompress": "Write the mesh of a file that `eigenshape compress` wrote.",
     "studio": "Open a window in the browser: bend a shape by hand, see its spectrum, heat and parts, "

@@ -9,7 +9,7 @@ import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
-from eigenshape.cli.console import err, escape_text, out, print_json
+from eigenshape.cli.console import SOME_FAILED, err, escape_text, out, print_json
 from eigenshape.cli.inputs import (
     PATCHES,
     IndexRepairOption,
@@ -18,8 +18,6 @@ from eigenshape.cli.inputs import (
     repair_names,
     require_method,
 )
-
-SOME_FAILED = 3  # exit code where some shapes could not be indexed
 
 NewIndexArgument = Annotated[
     Path, typer.Argument(help="Folder of the index. It is created if it does not exist.")
