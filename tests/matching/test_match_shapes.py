@@ -9,7 +9,6 @@ from eigenshape.geometry.topology import submesh
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.target import prepare_target
 
-
 N_VERTICES = 800
 
 
