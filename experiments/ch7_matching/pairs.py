@@ -11,8 +11,8 @@ import eigenshape as es
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from real_shapes import DATA
 
-# The halves were chosen before any result was looked at: the recipe's constants were tuned on
-# horses, cats and wolves, so that lions and the rigid pairs report.
+# Chosen before any result was looked at: constants were tuned on horses, cats and wolves, and lions
+# and the rigid pairs report.
 TUNING = {
     "horse": [f"sumner_horse-{number:02d}" for number in range(1, 11)],
     "cat": [f"sumner_cat-{number:02d}" for number in range(1, 10)],
@@ -42,7 +42,7 @@ class Pair:
 
     `vertices` are vertices of the part, `points` their true places on the whole, and `distances`
     the geodesic distances of the nearest vertices of the whole to all others, all in the unit of
-    the whole. `mirrored` and `mirror_distances` belong to the mirror image, if there is one.
+    the whole.
     """
 
     name: str

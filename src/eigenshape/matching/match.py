@@ -1,7 +1,6 @@
 """Dense correspondences of a part or a whole with a whole, without training."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -58,7 +57,7 @@ def match_shapes(
     part: MeshLike,
     whole: MeshLike | MatchTarget,
     *,
-    scale: Literal["known", "unknown"] | float = "known",
+    scale: str | float = "known",
     progress: Progress | None = None,
 ) -> ShapeMatch:
     """Find the point of a whole shape that corresponds to each vertex of a part of it.

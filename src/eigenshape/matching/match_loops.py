@@ -19,11 +19,11 @@ def couple_pairs(points, images, part, whole, slack, least, longer, couplings):
     """
     ours, our_ways = part
     theirs, their_ways = whole
-    n = len(points)
-    for i in range(n):
+    for i in range(len(points)):
         p, q = points[i], images[i]
-        for j in range(n):
-            couplings[i, j] = 0
+        couplings[i, i] = 0
+        for j in range(i):
+            couplings[i, j] = couplings[j, i] = 0
             r, s = points[j], images[j]
             if p == r:
                 continue
@@ -35,7 +35,9 @@ def couple_pairs(points, images, part, whole, slack, least, longer, couplings):
                 error *= longer
             if error < slack:
                 share = error / slack
-                couplings[i, j] = (1 - share * share) * their_ways[q, s] * np.conj(our_ways[p, r])
+                value = 1 - share * share
+                couplings[i, j] = value * their_ways[q, s] * np.conj(our_ways[p, r])
+                couplings[j, i] = value * their_ways[s, q] * np.conj(our_ways[r, p])
 
 
 @njit

@@ -57,8 +57,8 @@ class Pairs:
         return Pairs(self.points[chosen], self.partners[chosen], self.support[chosen])
 
 
-def descriptor_costs(part: Surface, whole: Surface) -> Float[np.ndarray, "m k"]:
-    """Return weighted mean squared differences of whitened numbers, 1 for the median best one."""
+def patch_differences(part: Surface, whole: Surface) -> Float[np.ndarray, "m k"]:
+    """Return weighted mean squared differences of whitened numbers, in sums over 20 axes."""
     total, weights = 0.0, 0.0
     for radius in range(part.numbers.shape[1]):
         one, two = part.numbers[:, radius], whole.numbers[:, radius]
@@ -66,7 +66,12 @@ def descriptor_costs(part: Surface, whole: Surface) -> Float[np.ndarray, "m k"]:
         share = part.weights[:, radius][:, None] * whole.weights[:, radius]
         total = total + share * np.maximum(squares, 0)
         weights = weights + share
-    costs = np.asarray(total / weights, dtype=np.float64)
+    return np.asarray(total / weights, dtype=np.float64)
+
+
+def descriptor_costs(part: Surface, whole: Surface) -> Float[np.ndarray, "m k"]:
+    """Return differences of patches in units of the median difference to the most similar one."""
+    costs = patch_differences(part, whole)
     return costs / max(float(np.median(costs.min(axis=1))), np.finfo(float).tiny)
 
 
@@ -143,7 +148,7 @@ def grow_pairs(
         places = place_points(part, whole, pairs, part.points)[0]
         away = part.between[pairs.points].min(axis=0)
         reach = (REACH + WANDER * away)[:, None]
-        moves = whole.distances.T[places]
+        moves = whole.columns[places]
         wanted = costs + (moves / reach) ** 2 + OCCUPIED * _occupied(part, whole, pairs)
         partners = np.argsort(wanted, axis=1, kind="stable")[:, :N_CANDIDATES]
         nearby = np.take_along_axis(moves, partners, axis=1)
@@ -167,9 +172,8 @@ def place_points(
     near = nearest_rows(rows, N_NEAR)
     starts = whole.points[pairs.partners[near[:, 0]]]
     misfits = np.empty(len(vertices))
-    columns = np.ascontiguousarray(whole.distances.T)
     found = place_by_distances(
-        rows, pairs.partners, columns, near, starts, SOFTNESS, CAP**2, LONGER, misfits
+        rows, pairs.partners, whole.columns, near, starts, SOFTNESS, CAP**2, LONGER, misfits
     )
     return found, np.sqrt(misfits)
 

@@ -44,7 +44,7 @@ def nearest_face_points(points, corners, faces, starts, around, places):
             )
             if value < best:
                 best, found[v] = value, face
-                weights[v, 0], weights[v, 1], weights[v, 2] = 1 - s - t, s, t
+                weights[v, 0], weights[v, 1], weights[v, 2] = max(1 - s - t, 0.0), s, t
     return found, weights
 
 

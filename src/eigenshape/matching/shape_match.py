@@ -30,11 +30,11 @@ class ShapeMatch:
     confidence : (n,) float
         Probability, 0 to 1, that the point is less than 0.05 √area of the whole from the true one,
         along the surface. 0 on pieces that are too small to be matched.
-    evidence : (n, 8) float
+    evidence : (n, 10) float
         Numbers from which the confidence is computed by logistic regression; 0 where there are
         none: local orientation, misfit of distances, distance to the next matched point, distance to
-        where other starts put the vertex, local stretch, weight of the nearest patch, and
-        orientation and support of the whole map.
+        where other starts put the vertex, local stretch, weight of the nearest patch, its difference from
+        that of its image; and orientation, support and mean difference of the whole map.
     score : float
         How good the whole map is, 0 to 1: orientation × coverage² × support. Maps with errors of
         limbs had 0.05 to 0.2, good ones 0.2 to 0.5.
@@ -67,7 +67,7 @@ class ShapeMatch:
     corners: Int[np.ndarray, "n 3"]
     weights: Float[np.ndarray, "n 3"]
     confidence: Float[np.ndarray, " n"]
-    evidence: Float[np.ndarray, "n 8"]
+    evidence: Float[np.ndarray, "n c"]
     score: float
     orientation: float
     coverage: float

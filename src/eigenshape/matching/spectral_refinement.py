@@ -60,11 +60,13 @@ def refine_places(
         ours, theirs = part.functions[:, low], np.ascontiguousarray(whole.functions[:, :k])
         matrix = (ours * part.areas[:, None]).T @ theirs[places]
         smooth = ours @ matrix
-        halves = (theirs**2).sum(axis=1) / 2
+        # Half the digits are enough to find the nearest vertex, and take half the time.
+        points, columns = smooth.astype(np.float32), theirs.T.astype(np.float32)
+        halves = (columns**2).sum(axis=0) / 2
         places = np.concatenate(
             [
-                (halves - smooth[first : first + ROWS_AT_ONCE] @ theirs.T).argmin(axis=1)
-                for first in range(0, len(smooth), ROWS_AT_ONCE)
+                (halves - points[first : first + ROWS_AT_ONCE] @ columns).argmin(axis=1)
+                for first in range(0, len(points), ROWS_AT_ONCE)
             ]
         )
         if k == len(whole.eigenvalues):

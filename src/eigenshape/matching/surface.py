@@ -35,7 +35,8 @@ MATCHED_RADII = RADII[list(BASES)]  # of the discs that are compared, in units
 class Surface:
     """A mesh in the unit of the whole, and m of its vertices with what matching compares.
 
-    `distances` are from the points to all vertices, `between` from point to point. `ways` holds the
+    `distances` are from the points to all vertices, `columns` the same as rows of vertices, and
+    `between` from point to point. `ways` holds the
     direction at each point (row) of the shortest path to each other one, as a complex number of
     modulus 1 at most in a tangent frame; it is shorter where several paths are about as short.
     """
@@ -45,6 +46,7 @@ class Surface:
     normals: Float[np.ndarray, "n 3"]
     points: Int[np.ndarray, " m"]
     distances: Float32[np.ndarray, "m n"]
+    columns: Float32[np.ndarray, "n m"]
     nearest: Int[np.ndarray, " n"]
     numbers: Float32[np.ndarray, "m r d"]
     weights: Float32[np.ndarray, "m r"]
@@ -83,6 +85,7 @@ def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
         normals,
         chosen,
         distances,
+        np.ascontiguousarray(distances.T),
         nearest,
         _whiten(patches),
         patches.weights,

@@ -1,0 +1,202 @@
+"""Dense correspondences on creatures whose poses share their vertices, so that the map is known."""
+
+import numpy as np
+import pytest
+
+import eigenshape as es
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.topology import submesh
+from eigenshape.matching.match import match_shapes
+from eigenshape.matching.target import prepare_target
+
+N_VERTICES = 800
+
+
+def creature(pose):
+    return es.make_creature("quadruped", pose, n_vertices=N_VERTICES)
+
+
+@pytest.fixture(scope="module")
+def target():
+    return prepare_target(creature(1))
+
+
+@pytest.fixture(scope="module")
+def cut():
+    mesh = creature(0)
+    height = np.quantile(mesh.vertices[:, 0], 0.6)
+    return es.scans.cut_by_planes(mesh, [[1, 0, 0, height]])
+
+
+@pytest.fixture(scope="module")
+def match(target, cut):
+    return match_shapes(moved(cut.mesh), target)
+
+
+def errors(match, target, truth):
+    """Errors in hundredths of √area, in space: enough to tell a wrong limb."""
+    whole = target.mesh
+    unit = np.sqrt(es.geometry.surface_area(whole))
+    gaps = match.pull(whole.vertices) - whole.vertices[truth]
+    return 100 * np.linalg.norm(gaps, axis=1) / unit
+
+
+def moved(mesh, factor=1.0):
+    """Turn a mesh in space, and scale it."""
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    return es.TriangleMesh(factor * mesh.vertices @ turn.T + 3.0, mesh.faces)
+
+
+def test_a_cut_part_of_another_pose_is_placed(match, target, cut):
+    found = errors(match, target, cut.source_vertices)
+    assert found.mean() < 5
+    assert np.median(found) < 3
+    assert match.orientation > 0.3
+    assert match.coverage > 0.8
+
+
+def test_weights_and_corners_give_the_place_of_each_vertex(match, target):
+    faces = target.mesh.faces
+    assert np.array_equal(match.corners, faces[match.faces])
+    assert (match.weights >= -1e-12).all()
+    assert np.allclose(match.weights.sum(axis=1), 1)
+    rows = np.arange(match.n_vertices)
+    assert np.array_equal(match.vertices, match.corners[rows, match.weights.argmax(axis=1)])
+    assert ((match.confidence >= 0) & (match.confidence <= 1)).all()
+
+
+def test_the_same_input_gives_the_same_digits(match, target, cut):
+    one, two = match, match_shapes(moved(cut.mesh), target.mesh)
+    for name in ("vertices", "faces", "weights", "confidence"):
+        assert np.array_equal(getattr(one, name), getattr(two, name))
+    assert one.score == two.score
+
+
+def test_a_part_whose_faces_look_inward_is_turned_over(target, cut):
+    inward = es.TriangleMesh(cut.mesh.vertices, cut.mesh.faces[:, ::-1])
+    match = match_shapes(inward, target)
+    assert errors(match, target, cut.source_vertices).mean() < 5
+
+
+def test_a_mirrored_part_of_a_shape_without_left_and_right_is_not_handed():
+    bumps = es.shapes.grid(20, 20)
+    match = match_shapes(bumps, bumps)
+    assert not match.handed
+
+
+def test_an_animal_is_handed(match):
+    assert match.handed
+
+
+def test_each_piece_is_matched_by_itself(target):
+    mesh = creature(0)
+    low, high = np.quantile(mesh.vertices[:, 0], [0.45, 0.55])
+    centers = mesh.vertices[mesh.faces][:, :, 0]
+    outside = (centers < low).all(axis=1) | (centers > high).all(axis=1)
+    part, vertices = submesh(mesh, outside)
+    assert es.geometry.vertex_components(part)[0] > 1
+    found = errors(match_shapes(part, target), target, vertices)
+    assert np.median(found) < 6
+
+
+def test_a_speck_beside_a_part_goes_where_its_neighbors_go_and_is_not_sure(target, cut):
+    corner = cut.mesh.vertices[:1]
+    speck = corner + 1e-3 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    n = cut.mesh.n_vertices
+    both = es.TriangleMesh(
+        np.vstack([cut.mesh.vertices, speck]), np.vstack([cut.mesh.faces, [[n, n + 1, n + 2]]])
+    )
+    match = match_shapes(both, target)
+    assert (match.confidence[n:] == 0).all()
+    assert np.array_equal(match.faces[n:], np.full(3, match.faces[0]))
+
+
+def test_a_whole_in_another_pose_is_matched(target):
+    match = match_shapes(creature(0), target)
+    assert np.median(errors(match, target, np.arange(target.mesh.n_vertices))) < 3
+
+
+def test_another_unit_of_length_is_given_or_found(target, cut):
+    part = moved(cut.mesh, 40.0)
+    given = match_shapes(part, target, scale=1 / 40)
+    assert errors(given, target, cut.source_vertices).mean() < 5
+    found = match_shapes(part, target, scale="unknown")
+    assert 0.85 < 40 * found.scale < 1.15
+    assert errors(found, target, cut.source_vertices).mean() < 8
+
+
+def test_a_part_of_something_else_is_less_sure(match, target):
+    chair = es.shapes.torus(40, 20)
+    size = np.sqrt(es.geometry.surface_area(target.mesh) / es.geometry.surface_area(chair))
+    strange = match_shapes(chair, target, scale=float(size))
+    assert strange.confidence.mean() < match.confidence.mean() - 0.3
+    assert strange.score < match.score
+
+
+def test_a_tiny_mesh_gets_a_map_that_is_not_sure(target):
+    match = match_shapes(es.shapes.grid(1, 1), target)
+    assert match.n_vertices == 4
+    assert (match.confidence == 0).all()
+
+
+def test_values_and_labels_are_pulled_back(match, target):
+    whole = target.mesh
+    places = match.pull(whole.vertices)
+    assert np.allclose(match.pull(whole.vertices[:, 0]), places[:, 0])
+    labels = np.arange(whole.n_vertices)
+    assert np.array_equal(match.pull(labels), match.vertices)
+    with pytest.raises(InvalidParameterError, match="a row for each vertex of the whole"):
+        match.pull([1.0, 2.0])
+
+
+def test_sure_vertices_are_those_above_a_confidence(match):
+    assert np.array_equal(match.sure(0.7), match.confidence >= 0.7)
+
+
+def test_a_match_is_a_list_of_vertices_for_other_functions(match, target, cut):
+    plan = es.stability.StabilityPlan(k=5, n_samples=100)
+    one = es.compare_shapes(cut.mesh, target.mesh, plan, partners=match)
+    two = es.compare_shapes(cut.mesh, target.mesh, plan, partners=match.vertices)
+    assert one.closeness.displacement.max() == two.closeness.displacement.max()
+
+
+def test_a_whole_of_two_pieces_is_refused_and_the_repair_works(target):
+    mesh = target.mesh
+    far = es.TriangleMesh(
+        np.vstack([mesh.vertices, mesh.vertices + 9]),
+        np.vstack([mesh.faces, mesh.faces[:-50] + mesh.n_vertices]),
+    )
+    whole = es.geometry.drop_unreferenced(far).mesh
+    with pytest.raises(InvalidShapeError, match=r"must be connected; it has 2 components"):
+        prepare_target(whole)
+    assert (
+        prepare_target(es.repair(whole, ["largest_component"]).mesh).mesh.n_vertices == N_VERTICES
+    )
+
+
+def test_a_part_that_is_larger_than_the_whole_is_refused(target):
+    with pytest.raises(InvalidParameterError, match=r"more than 1\.5 times the area of the whole"):
+        match_shapes(moved(creature(0), 2.0), target)
+
+
+def test_pieces_that_are_all_tiny_are_refused(target, cut):
+    dots = 1e-3 * es.icosphere(0).vertices
+    faces = es.icosphere(0).faces
+    two = es.TriangleMesh(np.vstack([dots, dots + 1]), np.vstack([faces, faces + len(dots)]))
+    with pytest.raises(InvalidParameterError, match="a piece with 1% of the area of the whole"):
+        match_shapes(two, target)
+
+
+@pytest.mark.parametrize("scale", ["guess", 0.0, -1.0, np.nan, np.inf])
+def test_a_scale_that_is_none_is_refused(target, cut, scale):
+    with pytest.raises(
+        InvalidParameterError, match=r'scale must be "known", "unknown" or a positi'
+    ):
+        match_shapes(cut.mesh, target, scale=scale)
+
+
+def test_progress_ends_at_one(target, cut):
+    seen = []
+    match_shapes(cut.mesh, target, progress=lambda share, _: seen.append(share))
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
