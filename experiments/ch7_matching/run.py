@@ -22,8 +22,8 @@ from outputs import give_out, output_file, output_folder
 from real_shapes import require_data
 
 HERE = Path(__file__).parent
-COUNTS = {"cuts": 12, "holes": 12, "scans": 12, "noise": 12, "wholes": 8}  # pairs of lions
-N_RIGID = 6  # pairs of dogs, centaurs and people of each set, of one pose
+COUNTS = {"cuts": 12, "holes": 8, "scans": 12, "noise": 8, "wholes": 6}  # pairs of lions
+N_RIGID = 3  # pairs of dogs, centaurs and people of each set, of one pose
 N_QUICK = 1
 SEEDS = {"lion": 500, "rigid": 700, "tuning": 100}  # of the first pair of each group
 N_TUNING = 3
