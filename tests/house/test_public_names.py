@@ -15,7 +15,7 @@ import eigenshape as es
 
 SOURCE = Path(es.__file__).parent
 ROOMS = {
-    "calculus", "deformation", "features", "geometry", "io", "operators", "plot", "retrieval", "retrieval.baselines",
+    "calculus", "deformation", "features", "geometry", "io", "matching", "operators", "plot", "retrieval", "retrieval.baselines",
     "scans", "shapes", "spectral", "stability", "types",
 }  # fmt: skip
 PROMISED = {

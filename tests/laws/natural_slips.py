@@ -54,6 +54,16 @@ def rig() -> es.deformation.EigenRig:
     return es.rig_shape(body())
 
 
+@cache
+def target() -> es.matching.MatchTarget:
+    return es.matching.prepare_target(body())
+
+
+@cache
+def matched() -> es.matching.ShapeMatch:
+    return es.matching.match_shapes(body(), target())
+
+
 HEAD = es.deformation.BoxRegion([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
 TURN = es.Rotation([0, 0.5, 0], [1, 0, 0], 0.2)
 
@@ -166,6 +176,8 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.deformation.SkeletonResponse: lambda: es.deformation.skeleton_response(binding()),
     es.deformation.DetailedSkeleton: lambda: es.deformation.detailed_skeleton(binding()),
     es.spectral.FunctionalMap: mapping,
+    es.matching.MatchTarget: target,
+    es.matching.ShapeMatch: matched,
     es.stability.Perturbation: lambda: es.stability.measure_perturbation(body(), bent()),
     es.geometry.SurfacePoints: lambda: es.geometry.sample_surface(
         body(), 60, rng=np.random.default_rng(0)
@@ -195,6 +207,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
 # A right value of each argument whose type is not ours, by its name; "function.name" where a name has several meanings.
 NAMED: dict[str, Callable[[], Any]] = {
     "alpha": lambda: 1.0,
+    "match_shapes.scale": lambda: "known",
     "average_onto_points.values": face_vectors,
     "bind.regions": lambda: [HEAD],
     "boundary_load.mesh": with_boundary,

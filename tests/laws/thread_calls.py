@@ -34,6 +34,11 @@ class Shared:
         self.animal, self.pose = (
             es.make_creature("quadruped", pose, n_vertices=700) for pose in (0, 1)
         )
+        self.fish, self.fish_pose = (
+            es.make_creature("fish", pose, n_vertices=300) for pose in (0, 1)
+        )
+        self.fish_target = es.matching.prepare_target(self.fish_pose)
+        self.fish_match = es.matching.match_shapes(self.fish, self.fish_target)
         self.camera = es.plot.Camera(np.eye(3), 60)
         self.labels = (self.animal.vertices[self.animal.faces[:, 0], 1] > 0).astype(np.int64)
         self.laplacian, self.other = (
@@ -713,6 +718,12 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
     "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
+    "match_shapes": lambda v: [
+        es.matching.match_shapes(v.fish, v.fish_target).weights,
+    ],
+    "prepare_target": lambda v: es.matching.prepare_target(v.fish).unit,
+    "take_pose": lambda v: es.matching.take_pose(v.fish, v.fish_pose, match=v.fish_match),
+    "figure_match": lambda v: es.plot.figure_match(v.fish, v.fish_pose, v.fish_match),
     "transfer_deformation": lambda v: es.deformation.transfer_deformation(
         v.animal, v.pose, v.pose, v.map
     ),

@@ -31,11 +31,17 @@ class Quality:
     orientation: float
     coverage: float
     support: float
+    likeness: float
 
     @property
     def score(self) -> float:
-        """Orientation × coverage² × support, at least 0."""
-        return max(self.orientation, 0.0) * self.coverage**2 * self.support
+        """Orientation × coverage² × support × likeness⁴, at least 0.
+
+        Without likeness, 3 of 33 small parts of the tuning half were placed on another part of the
+        whole, with it 1; powers from 4 to 6 choose the same maps.
+        """
+        kept = max(self.orientation, 0.0)
+        return kept * self.coverage**2 * self.support * self.likeness**4
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +77,13 @@ def rate_map(
     coupling = couplings(part, whole, pairs.points, pairs.partners)
     support = np.abs(coupling.sum(axis=1)).sum() / len(part.points) ** 2
     orientation = float(areas @ kept / areas.sum())
-    quality = Quality(orientation, float(min(covered, 1.0)), float(support))
+    differences = patch_differences(part, whole)
+    ends = whole.nearest[places[part.points]]
+    unlike = np.median(differences[np.arange(len(ends)), ends])
+    likeness = np.median(differences.min(axis=1)) / max(float(unlike), TINY)
+    quality = Quality(
+        orientation, float(min(covered, 1.0)), float(support), float(min(likeness, 1.0))
+    )
     return PlacedMap(places, misfits, pairs, quality, kept)
 
 

@@ -73,7 +73,8 @@ def match_shapes(
        get no support, since their turns do not agree (compare Leordeanu and Hebert 2005, Singer
        2011).
     3. The largest continuous piece of the map is kept and grown over the rest, five times, from
-       three starts. The map with the best orientation × coverage² × support is taken.
+       three starts. The map that keeps orientation, covers the whole, and places patches on
+       patches that are alike is taken (`ShapeMatch.score`).
     4. Each vertex goes where its distances to the nearest pairs fit best, and eigenfunctions of
        both shapes make the map smooth.
 

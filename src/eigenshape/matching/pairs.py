@@ -23,9 +23,8 @@ LEAST_SUPPORT = 0.3  # of a pair, as a share of the largest, to be selected
 LEAST_AGREEMENT = 0.7  # the same, of the support by selected pairs, as a share of their median
 FIRST_ROUNDS = 30  # of the iteration from all candidates; it is steady after about 20
 NEXT_ROUNDS = 15  # near the images of the last round
-N_GROWTHS = (
-    5  # times that pairs are selected, cleaned and extended; the fourth and fifth add little
-)
+# Rounds in which pairs are cleaned, extended and selected anew; the fourth and fifth add little
+N_GROWTHS = 5
 # Points nearer than this on the whole that are more than BLOCKED times as far on the part conflict.
 CROWDED = 0.07
 BLOCKED = 2.5

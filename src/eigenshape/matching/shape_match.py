@@ -36,8 +36,8 @@ class ShapeMatch:
         where other starts put the vertex, local stretch, weight of the nearest patch, its difference from
         that of its image; and orientation, support and mean difference of the whole map.
     score : float
-        How good the whole map is, 0 to 1: orientation × coverage² × support. Maps with errors of
-        limbs had 0.05 to 0.2, good ones 0.2 to 0.5.
+        How good the whole map is, 0 to 1: orientation × coverage² × support of pairs × likeness⁴ of
+        patches. Of several maps of one part, the one with the highest score is taken.
     orientation : float
         Share of the part's area that the map keeps, minus the share that it turns over.
     coverage : float
