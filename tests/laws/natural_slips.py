@@ -178,6 +178,9 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.spectral.FunctionalMap: mapping,
     es.matching.MatchTarget: target,
     es.matching.ShapeMatch: matched,
+    es.matching.Registration: lambda: es.matching.register_scans(body(), body()),
+    es.matching.FusedScan: lambda: es.matching.fuse_scans([body()]),
+    "fuse_scans.scans": lambda: [body()],
     es.stability.Perturbation: lambda: es.stability.measure_perturbation(body(), bent()),
     es.geometry.SurfacePoints: lambda: es.geometry.sample_surface(
         body(), 60, rng=np.random.default_rng(0)

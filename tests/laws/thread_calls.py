@@ -38,6 +38,7 @@ class Shared:
             es.make_creature("fish", pose, n_vertices=300) for pose in (0, 1)
         )
         self.fish_target = es.matching.prepare_target(self.fish_pose)
+        self.fish_scan = es.partial_scan(es.make_creature("fish", n_vertices=1200), [0, 0, 1]).mesh
         self.fish_match = es.matching.match_shapes(self.fish, self.fish_target)
         self.camera = es.plot.Camera(np.eye(3), 60)
         self.labels = (self.animal.vertices[self.animal.faces[:, 0], 1] > 0).astype(np.int64)
@@ -721,6 +722,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "match_shapes": lambda v: [
         es.matching.match_shapes(v.fish, v.fish_target).weights,
     ],
+    "register_scans": lambda v: es.matching.register_scans(v.fish, v.fish).rotation,
+    "fuse_scans": lambda v: es.matching.fuse_scans([v.fish_scan]).mesh.vertices,
     "prepare_target": lambda v: es.matching.prepare_target(v.fish).unit,
     "take_pose": lambda v: es.matching.take_pose(v.fish, v.fish_pose, match=v.fish_match),
     "figure_match": lambda v: es.plot.figure_match(v.fish, v.fish_pose, v.fish_match),
