@@ -55,7 +55,7 @@ def five_frames(version: Version) -> list[es.TriangleMesh]:
     for number in range(-2, 3):
         turn = Rotation.from_rotvec(np.deg2rad(STEP * number) * across / np.linalg.norm(across))
         scan = es.scans.simulate_scan(whole, rng, view=turn.apply(view)).mesh
-        placed = Rotation.random(rng=rng).apply(scan.vertices) + rng.standard_normal(3)
+        placed = scan.vertices @ Rotation.random(rng=rng).as_matrix().T + rng.standard_normal(3)
         frames.append(es.TriangleMesh(placed, scan.faces))
     return frames
 
