@@ -47,3 +47,9 @@ def test_a_list_of_vertices_is_a_map_for_transfer():
     rest, posed = creature(0), creature(1)
     bent = transfer_deformation(rest, posed, rest, np.arange(rest.n_vertices))
     assert aligned_error(bent, posed) < 0.3 * aligned_error(rest, posed)
+
+
+def test_a_list_of_vertices_of_another_length_is_refused():
+    rest, posed = creature(0), creature(1)
+    with pytest.raises(InvalidParameterError, match="hold a vertex of `before` for each vertex"):
+        transfer_deformation(rest, posed, rest, [0, 1, 2])

@@ -12,7 +12,7 @@ from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, UpOpti
 
 
 def match(
-    part: MeshArgument,
+    mesh: MeshArgument,
     whole: MeshArgument,
     *,
     scale: Annotated[
@@ -53,14 +53,14 @@ def match(
     side = steps.parse_side(view, up)
     steps.require_output(output, steps.MAP_FILES, "A map")
     size = steps.parse_scale(scale)
-    ours, theirs = (steps.load_mesh(path, repair) for path in (part, whole))
+    ours, theirs = (steps.load_mesh(path, repair) for path in (mesh, whole))
     with progress_bar("match") as progress:
         found = es.matching.match_shapes(ours, theirs, scale=size, progress=progress)
     facts = steps.match_facts(found)
     if as_json:
         print_json(
             {
-                "part": str(part),
+                "path": str(mesh),
                 "whole": str(whole),
                 **facts,
                 "vertices": found.vertices,

@@ -1,9 +1,9 @@
 """eigenshape pose: a shape in the pose of another one."""
 
+from math import sqrt
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 import eigenshape as es
@@ -49,9 +49,9 @@ def pose(
     steps.require_mesh_path(output)
     target, posed = steps.load_mesh(mesh, repair), steps.load_mesh(like, "")
     source = steps.load_mesh(rest, "") if rest else posed
-    factor = np.sqrt(es.geometry.surface_area(source) / es.geometry.surface_area(target))
+    factor = sqrt(es.geometry.surface_area(source) / es.geometry.surface_area(target))
     with progress_bar("match") as progress:
-        found = es.matching.match_shapes(target, source, scale=float(factor), progress=progress)
+        found = es.matching.match_shapes(target, source, scale=factor, progress=progress)
         if rest:
             bent = es.deformation.transfer_deformation(source, posed, target, found)
         else:
@@ -64,6 +64,5 @@ def pose(
     if output:
         steps.save_like(mesh, target, output, bent.vertices)
     if picture:
-        moved = np.linalg.norm(bent.vertices - target.vertices, axis=1)
         poses = {"before": target, "after": bent}
-        steps.save_picture(es.plot.figure_poses(poses, moved / moved.max(), **side), picture)
+        steps.save_picture(es.plot.figure_poses(poses, **side), picture)

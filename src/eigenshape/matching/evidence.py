@@ -70,7 +70,7 @@ def rate_map(
     areas = np.linalg.norm(area_vectors(part.mesh.vertices[faces]), axis=1)
     moved = area_vectors(whole.mesh.vertices[places[faces]])
     normals = whole.normals[places[faces]].sum(axis=1)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
     kept = np.clip(np.einsum("fi,fi->f", moved, normals) / np.maximum(areas, TINY), -1, 1)
     cells = np.bincount(whole.nearest, weights=whole.areas, minlength=len(whole.points))
     covered = cells[np.unique(whole.nearest[places])].sum() / part.area
@@ -102,8 +102,8 @@ def vertex_evidence(
     ours = np.linalg.norm(np.subtract(*part.mesh.vertices[edges.T]), axis=1)
     theirs = np.linalg.norm(np.subtract(*whole.mesh.vertices[places[edges.T]]), axis=1)
     jumps = np.minimum(theirs / np.maximum(ours, TINY), MOST_STRETCH)
-    stretch = np.bincount(edges.ravel(), weights=np.repeat(jumps, 2), minlength=n)
-    stretch /= np.maximum(np.bincount(edges.ravel(), minlength=n), 1)
+    sums = np.bincount(edges.ravel(), weights=np.repeat(jumps, 2), minlength=n)
+    stretch = sums / np.maximum(np.bincount(edges.ravel(), minlength=n), 1)
     away = part.distances[found.pairs.points].min(axis=0)
     spread = np.zeros(n)
     for other in others:

@@ -82,7 +82,7 @@ class ShapeMatch:
         """Number of vertices of the part, n."""
         return len(self.vertices)
 
-    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Return `vertices`, so that functions that take a list of vertices take a match."""
         return np.array(self.vertices, dtype=dtype)
 

@@ -1,0 +1,80 @@
+"""eigenshape match and pose."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import eigenshape as es
+from eigenshape.cli import app
+
+
+def run(*arguments, code=0):
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert done.exit_code == code, done.output
+    return done
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("fish")
+    meshes = [es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1)]
+    es.write_mesh(meshes[0], path / "rest.ply")
+    es.write_mesh(meshes[1], path / "posed.ply")
+    es.write_mesh(es.partial_scan(meshes[0], [0, 0, 1]).mesh, path / "scan.ply")
+    return path
+
+
+def test_a_scan_is_matched_and_the_map_is_written(folder):
+    scan, whole = folder / "scan.ply", folder / "posed.ply"
+    n = es.read_mesh(scan).n_vertices
+    files = [folder / f"map.{suffix}" for suffix in ("csv", "npz", "txt")]
+    picture = folder / "map.png"
+    done = run("match", scan, whole, "--json", "-o", files[0], "--picture", picture)
+    found = json.loads(done.stdout)
+    assert found["n_vertices"] == n == len(found["vertices"])
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    rows = list(csv.DictReader(files[0].read_text().splitlines()))
+    assert [int(row["whole_vertex"]) for row in rows] == found["vertices"]
+    assert [float(row["confidence"]) for row in rows] == pytest.approx(
+        found["vertex_confidence"], rel=1e-3
+    )
+    for file in files[1:]:
+        run("match", scan, whole, "-o", file)
+    with np.load(files[1]) as arrays:
+        assert arrays["vertices"].tolist() == found["vertices"]
+        assert arrays["weights"].shape == (n, 3)
+    assert [int(line) for line in files[2].read_text().split()] == found["vertices"]
+
+
+def test_a_map_says_how_sure_it_is(folder):
+    text = run("match", folder / "scan.ply", folder / "posed.ply").stdout
+    assert "have a confidence of at least 0.5" in text
+    assert "Score" in text
+
+
+def test_a_scale_is_a_word_or_a_number(folder):
+    arguments = "match", folder / "scan.ply", folder / "posed.ply", "--scale"
+    assert json.loads(run(*arguments, "0.9", "--json").stdout)["scale"] == 0.9
+    assert "--scale takes known, unknown or a number; it is 'big'" in run(
+        *arguments, "big", code=1
+    ).output.replace("\n", " ")
+
+
+def test_a_map_is_written_to_known_files_only(folder):
+    done = run("match", folder / "scan.ply", folder / "posed.ply", "-o", folder / "map.xls", code=1)
+    assert "must be written to a file that ends in .csv, .npz, .txt" in done.output
+
+
+@pytest.mark.parametrize("rest", [False, True])
+def test_a_mesh_takes_a_pose(folder, rest):
+    bent = folder / "bent.ply"
+    more = ("--rest", folder / "rest.ply") if rest else ()
+    picture = folder / "poses.png"
+    arguments = "pose", folder / "rest.ply", "--like", folder / "posed.ply", *more
+    run(*arguments, "-o", bent, "--picture", picture)
+    assert es.read_mesh(bent).n_vertices == es.read_mesh(folder / "rest.ply").n_vertices
+    assert picture.exists()
+    assert json.loads(run(*arguments, "--json").stdout)["like"].endswith("posed.ply")
