@@ -19,6 +19,7 @@ from ._errors import InvalidParameterError as InvalidParameterError
 from ._errors import InvalidShapeError as InvalidShapeError
 from ._errors import MissingExtraError as MissingExtraError
 from ._errors import StoreError as StoreError
+from ._threads import set_threads as set_threads
 from ._version import __version__ as __version__
 from .deformation.deform import deform as deform
 from .deformation.handles import Rotation as Rotation
@@ -30,7 +31,6 @@ from .features.parts import find_parts as find_parts
 from .features.segmentation import segment as segment
 from .geometry.cloud import PointCloud as PointCloud
 from .geometry.conversion import as_mesh as as_mesh
-from .geometry.conversion import from_arrays as from_arrays
 from .geometry.mesh import TriangleMesh as TriangleMesh
 from .geometry.repair import repair as repair
 from .geometry.repair import suggest_repairs as suggest_repairs

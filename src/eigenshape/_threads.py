@@ -1,13 +1,119 @@
-"""One BLAS thread inside a computation, also if several Python threads compute."""
+"""Threads: how many a computation may use, and one BLAS thread inside each of them."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from threading import Lock
-from typing import Any
+from threading import Lock, local
+from typing import Any, SupportsIndex, TypeVar
 
 import scipy.linalg  # noqa: F401  SciPy's BLAS must be loaded before libraries are looked for
 from threadpoolctl import ThreadpoolController
+
+from eigenshape._arrays import whole_number
+from eigenshape._errors import InvalidParameterError
+
+VARIABLE = "EIGENSHAPE_NUM_THREADS"
+
+A = TypeVar("A")
+R = TypeVar("R")
+
+
+def set_threads(n: SupportsIndex | None) -> int:
+    """Set how many threads a computation may use.
+
+    Results do not depend on the number, to the last digit: the work is divided in the same way for
+    any. The environment variable EIGENSHAPE_NUM_THREADS sets it at the start. Batches of files, as
+    of `build_index`, use processes in place of threads, with one thread each.
+
+    Parameters
+    ----------
+    n : int or None
+        At least 1. None for as many as the process has cores, which is the default, or as the
+        environment variable says.
+
+    Returns
+    -------
+    int
+        The number that is used from now on.
+
+    Raises
+    ------
+    InvalidParameterError
+        If n is less than 1, or None and the environment variable is no whole number above 0.
+
+    See Also
+    --------
+    es.retrieval.Workers
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.set_threads(2)
+    2
+    >>> es.set_threads(None) >= 1
+    True
+    """
+    chosen = None if n is None else whole_number(n, "n", 1)
+    _NUMBER.chosen = chosen
+    return thread_count()
+
+
+def thread_count() -> int:
+    """Return how many threads a computation may use; see `set_threads`."""
+    if _NUMBER.chosen is not None:
+        return _NUMBER.chosen
+    text = os.environ.get(VARIABLE, "").strip()
+    if not text:
+        return usable_cores()
+    if not text.isdecimal() or int(text) < 1:
+        raise InvalidParameterError(
+            f"{VARIABLE} must be a whole number of at least 1; it is {text!r}. Unset it to use all "
+            "cores."
+        )
+    return int(text)
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may use, which in a container are fewer than there are."""
+    if hasattr(os, "sched_getaffinity"):  # on Linux
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def map_in_threads(function: Callable[[A], R], items: Iterable[A]) -> list[R]:
+    """Return what a function returns of each item, computed side by side, in the order of the items.
+
+    Inside of it, other calls work one after the other, so no more threads run than may. The first
+    error is raised after all calls that have begun.
+    """
+    waiting = list(items)
+    n = 1 if _INSIDE.__dict__.get("working") else min(thread_count(), len(waiting))
+    if n <= 1:
+        return [function(item) for item in waiting]
+
+    def work(item: A) -> R:
+        _INSIDE.working = True
+        with one_blas_thread():  # some libraries have a number for each thread
+            return function(item)
+
+    with ThreadPoolExecutor(n) as pool:
+        try:
+            return list(pool.map(work, waiting))
+        except BaseException:  # also Ctrl-C: what waits is not begun
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+class _Number:
+    """The number of threads that `set_threads` chose."""
+
+    chosen: int | None = None
+
+
+_NUMBER = _Number()
+_INSIDE = local()  # whether a thread works for `map_in_threads`
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import EigenshapeError
 from eigenshape._text import html_repr, repr_of_changes
+from eigenshape._threads import set_threads, thread_count
 
 T = TypeVar("T")
 P = TypeVar("P")
@@ -51,7 +52,8 @@ class Workers:
     Parameters
     ----------
     count : int
-        Processes. With an executor, its own workers count instead.
+        Processes, of one thread each. By default as many as there are cores (`thread_count`). With
+        an executor, its own workers count instead.
     timeout : float
         Seconds after which a file is given up.
     memory : float, optional
@@ -79,7 +81,7 @@ class Workers:
     300.0
     """
 
-    count: int = 2
+    count: int = field(default_factory=thread_count)
     timeout: float = 300.0
     memory: float | None = None
     executor: Executor | None = None
@@ -308,6 +310,7 @@ def _start_worker(memory: int | None, prepare: Callable[[], object] | None = Non
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it could not be blocked
     threading.Thread(target=_die_with_parent, daemon=True).start()
     threadpool_limits(1)
+    set_threads(1)
     if prepare is not None:
         prepare()
 

@@ -496,7 +496,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "flat_torus_eigenvalues": lambda v: es.shapes.flat_torus_eigenvalues(9, np.eye(2)),
     "flatten_conformally": lambda v: es.calculus.flatten_conformally(v.grid),
-    "from_arrays": lambda v: es.from_arrays(v.ball.vertices, v.ball.faces),
+    "from_arrays": lambda v: es.geometry.from_arrays(v.ball.vertices, v.ball.faces),
     "from_pyvista": lambda v: es.io.from_pyvista(es.io.to_pyvista(v.ball)),
     "from_trimesh": lambda v: es.io.from_trimesh(es.io.to_trimesh(v.ball)),
     "functional_laplacian": lambda v: (
@@ -767,6 +767,7 @@ LEFT_OUT = {
     "cache_operator_bundles": "It starts processes, which take seconds to import.",
     "build_index": "It starts processes, which take seconds to import; it writes to an index, which admits one writer.",
     "index_folder": "It starts processes, which take seconds to import.",
+    "set_threads": "It sets one number for all threads; test_thread_count.py calls it.",
     "train_codebook_from_files": "It starts processes, which take seconds to import.",
     "view": "It shows a widget of the studio, which is a package of its own.",
 }

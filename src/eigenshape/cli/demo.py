@@ -36,12 +36,12 @@ def demo(
         Path, typer.Option("-o", "--output", help="Folder for meshes, index and picture.")
     ] = FOLDER,
     kind: Annotated[str, typer.Option(help=f"Creature to scan: {', '.join(CREATURES)}.")] = "biped",
-    workers: WorkersOption = 2,
+    workers: WorkersOption = None,
 ) -> None:
     """Try everything: make creatures, index them, scan one from one side in a new pose, and find its kind."""
     if kind not in CREATURES:
         raise InvalidParameterError(f"--kind takes {', '.join(CREATURES)}; it is {kind!r}.")
-    processes = es.retrieval.Workers(workers)
+    processes = es.retrieval.Workers() if workers is None else es.retrieval.Workers(workers)
     items = _make(output / "creatures")
     shelf = es.ShapeIndex.open_or_create(output / "index")
     report = steps.describe_all(shelf, items, None, processes)

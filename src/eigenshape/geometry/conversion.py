@@ -262,7 +262,7 @@ def from_arrays(
     --------
     >>> import eigenshape as es
     >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-    >>> es.from_arrays(square, [[0, 1, 2, 3]], cells="quads")
+    >>> es.geometry.from_arrays(square, [[0, 1, 2, 3]], cells="quads")
     TriangleMesh(4 vertices, 2 faces)
     """
     if cells not in (None, "tetrahedra", "quads"):

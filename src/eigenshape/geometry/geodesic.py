@@ -1,8 +1,6 @@
 """Geodesic distances on surfaces, and farthest points."""
 
-import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from itertools import chain, islice
 
 import numpy as np
@@ -11,6 +9,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import positive_values, whole_numbers
 from eigenshape._errors import InvalidShapeError
+from eigenshape._threads import map_in_threads
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.geodesic_loops import spread_wave, spread_waves
@@ -93,10 +92,9 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
             sources = sources[done:]
         return waves
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        tasks = pool.map(waves_from, range(0, n, SOURCES_PER_TASK))
-        parts = zip(*chain.from_iterable(tasks), strict=True)
-        counts, columns, distances = (np.concatenate(part) for part in parts)
+    tasks = map_in_threads(waves_from, range(0, n, SOURCES_PER_TASK))
+    parts = zip(*chain.from_iterable(tasks), strict=True)
+    counts, columns, distances = (np.concatenate(part) for part in parts)
     rows = np.concatenate([[0], np.cumsum(counts)])
     found = sp.csr_array((in_length(distances, scale, 1), columns, rows), shape=(n, n))
     found.sort_indices()

@@ -6,9 +6,7 @@ itself, in an order of its own: the entries (i, j) and (j, i) come out equal to 
 nothing depends on the number of threads.
 """
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -16,6 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._threads import map_in_threads
 from eigenshape.operators import pair_loops
 
 AXES = 3  # axes that are cut into cells, those along which the points spread most
@@ -161,6 +160,4 @@ def _each_cell(grid: CellGrid, work: Callable[[int, int], Any]) -> None:
     """Share the cells among threads; the compiled loops hold no lock, and no two write to one place."""
     n_cells = len(grid.cells) - 1
     chunks = range(0, n_cells, CHUNK)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for _ in pool.map(work, chunks, (min(first + CHUNK, n_cells) for first in chunks)):
-            pass
+    map_in_threads(lambda first: work(first, min(first + CHUNK, n_cells)), chunks)

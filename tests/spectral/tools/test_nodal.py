@@ -5,7 +5,7 @@ import pytest
 
 import eigenshape as es
 
-PATH = es.from_arrays(np.arange(6.0)[:, None], [[i, i + 1] for i in range(5)])
+PATH = es.geometry.from_arrays(np.arange(6.0)[:, None], [[i, i + 1] for i in range(5)])
 
 
 def test_domains_of_a_path_are_counted_by_hand():
@@ -37,7 +37,9 @@ def test_units_do_not_matter(scale):
 
 
 def test_an_interval_has_one_domain_more_for_each_mode():
-    interval = es.from_arrays(np.linspace(0, 1, 40)[:, None], [[i, i + 1] for i in range(39)])
+    interval = es.geometry.from_arrays(
+        np.linspace(0, 1, 40)[:, None], [[i, i + 1] for i in range(39)]
+    )
     spectrum = es.solve_spectrum(es.cotangent_laplacian(interval), 12)
     counts = [
         es.spectral.nodal_domains(interval, column).n_domains for column in spectrum.eigenvectors.T

@@ -37,7 +37,12 @@ ViewsOption = Annotated[
     ),
 ]
 WorkersOption = Annotated[
-    int, typer.Option(min=1, help="Number of processes that describe shapes at the same time.")
+    int | None,
+    typer.Option(
+        min=1,
+        help="Number of processes that describe shapes at the same time. By default one for each "
+        "core.",
+    ),
 ]
 TimeoutOption = Annotated[
     float, typer.Option(min=1, help="Seconds after which a file is named as failed.")
@@ -107,7 +112,7 @@ def add(
         ),
     ] = None,
     repair: IndexRepairOption = "auto",
-    workers: WorkersOption = 2,
+    workers: WorkersOption = None,
     timeout: TimeoutOption = 300.0,
     memory: MemoryOption = None,
     scheduler: SchedulerOption = None,

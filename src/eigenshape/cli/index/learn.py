@@ -25,7 +25,7 @@ def learn(
     *,
     output: Annotated[Path, typer.Option("-o", "--output", help="File for the codebook (.npz).")],
     repair: IndexRepairOption = "auto",
-    workers: WorkersOption = 2,
+    workers: WorkersOption = None,
     timeout: TimeoutOption = 300.0,
     memory: MemoryOption = None,
     scheduler: SchedulerOption = None,

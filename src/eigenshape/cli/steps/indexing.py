@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from eigenshape._errors import InvalidParameterError, MissingExtraError
+from eigenshape._threads import thread_count
 from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, err, progress_bar
 from eigenshape.cli.inputs import memory_bytes
@@ -34,10 +35,11 @@ def parse_part(text: str | None) -> tuple[int, int] | None:
 
 @contextmanager
 def worker_processes(
-    count: int, timeout: float, memory: float | None, scheduler: str | None
+    count: int | None, timeout: float, memory: float | None, scheduler: str | None
 ) -> Iterator[Workers]:
     """Give the processes that describe files: of this machine, or of a Dask cluster."""
     limit = memory_bytes(memory)
+    count = thread_count() if count is None else count
     if scheduler is None:
         yield Workers(count, timeout, limit)
         return

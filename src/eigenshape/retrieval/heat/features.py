@@ -1,6 +1,7 @@
 """Feature points of a mesh, and the heat descriptor that they carry."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -234,11 +235,12 @@ def describe_views(mesh: TriangleMesh, recipe: HeatRecipe, n_views: int) -> list
 
     Return nothing for an open shape, which is a part already.
     """
-    found = []
-    for part in views_of(mesh, n_views):
-        descriptor = find_heat_features(part.mesh, recipe).descriptor
-        found.append(replace(descriptor, vertices=part.source_vertices[descriptor.vertices]))
-    return found
+    return map_in_threads(partial(_describe_view, recipe), views_of(mesh, n_views))
+
+
+def _describe_view(recipe: HeatRecipe, part: MeshPart) -> HeatDescriptor:
+    descriptor = find_heat_features(part.mesh, recipe).descriptor
+    return replace(descriptor, vertices=part.source_vertices[descriptor.vertices])
 
 
 def find_view_features(

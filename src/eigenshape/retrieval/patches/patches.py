@@ -1,6 +1,7 @@
 """Local descriptors of a surface: geodesic discs of several radii around sampled points."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import SupportsIndex
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.sparse.csgraph import shortest_path
 from eigenshape._arrays import freeze, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr, short_repr
+from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.fragments import fragment_vertices
 from eigenshape.geometry.geodesic import farthest_points
@@ -23,7 +25,7 @@ from eigenshape.geometry.topology import boundary_vertices, is_closed, submesh
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.patch_loops import NUMBERS, RINGS, describe_disc
 from eigenshape.scans.depth_camera import simulate_scan
-from eigenshape.scans.partial import viewpoint, views_of
+from eigenshape.scans.partial import view_of, viewpoint
 
 N_SAMPLES = 150  # points of a surface; time and stored bytes grow with their square
 # Viewpoints from which a closed shape is described beside the whole. Each costs one more
@@ -73,6 +75,7 @@ class Patches:
     _repr_html_ = html_repr
 
 
+@one_blas_thread()
 def extract_patches(
     mesh: MeshLike,
     *,
@@ -139,13 +142,20 @@ def extract_patches(
     require_describable(mesh)
     if clean:
         mesh = denoise(orient_outward(mesh))
-    found = [surface_patches(mesh, n_samples=count)]
-    for part in views_of(mesh, n_viewpoints):
-        patches = surface_patches(part.mesh, n_samples=count)
-        found.append(replace(patches, vertices=freeze(part.source_vertices[patches.vertices])))
-    if n_shots and is_closed(mesh):
-        found += [_frame_patches(mesh, number, count, clean=clean) for number in range(n_shots)]
-    return found
+    jobs = [lambda: surface_patches(mesh, n_samples=count)]
+    if is_closed(mesh):
+        jobs += [partial(_view_patches, mesh, number, count) for number in range(n_viewpoints)]
+        jobs += [
+            partial(_frame_patches, mesh, number, count, clean=clean) for number in range(n_shots)
+        ]
+    return map_in_threads(lambda job: job(), jobs)
+
+
+def _view_patches(mesh: TriangleMesh, number: int, n_samples: int) -> Patches:
+    """Describe what is visible of a shape from one of the viewpoints."""
+    part = view_of(mesh, number)
+    patches = surface_patches(part.mesh, n_samples=n_samples)
+    return replace(patches, vertices=freeze(part.source_vertices[patches.vertices]))
 
 
 def _frame_patches(mesh: TriangleMesh, number: int, n_samples: int, *, clean: bool) -> Patches:
