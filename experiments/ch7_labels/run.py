@@ -55,7 +55,9 @@ def best_of_parts(truth: np.ndarray, areas: np.ndarray, parts: np.ndarray) -> fl
     return float(table.max(axis=1).sum())
 
 
-def measure(target: es.retrieval.LabeledShape, sources: list[es.retrieval.LabeledShape]) -> Row:
+def measure(
+    target: es.retrieval.LabeledShape, sources: list[es.retrieval.LabeledShape], cuts: list
+) -> Row:
     """Transfer labels: the share of the area that is right, bounds, and right area by confidence."""
     areas = es.geometry.face_areas(target.mesh)
     areas = areas / areas.sum()
@@ -65,15 +67,13 @@ def measure(target: es.retrieval.LabeledShape, sources: list[es.retrieval.Labele
     weights = np.concatenate([es.geometry.face_areas(source.mesh) for source in sources])
     known = np.isin(target.labels, every)
     truth = np.where(known, target.labels, -1)
-    parts = es.find_parts(target.mesh)
-    fine = es.features.smooth_boundaries(parts.mesh, es.segment(parts.tree, persistence=FINE))
     bins = np.minimum((found.confidence * N_BINS).astype(int), N_BINS - 1)
     return {
         "right": float(areas[right].sum()),
         "commonest": float(areas[target.labels == np.bincount(every, weights).argmax()].sum()),
         "known": float(areas[known].sum()),
-        "best of parts": best_of_parts(truth, areas, parts.parts.labels),
-        "best of finer parts": best_of_parts(truth, areas, fine.labels),
+        "best of parts": best_of_parts(truth, areas, cuts[0]),
+        "best of finer parts": best_of_parts(truth, areas, cuts[1]),
         "parts": float(len(found.part_labels)),
         "bin area": np.bincount(bins, areas, N_BINS).tolist(),
         "bin right": np.bincount(bins, areas * right, N_BINS).tolist(),
@@ -86,7 +86,11 @@ def kept(folder: Path, target: tuple, sources: list[tuple]) -> list[Row]:
     file = folder / f"{target[0]}-{len(sources)}.json"
     if not file.exists():
         shape, others = labeled(*target), [labeled(*one) for one in sources]
-        rows = [measure(shape, [one]) for one in others] + [measure(shape, others)]
+        parts = es.find_parts(shape.mesh)
+        fine = es.features.smooth_boundaries(parts.mesh, es.segment(parts.tree, persistence=FINE))
+        cuts = [parts.parts.labels, fine.labels]
+        rows = [measure(shape, some, cuts) for some in ([one] for one in others)]
+        rows.append(measure(shape, others, cuts))
         file.write_text(json.dumps(rows))
     return json.loads(file.read_text())
 

@@ -176,7 +176,10 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.plot.Camera: lambda: es.plot.three_quarter_view(body()),
     es.scans.DepthCamera: es.scans.DepthCamera,
     es.plot.Panel: lambda: es.plot.Panel(body(), "body", labels(), np.arange(3)),
-    es.retrieval.LabelTransfer: lambda: es.transfer_labels(body(), labels(), body()),
+    es.retrieval.LabeledShape: lambda: es.retrieval.LabeledShape(body(), labels()),
+    es.retrieval.LabelTransfer: lambda: es.transfer_labels(
+        es.retrieval.LabeledShape(body(), labels()), body()
+    ),
     es.stability.StabilityPlan: es.stability.StabilityPlan,
     es.stability.StabilityReport: report,
     es.spectral.SpectrumComparison: lambda: es.spectral.compare_spectra(spectrum(), spectrum()),
@@ -236,6 +239,8 @@ NAMED: dict[str, Callable[[], Any]] = {
     "keys": lambda: ["owner", "heir"],
     "label": lambda: "height",
     "labels": labels,
+    "labels_from_votes.labels": lambda: [4, 2, 7],
+    "labels_from_votes.votes": lambda: np.eye(body().n_vertices)[:, :3],
     "level": lambda: 0.1,
     "logarithmic_map.source": lambda: 0,
     "map_from_points.points": lambda: np.arange(body().n_vertices),

@@ -9,6 +9,7 @@ from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
 from eigenshape.geometry.orientation import orient_outward
+from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.codebook import (
     BASES,
@@ -59,6 +60,7 @@ class LabelPoints:
 
 def label_points(mesh: TriangleMesh, *, n_points: int = N_LABEL_POINTS) -> LabelPoints:
     """Describe points of a mesh, oriented outward and denoised first, as `describe` does."""
+    require_describable(mesh)
     clean = denoise(orient_outward(mesh))
 
     found = surface_patches(clean, n_samples=n_points)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,7 +26,7 @@ from eigenshape.geometry.orientation import orient_closed_outward
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import edge_table, face_pairs
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
-from eigenshape.retrieval.labels.label_points import label_points
+from eigenshape.retrieval.labels.label_points import LabelPoints, label_points
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 from eigenshape.retrieval.labels.transport import transport_points
 
@@ -155,7 +156,7 @@ def transfer_labels(
         )
     vocabulary = np.unique(np.concatenate([np.unique(source.labels) for source in sources]))
     n_steps = len(sources) + 2
-    points = label_points(target)
+    points = _target_points(target)
     votes, costs = [], []
     for number, source in enumerate(sources):
         if progress:
@@ -173,6 +174,12 @@ def transfer_labels(
     if progress:
         progress((n_steps - 1) / n_steps, "spreading votes")
     return _settle(target, at_vertices, vocabulary, weights)
+
+
+@lru_cache(maxsize=1)
+def _target_points(target: TriangleMesh) -> LabelPoints:
+    """Describe the target; the last one is kept, since other sources are often tried on it."""
+    return label_points(target)
 
 
 def labels_from_votes(target: MeshLike, votes: ArrayLike, labels: ArrayLike) -> LabelTransfer:
@@ -229,17 +236,25 @@ def labels_from_votes(target: MeshLike, votes: ArrayLike, labels: ArrayLike) -> 
     """
     target = as_mesh(target, "target")
     counts = point_functions(votes, "votes", target.n_vertices)
+    if counts.ndim != 2 or (counts < 0).any() or not counts.any():
+        raise InvalidParameterError(
+            "votes must have a column for each label, no entry below 0, and one above; "
+            f"the shape is {counts.shape} and the entries lie from {counts.min(initial=0)} to "
+            f"{counts.max(initial=0)}."
+        )
     names = np.asarray(labels)
     if names.dtype.kind not in "iu" or names.shape != counts.shape[1:]:
         raise InvalidParameterError(
             f"labels must be whole numbers, one for each of the {counts.shape[1:]} columns of "
             f"votes; the shape is {names.shape} and the type {names.dtype}."
         )
-    if counts.ndim != 2 or (counts < 0).any() or not counts.any():
+    different, occurrences = np.unique(names, return_counts=True)
+    if len(different) < len(names):
+        double = different[occurrences > 1][0]
+        one, two = np.flatnonzero(names == double)[:2]
         raise InvalidParameterError(
-            "votes must have a column for each label, no entry below 0, and one above; "
-            f"the shape is {counts.shape} and the entries lie from {counts.min(initial=0)} to "
-            f"{counts.max(initial=0)}."
+            f"labels must differ; label {double} stands in columns {one} and {two}. "
+            "Add the votes of the two."
         )
     require_describable(target)
     return _settle(target, counts, names.astype(np.int64), np.ones(1))
@@ -303,7 +318,7 @@ def _spread_votes(
 
 
 def _pieces(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, " f"]:
-    """Number the connected pieces of equal labels."""
+    """Find the connected pieces of equal labels."""
     pairs, _ = face_pairs(edge_table(mesh))
     same = labels[pairs[:, 0]] == labels[pairs[:, 1]]
     links = np.ones(np.count_nonzero(same), dtype=np.int8)

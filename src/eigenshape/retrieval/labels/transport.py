@@ -46,8 +46,9 @@ def transport_points(target: LabelPoints, source: LabelPoints) -> Transport:
     """Match points softly, by a fused Gromov-Wasserstein plan (Vayer and others 2019).
 
     The cost of a pair is the squared difference of patches, of thicknesses, and of the distances to
-    the surest matched points (`match_patches`), plus the mean squared difference of distances to all points, each matched as in the round before. Rows keep
-    their area, columns in part, by Sinkhorn's balancing (Cuturi 2013, Chizat and others 2018).
+    the surest matched points (`match_patches`), plus the mean squared difference of distances to
+    all points, each matched as in the round before. Rows keep their area, columns in part, by
+    Sinkhorn's balancing (Cuturi 2013, Chizat and others 2018).
     """
     step, strain = anchor_strain(target.patches, source.patches)
     ours, theirs = target.numbers[max(-step, 0)], source.numbers[max(step, 0)]
