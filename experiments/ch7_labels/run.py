@@ -22,6 +22,7 @@ N_TUNED = 5  # first members of each class: constants were chosen on them, and t
 QUICK = ("ant", "fish", "hand", "teddy")
 N_QUICK = 2  # sources in the quick form
 N_BINS = 5  # of the confidence
+LEAST_BIN = 1e-3  # share of the area; below it nothing is said of a bin
 FINE = 0.1  # persistence of finer parts, beside the default
 
 Row = dict[str, float | list[float]]
@@ -49,7 +50,8 @@ def labeled(name: str, cls: str, path: Path) -> es.retrieval.LabeledShape:
 
 def best_of_parts(truth: np.ndarray, areas: np.ndarray, parts: np.ndarray) -> float:
     """Return the share of the area that is right if each part has its commonest name, -1 apart."""
-    table = np.zeros((parts.max() + 1, truth.max() + 1))
+    # Where a source has none of the names, all are -1; one empty column then gives 0.
+    table = np.zeros((parts.max() + 1, max(truth.max() + 1, 1)))
     known = truth >= 0
     np.add.at(table, (parts[known], truth[known]), areas[known])
     return float(table.max(axis=1).sum())
@@ -127,11 +129,20 @@ def summary(rows: dict[str, list[Row]]) -> dict[str, object]:
             "by class": by_class,
             "confidence": {
                 "share of area": (sums["area"] / sums["area"].sum()).round(3).tolist(),
-                "mean confidence": (sums["confidence"] / sums["area"]).round(3).tolist(),
-                "right": (sums["right"] / sums["area"]).round(3).tolist(),
+                "mean confidence": shares(sums["confidence"], sums["area"]),
+                "right": shares(sums["right"], sums["area"]),
             },
         }
     return results
+
+
+def shares(parts: np.ndarray, areas: np.ndarray) -> list[float | None]:
+    """Return parts over areas, or None where there is nearly no area."""
+    enough = areas > LEAST_BIN * areas.sum()
+    return [
+        round(float(part / area), 3) if is_enough else None
+        for part, area, is_enough in zip(parts, areas, enough, strict=True)
+    ]
 
 
 def pairs(half: str, quick: bool) -> list[tuple[tuple, list[tuple]]]:
