@@ -60,7 +60,7 @@ FULL = {
     ),
     "graph-bunny": Case(
         "10 neighbors, bunny",
-        lambda: np.asarray(es.read_points(DATA / "points" / "bunny16k.pts").points),
+        lambda: np.asarray(es.io.read_points(DATA / "points" / "bunny16k.pts").points),
         50,
         10,
     ),

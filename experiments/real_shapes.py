@@ -20,6 +20,24 @@ def manifest() -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def labeled_shapes() -> list[tuple[str, str, Path]]:
+    """List name, class and file of the shapes whose faces have names, by class and number."""
+    found = [(row["cls"], Path(row["path"])) for row in manifest()]
+    labeled = [
+        (cls, path) for cls, path in found if (DATA / "parts" / f"{cls}-{path.stem}.npy").exists()
+    ]
+    labeled.sort(key=lambda one: (one[0], int(one[1].stem.removeprefix("psb"))))
+    return [(f"{cls}-{path.stem}", cls, DATA / path) for cls, path in labeled]
+
+
+def first_members(n: int) -> set[str]:
+    """Return the names of the first n labeled shapes of each class."""
+    members: dict[str, list[str]] = {}
+    for name, cls, _ in labeled_shapes():
+        members.setdefault(cls, []).append(name)
+    return {name for names in members.values() for name in names[:n]}
+
+
 def require_data() -> None:
     """End where there are no real shapes."""
     if not DATA.is_dir():

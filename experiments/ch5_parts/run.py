@@ -20,7 +20,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from outputs import give_out, output_file, output_folder
-from real_shapes import DATA, manifest, require_data
+from real_shapes import DATA, first_members, labeled_shapes, require_data
 
 QUICK = ("ant", "armadillo", "human", "table", "teddy")
 N_TUNED = 5  # first members of each class: constants were chosen on them
@@ -38,26 +38,11 @@ Labels = np.ndarray
 
 def shapes(quick: bool) -> list[tuple[str, str, Path]]:
     """List name, class and file of the labeled shapes by class and number, or two of each of some classes."""
-    found = [(row["cls"], Path(row["path"])) for row in manifest()]
-    labeled = [
-        (cls, path) for cls, path in found if (DATA / "parts" / f"{cls}-{path.stem}.npy").exists()
-    ]
-    labeled.sort(key=lambda one: (one[0], int(one[1].stem.removeprefix("psb"))))
+    labeled = labeled_shapes()
     if quick:
-        members = {cls: [one for one in labeled if one[0] == cls] for cls in QUICK}
+        members = {cls: [one for one in labeled if one[1] == cls] for cls in QUICK}
         labeled = [one for cls in QUICK for one in (members[cls][0], members[cls][-1])]
-    return [(f"{cls}-{path.stem}", cls, DATA / path) for cls, path in labeled]
-
-
-def tuning_names() -> set[str]:
-    """Return the half on which constants were chosen: the first members of each class."""
-    everyone = shapes(quick=False)
-    classes = sorted({cls for _, cls, _ in everyone})
-    return {
-        name
-        for cls in classes
-        for name, own, _ in [one for one in everyone if one[1] == cls][:N_TUNED]
-    }
+    return labeled
 
 
 def face_neighbors(mesh: es.TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
@@ -238,7 +223,7 @@ def main() -> None:
     require_data()
     wanted = shapes(arguments.quick)
     rows = {name: kept(arguments.db, name, path) for name, _, path in track(wanted, "shapes")}
-    give_out(summary(rows, tuning_names()), arguments.out)
+    give_out(summary(rows, first_members(N_TUNED)), arguments.out)
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ def measure(pair: Pair, targets: dict[str, tuple]) -> dict[str, np.ndarray]:
         targets[key] = target, seconds, es.describe(pair.whole).points[0]
     target, seconds, points = targets[key]
     begin = time.process_time()
-    match = es.matching.match_shapes(pair.part, target)
+    match = es.match_shapes(pair.part, target)
     done = time.process_time()
     return {
         OURS: errors(pair, match.pull(pair.whole.vertices)),
@@ -139,7 +139,7 @@ def draw_examples(found: dict[str, list], wanted: list[tuple], folder: Path) -> 
         order = np.argsort([row[OURS].mean() for row in rows])
         for name, place in (("best", 0), ("median", len(order) // 2), ("worst", -1)):
             pair = make_pair(*pairs[order[place]])
-            match = es.matching.match_shapes(pair.part, pair.whole)
+            match = es.match_shapes(pair.part, pair.whole)
             figure = es.plot.figure_match(pair.part, pair.whole, match)
             es.save_figure(figure, folder / f"{kind}_{name}.png")
 

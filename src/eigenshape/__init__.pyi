@@ -37,8 +37,8 @@ from .geometry.repair import suggest_repairs as suggest_repairs
 from .geometry.simplicial import SimplicialMesh as SimplicialMesh
 from .io.mesh_files import read_mesh as read_mesh
 from .io.mesh_files import write_mesh as write_mesh
-from .io.shape_files import read_points as read_points
 from .io.shape_files import read_shape as read_shape
+from .matching.match import match_shapes as match_shapes
 from .operators.catalog import build_laplacian as build_laplacian
 from .operators.cotangent import cotangent_laplacian as cotangent_laplacian
 from .operators.gaussian import mesh_laplacian as mesh_laplacian
@@ -50,7 +50,7 @@ from .plot.fields import figure_segments as figure_segments
 from .plot.save import save_figure as save_figure
 from .plot.view import view as view
 from .retrieval.description import describe as describe
-from .retrieval.label_transfer import transfer_labels as transfer_labels
+from .retrieval.labels.transfer import transfer_labels as transfer_labels
 from .retrieval.store.index import ShapeIndex as ShapeIndex
 from .scans.partial import partial_scan as partial_scan
 from .shapes.creatures import make_creature as make_creature

@@ -26,7 +26,8 @@ MAKERS = {
     "HeatGeodesics": "es.calculus.prepare_heat_geodesics(mesh)",
     "HeatRecipe": "es.retrieval.SCALE_FREE",
     "Item": "es.retrieval.Item(name, path)",
-    "LabelTransfer": "es.transfer_labels(source, labels, target)",
+    "LabelTransfer": "es.transfer_labels(labeled, target)",
+    "LabeledShape": "es.retrieval.LabeledShape(mesh, labels)",
     "Laplacian": "es.cotangent_laplacian(mesh)",
     "LinearSolver": "es.calculus.poisson_solver(laplacian)",
     "Mapping": "{title: value}",
@@ -62,7 +63,7 @@ MAKERS = {
 # The call that reads a value of each type from a file.
 READERS = {
     "PatchCodebook": "es.retrieval.read_codebook(Path({path}).read_bytes())",
-    "PointCloud": "es.read_points({path}, dim=2)",
+    "PointCloud": "es.io.read_points({path}, dim=2)",
     "ShapeIndex": "es.ShapeIndex.open({path})",
     "Spectrum": "es.Spectrum.load({path})",
 }

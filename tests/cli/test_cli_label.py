@@ -1,6 +1,7 @@
 """`eigenshape label`: what it gives is what `transfer_labels` gives, in every form."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -8,9 +9,10 @@ from typer.testing import CliRunner
 
 from eigenshape.cli import app
 from eigenshape.features.parts import find_parts
+from eigenshape.io.labeled_shapes import read_labeled_shape
 from eigenshape.io.labels import read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
-from eigenshape.retrieval.label_transfer import transfer_labels
+from eigenshape.retrieval.labels.transfer import transfer_labels
 from eigenshape.shapes.creatures import make_creature
 
 
@@ -22,13 +24,14 @@ def run(*arguments, code=0):
 
 @pytest.fixture(scope="module")
 def poses(tmp_path_factory):
-    """Write two poses of a giraffe, and labels of the first: ten times the number of its part, plus one."""
+    """Write three poses of a giraffe, and labels of two: ten times the number of the part, plus one."""
     folder = tmp_path_factory.mktemp("poses")
-    rest, posed = (make_creature("giraffe", pose, n_vertices=1200) for pose in (0, 3))
+    rest, raised, posed = (make_creature("giraffe", pose, n_vertices=1200) for pose in (0, 1, 3))
     labels = 10 * find_parts(rest).parts.labels + 1
     write_mesh(rest, folder / "rest.ply")
     write_mesh(posed, folder / "posed.ply")
     write_labels(labels, folder / "rest.seg")
+    write_mesh(raised, folder / "raised.ply", face_labels=labels)
     return folder
 
 
@@ -50,14 +53,15 @@ def test_label_gives_what_transfer_labels_gives(poses, tmp_path):
     run(*command(poses, "-o", saved))
     done = run(*command(poses, "--json", "-o", colored, "--picture", picture))
     found = json.loads(done.stdout)
-    rest, posed = read_mesh(poses / "rest.ply"), read_mesh(poses / "posed.ply")
-    expected = transfer_labels(rest, read_labels(poses / "rest.seg"), posed)
+    posed = read_mesh(poses / "posed.ply")
+    expected = transfer_labels(read_labeled_shape(poses / "rest.ply"), posed)
     assert found["face_labels"] == expected.labels.tolist() == read_labels(saved).tolist()
+    assert found["face_confidence"] == pytest.approx(expected.confidence.tolist())
     assert [row["label"] for row in found["parts"]] == expected.part_labels.tolist()
     assert [row["confidence"] for row in found["parts"]] == pytest.approx(
-        expected.confidence.tolist()
+        expected.part_confidence.tolist()
     )
-    assert [row["like_part"] for row in found["parts"]] == expected.matches.tolist()
+    assert found["like"] == {str(poses / "rest.ply"): 1.0}
     assert sum(row["area_share"] for row in found["parts"]) == pytest.approx(1)
     assert np.array_equal(read_mesh(colored).vertices, posed.vertices)
     assert picture.read_bytes()[:4] == b"\x89PNG"
@@ -67,15 +71,31 @@ def test_label_gives_what_transfer_labels_gives(poses, tmp_path):
 
 
 @pytest.mark.long
-def test_label_prints_a_table_and_takes_what_segment_prints(poses, tmp_path):
+def test_label_takes_several_meshes_or_a_library_with_names(poses, tmp_path):
+    posed = poses / "posed.ply"
+    two = ("--like", poses / "rest.ply", "--like", poses / "raised.ply")
+    several = json.loads(run("label", posed, *two, "--json").stdout)
+    assert len(several["like"]) == 2
+    assert sum(several["like"].values()) == pytest.approx(1)
+    library = tmp_path / "library"
+    library.mkdir()
+    for name in ("rest.ply", "rest.seg", "raised.ply"):
+        shutil.copy(poses / name, library)
+    (library / "names.txt").write_text("nothing\ntorso\n")
+    text = run("label", posed, "--library", library).stdout
+    for word in ("label", "name", "torso", "confidence", "clearest vertex", "%"):
+        assert word in text
+    of_library = json.loads(run("label", posed, "--library", library, "--json").stdout)
+    # The order of the shapes differs, and with it the last digit of the votes.
+    same = np.array(of_library["face_labels"]) == several["face_labels"]
+    assert same.mean() > 0.99
+
+
+@pytest.mark.long
+def test_label_takes_what_segment_prints(poses, tmp_path):
     parts = tmp_path / "rest.json"
     parts.write_text(run("segment", poses / "rest.ply", "--json").stdout)
     arguments = ("label", poses / "posed.ply", "--like", poses / "rest.ply", "--labels", parts)
-    text = run(*arguments, "-n", 3).stdout
-    for word in ("label", "confidence", "feature point", "like part", "%"):
-        assert word in text
-    few = json.loads(run(*arguments, "-n", 3, "--json").stdout)
-    assert len(few["parts"]) == 3
     many = json.loads(run(*arguments, "--json").stdout)["face_labels"]
     numbers = json.loads(run(*command(poses, "--json")).stdout)["face_labels"]
     assert [10 * label + 1 for label in many] == numbers
@@ -115,7 +135,12 @@ def test_label_names_what_is_wrong(poses, tmp_path, options, message):
     assert done.stdout == ""
 
 
-def test_label_needs_a_mesh_that_has_labels(poses):
-    for missing in ("--like", "--labels"):
-        words = [word for word in command(poses) if word != missing]
-        assert f"Missing option '{missing}'" in run(*words, code=2).output
+def test_label_needs_shapes_that_have_labels(poses, tmp_path):
+    posed = poses / "posed.ply"
+    assert "Labels must come from --like or from --library" in run("label", posed, code=1).stderr
+    done = run(*command(poses, "--like", poses / "raised.ply"), code=1)
+    assert "there are 1 for 2" in " ".join(done.stderr.split())
+    done = run("label", posed, "--like", posed, code=1)
+    assert "must have a property label" in " ".join(done.stderr.split())
+    done = run("label", posed, "--library", tmp_path, code=1)
+    assert "must hold a mesh" in " ".join(done.stderr.split())

@@ -67,6 +67,9 @@ def test_segment_cuts_where_it_is_told(biped):
     one = run_json("segment", biped, "--persistence", 2)
     assert len(one["parts"]) == 1
     assert one["parts"][0]["persistence"] is None
+    finer = run_json("segment", biped, "--level", 1)["parts"]
+    assert len(finer) == len(run_json("segment", biped, "--persistence", 0.15)["parts"])
+    assert len(finer) > len(run_json("segment", biped)["parts"])
     every = run_json("segment", biped, "--persistence", 0)
     assert len(every["parts"]) == len(find_parts(read_mesh(biped)).tree.maxima)
     lengths = [row["persistence"] for row in every["parts"][1:]]
@@ -115,6 +118,15 @@ def test_segment_prints_a_table(biped):
             ("features", "{missing}", "-o", "a.obj"),
             "A mesh with colors must be written to a file that ends in .ply; ",
         ),
+        (
+            ("segment", "{mesh}", "--level", 1, "-n", 3),
+            "--level determines the number of parts, as --n-parts, --persistence and --largest-gap",
+        ),
+        (
+            ("segment", "{mesh}", "--level", 1, "--method", "thesis"),
+            "--level is for --method parts; the method is thesis",
+        ),
+        (("segment", "{mesh}", "--level", "inf"), "--level must be finite; it is inf"),
         (
             ("segment", "{mesh}", "-n", 3, "--largest-gap"),
             "at most one of --n-parts, --persistence, --largest-gap; it was given --n-parts and",

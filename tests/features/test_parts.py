@@ -1,9 +1,12 @@
+import itertools
+
 import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.features import boundaries
 from eigenshape.features.boundaries import smooth_boundaries
+from eigenshape.features.contrast import contrast_at
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.parts import find_parts, part_spectrum
@@ -249,6 +252,23 @@ def test_times_widths_and_modes_must_be_positive():
         smooth_boundaries(mesh, two_halves(mesh, 0.0), width=-1.0)
     with pytest.raises(InvalidParameterError, match="n_modes must be at least 2"):
         find_parts(mesh, n_modes=1)
+
+
+def test_finer_levels_have_more_parts_that_lie_within_those_of_coarser_ones(human):
+    cuts = [segment(human.tree, persistence=contrast_at(level)) for level in (-1, 0, 1, 2)]
+    counts = [len(cut.features.vertices) for cut in cuts]
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1]
+    for coarse, fine in itertools.pairwise(cuts):
+        pairs = np.unique(np.column_stack([fine.labels, coarse.labels]), axis=0)
+        assert len(pairs) == len(fine.features.vertices)
+    found = find_parts(human.mesh, level=1)
+    assert len(found.parts.features.vertices) == counts[2]
+
+
+def test_a_level_must_be_finite():
+    with pytest.raises(InvalidParameterError, match="level must be finite"):
+        find_parts(icosphere(1), level=np.inf)
 
 
 def test_a_face_without_area_is_refused():

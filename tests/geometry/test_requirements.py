@@ -39,7 +39,8 @@ from eigenshape.retrieval.baselines.shape_dna import shape_dna
 from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.heat.recipe import SCALE_FREE
-from eigenshape.retrieval.label_transfer import transfer_labels
+from eigenshape.retrieval.labels.labeled_shape import LabeledShape
+from eigenshape.retrieval.labels.transfer import transfer_labels
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.patches import extract_patches, surface_patches
 from eigenshape.retrieval.store.writing import describe_to_store
@@ -72,7 +73,7 @@ DESCRIBERS = {
     "extract_patches": lambda mesh: extract_patches(mesh, n_views=1),
     "find_parts": find_parts,
     "transfer_labels": lambda mesh: transfer_labels(
-        BALL, np.zeros(BALL.n_faces, dtype=np.int64), mesh
+        LabeledShape(BALL, np.zeros(BALL.n_faces, dtype=np.int64)), mesh
     ),
     "shape_dna": shape_dna,
     "affinity_eigenvalues": affinity_eigenvalues,

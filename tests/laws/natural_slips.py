@@ -61,7 +61,7 @@ def target() -> es.matching.MatchTarget:
 
 @cache
 def matched() -> es.matching.ShapeMatch:
-    return es.matching.match_shapes(body(), target())
+    return es.match_shapes(body(), target())
 
 
 HEAD = es.deformation.BoxRegion([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
@@ -191,7 +191,10 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.plot.Camera: lambda: es.plot.three_quarter_view(body()),
     es.scans.DepthCamera: es.scans.DepthCamera,
     es.plot.Panel: lambda: es.plot.Panel(body(), "body", labels(), np.arange(3)),
-    es.retrieval.LabelTransfer: lambda: es.transfer_labels(body(), labels(), body()),
+    es.retrieval.LabeledShape: lambda: es.retrieval.LabeledShape(body(), labels()),
+    es.retrieval.LabelTransfer: lambda: es.transfer_labels(
+        es.retrieval.LabeledShape(body(), labels()), body()
+    ),
     es.stability.StabilityPlan: es.stability.StabilityPlan,
     es.stability.StabilityReport: report,
     es.spectral.SpectrumComparison: lambda: es.spectral.compare_spectra(spectrum(), spectrum()),
@@ -210,6 +213,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
 # A right value of each argument whose type is not ours, by its name; "function.name" where a name has several meanings.
 NAMED: dict[str, Callable[[], Any]] = {
     "alpha": lambda: 1.0,
+    "set_threads.n": lambda: None,
     "match_shapes.scale": lambda: "known",
     "average_onto_points.values": face_vectors,
     "bind.regions": lambda: [HEAD],
@@ -252,6 +256,8 @@ NAMED: dict[str, Callable[[], Any]] = {
     "keys": lambda: ["owner", "heir"],
     "label": lambda: "height",
     "labels": labels,
+    "labels_from_votes.labels": lambda: [4, 2, 7],
+    "labels_from_votes.votes": lambda: np.eye(body().n_vertices)[:, :3],
     "level": lambda: 0.1,
     "logarithmic_map.source": lambda: 0,
     "map_from_points.points": lambda: np.arange(body().n_vertices),

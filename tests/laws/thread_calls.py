@@ -39,7 +39,7 @@ class Shared:
         )
         self.fish_target = es.matching.prepare_target(self.fish_pose)
         self.fish_scan = es.partial_scan(es.make_creature("fish", n_vertices=1200), [0, 0, 1]).mesh
-        self.fish_match = es.matching.match_shapes(self.fish, self.fish_target)
+        self.fish_match = es.match_shapes(self.fish, self.fish_target)
         self.camera = es.plot.Camera(np.eye(3), 60)
         self.labels = (self.animal.vertices[self.animal.faces[:, 0], 1] > 0).astype(np.int64)
         self.laplacian, self.other = (
@@ -67,7 +67,8 @@ class Shared:
         self.many_map = es.functional_map(
             self.many_spectrum, self.many_spectrum, [[0, 0], [99, 99]], n_modes=4
         )
-        self.transfer = es.transfer_labels(self.animal, self.labels, self.pose)
+        self.labeled = es.retrieval.LabeledShape(self.animal, self.labels)
+        self.transfer = es.transfer_labels(self.labeled, self.pose)
         self._make_solvers()
         self._make_graph()
         self._make_files()
@@ -170,6 +171,11 @@ class Shared:
             "MeshVersionFormatted 2\nDimension 3\nVertices\n4\n0 0 0 0\n1 0 0 0\n1 1 0 0\n0 1 0 0\n"
             "Triangles\n2\n1 2 3 0\n1 3 4 0\nEnd\n"
         )
+        self.labeled_folder = self.folder / "labeled"
+        self.labeled_folder.mkdir()
+        es.write_mesh(self.animal, self.labeled_folder / "animal.off")
+        (self.labeled_folder / "animal.seg").write_text("\n".join(map(str, self.labels)))
+        (self.labeled_folder / "names.txt").write_text("torso\nleg\n")
         self.bytes = es.retrieval.write_codebook(self.codebook)
 
 
@@ -461,7 +467,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.figure_field(v.ball, v.ball.vertices[:, 0], r"$x_1$", camera=v.camera)
     ),
     "figure_label_transfer": lambda v: drawn(
-        es.plot.figure_label_transfer(v.animal, v.pose, v.transfer)
+        es.plot.figure_label_transfer(v.labeled, v.pose, v.transfer)
     ),
     "figure_merge_tree": lambda v: drawn(es.plot.figure_merge_tree(v.tree)),
     "figure_poses": lambda v: drawn(
@@ -625,7 +631,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_edits": lambda v: es.io.read_edits(v.folder / "edits.json", v.animal),
     "read_mesh": lambda v: es.read_mesh(v.folder / "ball.ply"),
     "read_surface": lambda v: es.io.read_surface(v.folder / "ball.ply"),
-    "read_points": lambda v: es.read_points(v.folder / "cloud.ply"),
+    "read_points": lambda v: es.io.read_points(v.folder / "cloud.ply"),
     "read_shape": lambda v: es.read_shape(v.folder / "square.mesh"),
     "reconstruct": lambda v: es.spectral.reconstruct(v.many_coefficients, v.many_spectrum),
     "recover_geometry": lambda v: es.spectral.recover_geometry(es.shapes.sphere_eigenvalues(300)),
@@ -720,7 +726,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
     "match_shapes": lambda v: [
-        es.matching.match_shapes(v.fish, v.fish_target).weights,
+        es.match_shapes(v.fish, v.fish_target).weights,
     ],
     "register_scans": lambda v: es.matching.register_scans(v.fish, v.fish).rotation,
     "fuse_scans": lambda v: es.matching.fuse_scans([v.fish_scan]).mesh.vertices,
@@ -731,7 +737,17 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.animal, v.pose, v.pose, v.map
     ),
     "transfer_function": lambda v: es.spectral.transfer_function(v.many_map, v.many.vertices),
-    "transfer_labels": lambda v: es.transfer_labels(v.animal, v.labels, v.pose),
+    "labels_from_votes": lambda v: es.retrieval.labels_from_votes(
+        v.animal, np.eye(v.animal.n_vertices)[:, :3], [4, 2, 7]
+    ),
+    "read_label_names": lambda v: es.io.read_label_names(v.labeled_folder),
+    "read_labeled_shape": lambda v: (
+        es.io.read_labeled_shape(v.labeled_folder / "animal.off").labels
+    ),
+    "read_labeled_shapes": lambda v: [
+        shape.labels for shape in es.io.read_labeled_shapes(v.labeled_folder).values()
+    ],
+    "transfer_labels": lambda v: es.transfer_labels(v.labeled, v.pose),
     "admissible_times": lambda v: es.stability.admissible_times(
         delta=0.01, spacing=0.02, eigenvalue=9.0
     ),

@@ -1,6 +1,7 @@
 """The options that several verbs have. Nothing heavy is imported here, so that `--help` is quick."""
 
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -165,6 +166,28 @@ def require_one_rule(n_parts: int | None, persistence: float | None, *, largest_
         raise InvalidParameterError(
             f"The number of parts takes at most one of {', '.join(rules)}; it was given "
             f"{' and '.join(given)}."
+        )
+
+
+def require_level(
+    level: float,
+    method: str,
+    n_parts: int | None,
+    persistence: float | None,
+    *,
+    largest_gap: bool,
+) -> None:
+    """Raise an error if a level has no meaning for a method, or other options contradict it."""
+    if method != PARTS:
+        raise InvalidParameterError(
+            f"--level is for --method {PARTS}; the method is {method}. Use --n-parts."
+        )
+    if not isfinite(level):
+        raise InvalidParameterError(f"--level must be finite; it is {level}.")
+    if n_parts is not None or persistence is not None or largest_gap:
+        raise InvalidParameterError(
+            "--level determines the number of parts, as --n-parts, --persistence and --largest-gap "
+            "do; give only one of them."
         )
 
 

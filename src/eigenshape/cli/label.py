@@ -1,10 +1,11 @@
-"""eigenshape label: the labels of one mesh, copied to the parts of another."""
+"""eigenshape label: the labels of one mesh or several, copied to another."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 import eigenshape as es
@@ -15,34 +16,38 @@ from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, UpOpti
 COLUMNS = {
     "part": "part",
     "label": "label",
+    "name": "name",
     "confidence": "confidence",
-    "feature point": "vertex",
     "area": "area_share",
-    "like part": "like_part",
+    "clearest vertex": "vertex",
 }
 
 
 def label(
     mesh: MeshArgument,
     *,
-    like: Annotated[Path, typer.Option("--like", help="Mesh whose faces have labels.")],
+    like: Annotated[
+        list[Path] | None,
+        typer.Option("--like", help="Mesh whose faces have labels. May be given several times."),
+    ] = None,
     labels: Annotated[
-        Path,
+        list[Path] | None,
         typer.Option(
             "--labels",
             help=(
-                "Labels of the faces of --like: a text file with one whole number a line, the "
-                "JSON of `segment --json`, or the PLY of `segment -o`."
+                "Labels of the faces of --like, once for each: a text file with one whole number a "
+                "line, the JSON of `segment --json`, or the PLY of `segment -o`. By default the "
+                "file with the name of the mesh that ends in .seg, .txt or .json, or the labels in "
+                "the mesh (PLY)."
             ),
         ),
-    ],
-    n_parts: Annotated[
-        int | None,
+    ] = None,
+    library: Annotated[
+        Path | None,
         typer.Option(
-            "-n",
-            "--n-parts",
-            min=1,
-            help="Largest number of parts to cut each mesh into. By default as many as are found.",
+            "--library",
+            help="Folder of meshes with such files beside them. Its file names.txt, if there is "
+            "one, has the name of label 0 in the first line, of label 1 in the second, and so on.",
         ),
     ] = None,
     repair: RepairOption = "",
@@ -56,46 +61,61 @@ def label(
         ),
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option(help="Draw both meshes side by side (PNG, SVG or PDF).")
+        Path | None,
+        typer.Option(help="Draw the best matching labeled mesh and this one (PNG, SVG or PDF)."),
     ] = None,
     view: ViewOption = "auto",
     up: UpOption = "auto",
     as_json: JsonOption = False,
 ) -> None:
-    """Copy the labels of one mesh to the matching parts of another: label a horse, and get a labeled camel.
+    """Copy the labels of one mesh or several to another: label a horse, and get a labeled camel.
 
     Left and right may be exchanged. Repairs are applied to the mesh that gets the labels.
     """
     steps.require_picture(picture)
     side = steps.parse_side(view, up)
     steps.require_label_path(output)
-    source, given = steps.read_labeled_mesh(like, labels)
+    examples, names = steps.read_examples(like or [], labels or [], library)
     target = steps.load_mesh(mesh, repair)
     with progress_bar("label") as progress:
-        found = es.transfer_labels(source, given, target, n_parts=n_parts, progress=progress)
-    rows = _rows(target, found)
+        found = es.transfer_labels(list(examples.values()), target, progress=progress)
+    rows = _rows(target, found, names)
     if as_json:
         print_json(
-            {"path": str(mesh), "like": str(like), "parts": rows, "face_labels": found.labels}
+            {
+                "path": str(mesh),
+                "like": dict(zip(examples, found.weights.tolist(), strict=True)),
+                "parts": rows,
+                "face_labels": found.labels,
+                "face_confidence": found.confidence,
+            }
         )
     else:
-        steps.print_rows("Labels", COLUMNS, rows)
+        columns = {key: value for key, value in COLUMNS.items() if names or key != "name"}
+        steps.print_rows("Labels", columns, rows)
     if output:
-        colors = steps.label_colors(target, found.labels, given)
+        every = np.unique(np.concatenate([shape.labels for shape in examples.values()]))
+        colors = steps.label_colors(target, found.labels, every)
         steps.save_labels(target, found.labels, colors, output)
     if picture:
-        figure = es.plot.figure_label_transfer(source, target, found, **side)
+        best = list(examples.values())[int(found.weights.argmax())]
+        figure = es.plot.figure_label_transfer(best, target, found, names=names, **side)
         steps.save_picture(figure, picture)
 
 
-def _rows(target: es.TriangleMesh, found: es.retrieval.LabelTransfer) -> list[dict[str, Any]]:
+def _rows(
+    target: es.TriangleMesh, found: es.retrieval.LabelTransfer, names: list[str]
+) -> list[dict[str, Any]]:
+    areas = np.bincount(found.parts, weights=es.geometry.face_areas(target))
     return [
         {
             "part": number,
-            **row,
-            "label": int(found.part_labels[number]),
-            "confidence": float(found.confidence[number]),
-            "like_part": int(found.matches[number]),
+            "label": int(label),
+            "name": names[label] if 0 <= label < len(names) else "",
+            "confidence": float(found.part_confidence[number]),
+            "area_share": float(areas[number] / areas.sum()),
+            "vertex": int(found.part_vertices[number]),
+            "position": target.vertices[found.part_vertices[number]].tolist(),
         }
-        for number, row in enumerate(steps.part_rows(target, found.target))
+        for number, label in enumerate(found.part_labels)
     ]

@@ -55,7 +55,7 @@ def match(
     size = steps.parse_scale(scale)
     ours, theirs = (steps.load_mesh(path, repair) for path in (mesh, whole))
     with progress_bar("match") as progress:
-        found = es.matching.match_shapes(ours, theirs, scale=size, progress=progress)
+        found = es.match_shapes(ours, theirs, scale=size, progress=progress)
     facts = steps.match_facts(found)
     if as_json:
         print_json(

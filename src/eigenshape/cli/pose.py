@@ -51,7 +51,7 @@ def pose(
     source = steps.load_mesh(rest, "") if rest else posed
     factor = sqrt(es.geometry.surface_area(source) / es.geometry.surface_area(target))
     with progress_bar("match") as progress:
-        found = es.matching.match_shapes(target, source, scale=factor, progress=progress)
+        found = es.match_shapes(target, source, scale=factor, progress=progress)
         if rest:
             bent = es.deformation.transfer_deformation(source, posed, target, found)
         else:

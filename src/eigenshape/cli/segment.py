@@ -16,9 +16,10 @@ from eigenshape.cli.inputs import (
     RepairOption,
     UpOption,
     ViewOption,
+    require_level,
     require_one_rule,
 )
-from eigenshape.features.contrast import PART_CONTRAST
+from eigenshape.features.contrast import PART_CONTRAST, contrast_at
 from eigenshape.retrieval.heat.recipe import PRESETS
 
 METHODS = (PARTS, *PRESETS)
@@ -56,6 +57,13 @@ def segment(
             )
         ),
     ] = None,
+    level: Annotated[
+        float | None,
+        typer.Option(
+            help=f"From coarse to fine, for --method {PARTS}: 0 is the default, 1 halves the least "
+            "persistence of a part, -1 doubles it."
+        ),
+    ] = None,
     largest_gap: Annotated[
         bool,
         typer.Option(
@@ -88,6 +96,9 @@ def segment(
     """Cut a mesh into its parts: limbs, head, torso."""
     if method not in METHODS:
         raise InvalidParameterError(f"--method takes {', '.join(METHODS)}; it is {method!r}.")
+    if level is not None:
+        require_level(level, method, n_parts, persistence, largest_gap=largest_gap)
+        persistence = contrast_at(level)
     require_one_rule(n_parts, persistence, largest_gap=largest_gap)
     steps.require_picture(picture)
     side = steps.parse_side(view, up)

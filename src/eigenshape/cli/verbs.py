@@ -26,8 +26,8 @@ VERBS = {
     "features": "Find the feature points of a mesh and the parts around them, most persistent "
     "first.",
     "segment": "Cut a mesh into its parts: limbs, head, torso.",
-    "label": "Copy the labels of one mesh to the matching parts of another: label a horse, and get "
-    "a labeled camel.",
+    "label": "Copy the labels of one mesh or several to another: label a horse, and get a labeled "
+    "camel.",
     "match": "Find where each point of a part, a scan or a pose lies on a whole shape.",
     "deform": "Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows "
     "smoothly.",

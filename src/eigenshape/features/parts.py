@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import finite_values, freeze, whole_number
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
-from eigenshape.features.contrast import PART_CONTRAST
+from eigenshape.features.contrast import contrast_at
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import Segmentation, segment
@@ -70,7 +70,11 @@ class PartDecomposition:
 
 
 def find_parts(
-    mesh: MeshLike, *, n_modes: int = N_MODES, progress: Progress | None = None
+    mesh: MeshLike,
+    *,
+    level: float = 0.0,
+    n_modes: int = N_MODES,
+    progress: Progress | None = None,
 ) -> PartDecomposition:
     """Find the parts of a surface, such as limbs, head and torso.
 
@@ -89,6 +93,10 @@ def find_parts(
     mesh : MeshLike
         A closed surface is oriented outward first. The faces of an open surface must be
         counter-clockwise as seen from outside.
+    level : float
+        From coarse to fine: at level 1 a part needs half the persistence that it needs at level 0,
+        at level -1 twice as much. The parts of a finer level are those of a coarser one or lie
+        within them, up to the smoothing of their boundaries.
     n_modes : int
         Number of eigenpairs, at least 2; one is added for each component that is not a fragment.
     progress : callable, optional
@@ -101,7 +109,7 @@ def find_parts(
     Raises
     ------
     InvalidParameterError
-        If `n_modes` is less than 2.
+        If `n_modes` is less than 2, or `level` is not finite.
     InvalidShapeError
         If the mesh has a face without area, a duplicate face or a vertex without a face; if
         neighboring faces are oriented against each other; or if faces lie edge to edge without
@@ -126,17 +134,23 @@ def find_parts(
     >>> len(found.parts.features.vertices)
     2
 
+    At a coarser level it is one, at a finer level two still:
+
+    >>> [len(es.find_parts(dumbbell, level=level).parts.features.vertices) for level in (-2, 1)]
+    [1, 2]
+
     The tree can be cut again, for example to keep the whole shape together:
 
     >>> len(es.segment(found.tree, n_regions=1).features.vertices)
     1
     """
     mesh = as_mesh(mesh)
+    (fineness,) = finite_values(level, "level")
     outward = orient_closed_outward(mesh)
     spectrum = part_spectrum(outward, n_modes=n_modes, progress=progress)
     tree = part_tree(outward, spectrum)
     heat = heat_kernel_signature(spectrum, [SEED_TIME * float(spectrum.mass.sum())])[:, 0]
-    parts = smooth_boundaries(outward, segment(tree, persistence=PART_CONTRAST))
+    parts = smooth_boundaries(outward, segment(tree, persistence=contrast_at(float(fineness))))
     return PartDecomposition(outward, spectrum, freeze(heat), tree, parts)
 
 

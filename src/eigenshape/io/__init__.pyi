@@ -7,6 +7,9 @@ from .edits import read_edits as read_edits
 from .edits import write_edits as write_edits
 from .folders import find_items as find_items
 from .folders import index_folder as index_folder
+from .labeled_shapes import read_label_names as read_label_names
+from .labeled_shapes import read_labeled_shape as read_labeled_shape
+from .labeled_shapes import read_labeled_shapes as read_labeled_shapes
 from .mesh_files import read_mesh as read_mesh
 from .mesh_files import write_mesh as write_mesh
 from .parsing import MESH_FORMATS as MESH_FORMATS

@@ -156,7 +156,7 @@ def read_points(
     >>> import eigenshape as es
     >>> path = pathlib.Path(tempfile.mkdtemp(), "corners.xyz")
     >>> _ = path.write_text("0 0 0\n1 0 0\n0 1 0\n")
-    >>> cloud = es.read_points(path, dim=2)
+    >>> cloud = es.io.read_points(path, dim=2)
     >>> cloud.points.shape, cloud.dim
     ((3, 3), 2)
     """
@@ -191,7 +191,7 @@ def write_points(cloud: PointCloud, path: str | Path) -> None:
     >>> path = pathlib.Path(tempfile.mkdtemp(), "ball.xyz")
     >>> cloud = es.PointCloud(es.icosphere(1).vertices, dim=2)
     >>> es.io.write_points(cloud, path)
-    >>> bool((es.read_points(path).points == cloud.points).all())
+    >>> bool((es.io.read_points(path).points == cloud.points).all())
     True
     """
     require_type(cloud, PointCloud, "cloud")

@@ -120,7 +120,7 @@ def match_shapes(
     >>> import eigenshape as es
     >>> poses = [es.make_creature("quadruped", pose, n_vertices=1000) for pose in (0, 1)]
     >>> scan = es.partial_scan(poses[0], [0, 0, 1])
-    >>> match = es.matching.match_shapes(scan.mesh, poses[1])
+    >>> match = es.match_shapes(scan.mesh, poses[1])
     >>> match.vertices.shape == (scan.mesh.n_vertices,)
     True
     >>> image = match.pull(poses[1].vertices)  # the place of each vertex on the whole

@@ -57,7 +57,7 @@ class ShapeMatch:
     --------
     >>> import eigenshape as es
     >>> pose, other = (es.make_creature("quadruped", pose, n_vertices=600) for pose in (0, 1))
-    >>> match = es.matching.match_shapes(pose, other)
+    >>> match = es.match_shapes(pose, other)
     >>> match.pull(other.vertices).shape == pose.vertices.shape  # where each vertex went
     True
     """

@@ -59,7 +59,7 @@ def figure_match(
     --------
     >>> import eigenshape as es
     >>> fish, other = (es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1))
-    >>> match = es.matching.match_shapes(fish, other)
+    >>> match = es.match_shapes(fish, other)
     >>> figure = es.plot.figure_match(fish, other, match)
     >>> figure.axes[1].get_title()
     'whole'

@@ -15,7 +15,8 @@ from eigenshape.plot.camera import Up, View, aim_camera
 from eigenshape.plot.fields import PANEL, mark, show
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw, palette
-from eigenshape.retrieval.label_transfer import LabelTransfer
+from eigenshape.retrieval.labels.labeled_shape import LabeledShape
+from eigenshape.retrieval.labels.transfer import LabelTransfer
 
 N_COLUMNS = 3  # matches in a row at most
 QUIET = "#808080"
@@ -148,23 +149,26 @@ def _fill(axes: Axes, panel: Panel, view: View, up: Up) -> None:
 
 
 def figure_label_transfer(
-    source: MeshLike,
+    labeled: LabeledShape,
     target: MeshLike,
     transfer: LabelTransfer,
     *,
+    names: Sequence[str] = (),
     view: View = "auto",
     up: Up = "auto",
 ) -> Figure:
-    """Draw two shapes side by side, matched parts in one color, with the labels and their confidence.
+    """Draw two shapes side by side, equal labels in one color, with their confidence.
 
     Parameters
     ----------
-    source : MeshLike
-        The mesh that had labels.
+    labeled : LabeledShape
+        The shape that had labels; of several, one of them.
     target : MeshLike
         The mesh that got them.
     transfer : LabelTransfer
-        Of `transfer_labels(source, labels, target)`.
+        Of `transfer_labels(labeled, target)`.
+    names : sequence of str
+        The name of label 0, of label 1, and so on. A label without a name is shown as its number.
     view : str or (3,) float
         The side from which each shape is drawn, as in `aim_camera`.
     up : str or (3,) float
@@ -176,36 +180,43 @@ def figure_label_transfer(
 
     See Also
     --------
-    transfer_labels : Copy labels to the matching parts of another shape.
+    transfer_labels : Copy labels to another shape.
 
     Examples
     --------
     >>> import eigenshape as es
     >>> fish, other = (es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1))
-    >>> found = es.transfer_labels(fish, es.find_parts(fish).parts.labels, other)
-    >>> figure = es.plot.figure_label_transfer(fish, other, found)
+    >>> labeled = es.retrieval.LabeledShape(fish, es.find_parts(fish).parts.labels)
+    >>> found = es.transfer_labels(labeled, other)
+    >>> figure = es.plot.figure_label_transfer(labeled, other, found)
     >>> figure.axes[0].get_title()
     'labeled'
     """
-    source = as_mesh(source, "source")
+    require_type(labeled, LabeledShape, "labeled")
     target = as_mesh(target, "target")
     require_type(transfer, LabelTransfer, "transfer")
     figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    labeled = transfer.source
-    _fill(left, Panel(source, "labeled", labeled.labels, labeled.features.vertices), view, up)
-    colors = transfer.matches[transfer.target.labels]
+    every = np.union1d(labeled.labels, transfer.labels)
+    no_vertices = np.empty(0, dtype=np.int64)
+    colors = np.searchsorted(every, labeled.labels)
+    _fill(left, Panel(labeled.mesh, "labeled", colors, no_vertices), view, up)
+    colors = np.searchsorted(every, transfer.labels)
     drawing = draw(target, aim_camera(target, view=view, up=up), face_colors=palette(colors))
     show(right, drawing)
-    vertices = transfer.target.features.vertices
-    mark(right, drawing, vertices)
+    mark(right, drawing, transfer.part_vertices)
     paper = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
     for vertex, label, sure in zip(
-        vertices, transfer.part_labels, transfer.confidence, strict=True
+        transfer.part_vertices, transfer.part_labels, transfer.part_confidence, strict=True
     ):
-        text = f"label {label}, {100 * sure:.0f} %"
+        name = names[label] if 0 <= label < len(names) else f"label {label}"
         right.annotate(
-            text, drawing.places[vertex], (7, 7), textcoords="offset points", fontsize=8, bbox=paper
+            f"{name}, {100 * sure:.0f} %",
+            drawing.places[vertex],
+            (7, 7),
+            textcoords="offset points",
+            fontsize=8,
+            bbox=paper,
         )
     right.set_title("labels copied, with their confidence (hollow: on the far side)", fontsize=10)
     return figure

@@ -9,8 +9,10 @@ from .heat.recipe import THESIS as THESIS
 from .heat.recipe import HeatRecipe as HeatRecipe
 from .heat.score import match_features as match_features
 from .heat.score import matching_score as matching_score
-from .label_transfer import LabelTransfer as LabelTransfer
-from .label_transfer import transfer_labels as transfer_labels
+from .labels.labeled_shape import LabeledShape as LabeledShape
+from .labels.transfer import LabelTransfer as LabelTransfer
+from .labels.transfer import labels_from_votes as labels_from_votes
+from .labels.transfer import transfer_labels as transfer_labels
 from .patches.codebook import PatchCodebook as PatchCodebook
 from .patches.codebook import default_codebook as default_codebook
 from .patches.codebook import read_codebook as read_codebook

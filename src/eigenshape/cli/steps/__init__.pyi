@@ -34,7 +34,7 @@ from .parts import save_labels as save_labels
 from .reading import load_mesh as load_mesh
 from .reading import load_shape as load_shape
 from .reading import load_surface as load_surface
-from .reading import read_labeled_mesh as read_labeled_mesh
+from .reading import read_examples as read_examples
 from .reading import read_partners as read_partners
 from .recipes import heat_recipe as heat_recipe
 from .recipes import index_recipe as index_recipe

@@ -1,10 +1,12 @@
 """Reading the shapes that a verb is given, and repairing them."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import print_repairs
 from eigenshape.cli.inputs import repair_names
 from eigenshape.geometry.cloud import Shape
@@ -12,10 +14,16 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair
 from eigenshape.geometry.repair_report import RepairedCloud
 from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.labels import read_labels, read_map
+from eigenshape.io.labeled_shapes import (
+    read_label_names,
+    read_labeled_shape,
+    read_labeled_shapes,
+)
+from eigenshape.io.labels import read_map
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.shape_files import read_shape
 from eigenshape.io.surfaces import read_surface
+from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 
 
 def load_mesh(path: Path, repairs: str) -> TriangleMesh:
@@ -43,10 +51,23 @@ def load_shape(
     return done.cloud if isinstance(done, RepairedCloud) else done.mesh
 
 
-def read_labeled_mesh(path: Path, labels: Path) -> tuple[TriangleMesh, Int[np.ndarray, " f"]]:
-    """Read a mesh and, from another file, the labels of its faces."""
-    face_labels = read_labels(labels)
-    return read_mesh(path), face_labels
+def read_examples(
+    like: Sequence[Path], labels: Sequence[Path], library: Path | None
+) -> tuple[dict[str, LabeledShape], list[str]]:
+    """Read the labeled shapes of a verb by name, and the names of labels that a library has."""
+    if labels and len(labels) != len(like):
+        raise InvalidParameterError(
+            f"--labels must be given once for each --like; there are {len(labels)} for {len(like)}."
+        )
+    if not like and library is None:
+        raise InvalidParameterError("Labels must come from --like or from --library; give one.")
+    beside: Sequence[Path | None] = labels or [None] * len(like)
+    found = {
+        str(path): read_labeled_shape(path, given) for path, given in zip(like, beside, strict=True)
+    }
+    if library is None:
+        return found, []
+    return found | read_labeled_shapes(library), read_label_names(library)
 
 
 def read_partners(path: Path | None) -> Int[np.ndarray, " n"] | None:

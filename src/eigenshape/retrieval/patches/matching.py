@@ -225,6 +225,17 @@ def patch_agreement(first: PatchPoints, second: PatchPoints) -> float:
     return _best_start(first, second).agreement
 
 
+def anchor_strain(
+    first: PatchPoints, second: PatchPoints
+) -> tuple[int, Float32[np.ndarray, "m n"]]:
+    """Return the relative size, and how badly each pair keeps its distances to the surest matches.
+
+    The size is the `step` of `match_patches`. The strain of a pair is a mean squared error, 0 to 1.
+    """
+    start = _best_start(first, second)
+    return start.step, _strain(first, second, start)
+
+
 @dataclass(frozen=True, eq=False)
 class _Matches:
     """Matches at one relative size, the best supported first."""

@@ -1,0 +1,157 @@
+"""Read labeled shapes: meshes with files of labels beside them, alone or in a folder."""
+
+from pathlib import Path
+
+from eigenshape._errors import FileFormatError
+from eigenshape.io.labels import read_labels
+from eigenshape.io.mesh_files import read_mesh
+from eigenshape.io.parsing import MESH_FORMATS
+from eigenshape.retrieval.labels.labeled_shape import LabeledShape
+
+LABEL_SUFFIXES = (".seg", ".txt", ".json")  # of files of labels, in the order of search
+NAMES_FILE = "names.txt"  # in a folder of labeled shapes: the name of label k in line k + 1
+
+
+def find_labels(path: Path) -> Path:
+    """Return the file with the labels of a mesh: beside it, or a PLY file itself.
+
+    Raises
+    ------
+    FileFormatError
+        If there is no such file.
+    """
+    for suffix in LABEL_SUFFIXES:
+        beside = path.with_suffix(suffix)
+        if beside.exists():
+            return beside
+    if path.suffix.lower() == ".ply":
+        return path
+    beside_names = ", ".join(path.with_suffix(suffix).name for suffix in LABEL_SUFFIXES)
+    raise FileFormatError(
+        f"{path} must have labels beside it, in one of the files {beside_names}; there is none. "
+        "Write one label a line, as `eigenshape segment -o` does."
+    )
+
+
+def read_labeled_shape(path: str | Path, labels: str | Path | None = None) -> LabeledShape:
+    """Read a mesh and the labels of its faces.
+
+    Parameters
+    ----------
+    path : path
+        A mesh, in any format of `read_mesh`.
+    labels : path, optional
+        One label a line (``.seg``, ``.txt``), the list ``face_labels`` (``.json``), or the property
+        ``label`` of faces (``.ply``). By default the file of one of these kinds that lies beside
+        the mesh and has its name, or the mesh itself if it is a PLY file.
+
+    Returns
+    -------
+    LabeledShape
+
+    Raises
+    ------
+    FileFormatError
+        If there are no labels, or a label is not a whole number.
+    InvalidParameterError
+        If there is not one label for each face.
+    OSError
+        If a file cannot be read.
+
+    See Also
+    --------
+    read_labeled_shapes, es.transfer_labels
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> es.write_mesh(es.icosphere(1), folder / "ball.off")
+    >>> _ = (folder / "ball.seg").write_text("3\\n" * 80)
+    >>> set(es.io.read_labeled_shape(folder / "ball.off").labels.tolist())
+    {3}
+    """
+    path = Path(path)
+    found = find_labels(path) if labels is None else Path(labels)
+    return LabeledShape(read_mesh(path), read_labels(found))
+
+
+def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
+    """Read all labeled shapes of a folder, for `transfer_labels`.
+
+    Each mesh has its labels beside it, as `read_labeled_shape` takes them. Equal labels must mean
+    the same on all shapes of the folder.
+
+    Parameters
+    ----------
+    folder : path
+
+    Returns
+    -------
+    dict of str to LabeledShape
+        By the name of the file without its suffix, in the order of names.
+
+    Raises
+    ------
+    FileFormatError
+        If there is no mesh in the folder, or as in `read_labeled_shape`.
+    OSError
+        If the folder or a file cannot be read.
+
+    See Also
+    --------
+    read_label_names, es.transfer_labels
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> fish = es.make_creature("fish", n_vertices=500)
+    >>> es.write_mesh(fish, folder / "fish.ply", face_labels=es.find_parts(fish).parts.labels)
+    >>> library = es.io.read_labeled_shapes(folder)
+    >>> other = es.make_creature("fish", 1, n_vertices=500)
+    >>> found = es.transfer_labels(list(library.values()), other)
+    >>> found.labels.shape == (other.n_faces,)
+    True
+    """
+    folder = Path(folder)
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in MESH_FORMATS)
+    if not paths:
+        raise FileFormatError(
+            f"A folder of labeled shapes must hold a mesh; {folder} holds none. "
+            f"Formats: {', '.join(MESH_FORMATS)}."
+        )
+    return {path.stem: read_labeled_shape(path) for path in paths}
+
+
+def read_label_names(folder: str | Path) -> list[str]:
+    """Read the names of labels from the file ``names.txt`` of a folder of labeled shapes.
+
+    Parameters
+    ----------
+    folder : path
+
+    Returns
+    -------
+    list of str
+        The name of label 0, of label 1, and so on; empty if there is no such file.
+
+    See Also
+    --------
+    read_labeled_shapes
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> _ = (folder / "names.txt").write_text("torso\\nleg\\n")
+    >>> es.io.read_label_names(folder)
+    ['torso', 'leg']
+    """
+    path = Path(folder) / NAMES_FILE
+    if not path.exists():
+        return []
+    return [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]

@@ -1,0 +1,1 @@
+"""Labels of faces: shapes that have them, and their transfer to shapes that have none."""

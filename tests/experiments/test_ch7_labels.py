@@ -1,0 +1,47 @@
+"""The experiment on labels: what its README and the docs show and claim."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "experiments" / "ch7_labels"
+FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
+KEYS = ("commonest", "right", "best of parts", "best of finer parts", "known")
+
+
+def test_the_readme_shows_the_expected_figures():
+    text = (FOLDER / "README.md").read_text()
+    for way in ("one", "all"):
+        means = FULL[way]["mean over classes"]
+        cells = " | ".join(f"{100 * means[key]:.1f}" for key in KEYS)
+        assert f"{cells} |" in text, way
+    for cls, row in FULL["one"]["by class"].items():
+        several = FULL["all"]["by class"][cls]
+        cells = [row["commonest"], row["right"], several["right"], row["known"]]
+        assert f"| {cls} | " + " | ".join(f"{100 * cell:.0f}" for cell in cells) + " |" in text
+
+
+def test_the_docs_give_the_same_figures():
+    one, several = (100 * FULL[way]["mean over classes"]["right"] for way in ("one", "all"))
+    text = (ROOT / "docs" / "parts.md").read_text()
+    assert f"{one:.0f} % of the area from one labeled shape and {several:.0f} % from five" in text
+
+
+def test_confidence_holds_on_shapes_on_which_it_was_not_fitted():
+    for way in ("one", "all"):
+        table = FULL[way]["confidence"]
+        rows = zip(*(table[key] for key in table), strict=True)
+        for share, confidence, right in rows:
+            if share > 0.05:
+                assert abs(confidence - right) < 0.1, way
+
+
+@pytest.mark.long
+@pytest.mark.data
+def test_labels_are_right_far_more_often_than_the_commonest(quick_form):
+    found = quick_form("ch7_labels/run.py")
+    for way in ("one", "all"):
+        means = found[way]["mean over classes"]
+        assert means["right"] > means["commonest"] + 0.2
