@@ -11,6 +11,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, vertex_values
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
+from eigenshape._threads import map_in_threads
 from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.region_tree import MergeTree
