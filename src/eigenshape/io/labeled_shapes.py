@@ -34,7 +34,7 @@ def find_labels(path: Path) -> Path:
 
 
 def read_labeled_shape(path: str | Path, labels: str | Path | None = None) -> LabeledShape:
-    """Read a mesh and the labels of its faces.
+    r"""Read a mesh and the labels of its faces.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
 
 
 def read_label_names(folder: str | Path) -> list[str]:
-    """Read the names of labels from the file ``names.txt`` of a folder of labeled shapes.
+    r"""Read the names of labels from the file ``names.txt`` of a folder of labeled shapes.
 
     Parameters
     ----------
