@@ -27,6 +27,10 @@ def test_the_docs_give_the_same_figures():
     one, several = (100 * FULL[way]["mean over classes"]["right"] for way in ("one", "all"))
     text = (ROOT / "docs" / "parts.md").read_text()
     assert f"{one:.0f} % of the area from one labeled shape and {several:.0f} % from five" in text
+    front = (ROOT / "README.md").read_text()
+    assert (
+        f"{one:.0f} % of the area from one labeled shape and on {several:.0f} % from five" in front
+    )
 
 
 def test_confidence_holds_on_shapes_on_which_it_was_not_fitted():

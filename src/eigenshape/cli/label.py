@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import typer
 
 import eigenshape as es
@@ -79,7 +78,7 @@ def label(
     target = steps.load_mesh(mesh, repair)
     with progress_bar("label") as progress:
         found = es.transfer_labels(list(examples.values()), target, progress=progress)
-    rows = _rows(target, found, names)
+    rows = steps.label_rows(target, found, names)
     if as_json:
         print_json(
             {
@@ -94,28 +93,9 @@ def label(
         columns = {key: value for key, value in COLUMNS.items() if names or key != "name"}
         steps.print_rows("Labels", columns, rows)
     if output:
-        every = np.unique(np.concatenate([shape.labels for shape in examples.values()]))
-        colors = steps.label_colors(target, found.labels, every)
+        colors = steps.label_colors(target, found.labels, list(examples.values()))
         steps.save_labels(target, found.labels, colors, output)
     if picture:
         best = list(examples.values())[int(found.weights.argmax())]
         figure = es.plot.figure_label_transfer(best, target, found, names=names, **side)
         steps.save_picture(figure, picture)
-
-
-def _rows(
-    target: es.TriangleMesh, found: es.retrieval.LabelTransfer, names: list[str]
-) -> list[dict[str, Any]]:
-    areas = np.bincount(found.parts, weights=es.geometry.face_areas(target))
-    return [
-        {
-            "part": number,
-            "label": int(label),
-            "name": names[label] if 0 <= label < len(names) else "",
-            "confidence": float(found.part_confidence[number]),
-            "area_share": float(areas[number] / areas.sum()),
-            "vertex": int(found.part_vertices[number]),
-            "position": target.vertices[found.part_vertices[number]].tolist(),
-        }
-        for number, label in enumerate(found.part_labels)
-    ]

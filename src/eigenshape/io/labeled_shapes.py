@@ -34,7 +34,7 @@ def find_labels(path: Path) -> Path:
 
 
 def read_labeled_shape(path: str | Path, labels: str | Path | None = None) -> LabeledShape:
-    """Read a mesh and the labels of its faces.
+    r"""Read a mesh and the labels of its faces.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def read_labeled_shape(path: str | Path, labels: str | Path | None = None) -> La
     >>> import eigenshape as es
     >>> folder = pathlib.Path(tempfile.mkdtemp())
     >>> es.write_mesh(es.icosphere(1), folder / "ball.off")
-    >>> _ = (folder / "ball.seg").write_text("3\\n" * 80)
+    >>> _ = (folder / "ball.seg").write_text("3\n" * 80)
     >>> set(es.io.read_labeled_shape(folder / "ball.off").labels.tolist())
     {3}
     """
@@ -127,7 +127,7 @@ def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
 
 
 def read_label_names(folder: str | Path) -> list[str]:
-    """Read the names of labels from the file ``names.txt`` of a folder of labeled shapes.
+    r"""Read the names of labels from the file ``names.txt`` of a folder of labeled shapes.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def read_label_names(folder: str | Path) -> list[str]:
     >>> import pathlib, tempfile
     >>> import eigenshape as es
     >>> folder = pathlib.Path(tempfile.mkdtemp())
-    >>> _ = (folder / "names.txt").write_text("torso\\nleg\\n")
+    >>> _ = (folder / "names.txt").write_text("torso\nleg\n")
     >>> es.io.read_label_names(folder)
     ['torso', 'leg']
     """

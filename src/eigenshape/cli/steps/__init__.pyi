@@ -26,6 +26,7 @@ from .outputs import require_picture as require_picture
 from .outputs import save_like as save_like
 from .outputs import save_picture as save_picture
 from .parts import label_colors as label_colors
+from .parts import label_rows as label_rows
 from .parts import part_rows as part_rows
 from .parts import print_rows as print_rows
 from .parts import require_colored_path as require_colored_path

@@ -1,6 +1,6 @@
 """What the verbs that cut a mesh share: the files that they write, and rows and a table of the parts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,8 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.labels import write_labels
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.plot.fields import part_colors
+from eigenshape.retrieval.labels.labeled_shape import LabeledShape
+from eigenshape.retrieval.labels.transfer import LabelTransfer
 
 LABEL_LISTS = (".seg", ".txt")  # files with one label a line
 SHOWN: dict[str, Callable[[Any], str]] = {
@@ -60,10 +62,30 @@ def save_labels(
 
 
 def label_colors(
-    mesh: TriangleMesh, labels: Int[np.ndarray, " f"], every: Int[np.ndarray, " _"]
+    mesh: TriangleMesh, labels: Int[np.ndarray, " f"], examples: Sequence[LabeledShape]
 ) -> UInt8[np.ndarray, "n 3"]:
-    """Return colors of the vertices by labels of faces; `every` lists all labels, for equal colors."""
-    return part_colors(mesh, np.searchsorted(np.unique(every), labels))
+    """Return colors of the vertices by labels of faces, the same whichever labels of the examples occur."""
+    every = np.unique(np.concatenate([shape.labels for shape in examples]))
+    return part_colors(mesh, np.searchsorted(every, labels))
+
+
+def label_rows(
+    target: TriangleMesh, found: LabelTransfer, names: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Return for each labeled part its label, its name, how reliable they are, its area and a vertex."""
+    areas = np.bincount(found.parts, weights=face_areas(target))
+    return [
+        {
+            "part": number,
+            "label": int(label),
+            "name": names[label] if 0 <= label < len(names) else "",
+            "confidence": float(found.part_confidence[number]),
+            "area_share": float(areas[number] / areas.sum()),
+            "vertex": int(found.part_vertices[number]),
+            "position": target.vertices[found.part_vertices[number]].tolist(),
+        }
+        for number, label in enumerate(found.part_labels)
+    ]
 
 
 def part_rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:

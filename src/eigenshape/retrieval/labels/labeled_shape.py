@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from eigenshape._arrays import face_labels, freeze
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import as_mesh
-from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.labels.label_points import LabelPoints, label_points
 
@@ -62,13 +61,3 @@ class LabeledShape:
     def points(self) -> LabelPoints:
         """Return the points that are matched with those of other shapes."""
         return label_points(self.mesh)
-
-    def votes(self, vocabulary: Int[np.ndarray, " l"]) -> Float[np.ndarray, "m l"]:
-        """Return the share of each label in the area of the faces around each point."""
-        columns = np.searchsorted(vocabulary, self.labels)
-        around = np.zeros((self.mesh.n_vertices, len(vocabulary)))
-        areas = face_areas(self.mesh)
-        for corner in self.mesh.faces.T:
-            np.add.at(around, (corner, columns), areas / areas.max())
-        chosen = around[self.points.vertices]
-        return np.asarray(chosen / chosen.sum(axis=1, keepdims=True))
