@@ -35,7 +35,7 @@ class Shared:
             es.make_creature("quadruped", pose, n_vertices=700) for pose in (0, 1)
         )
         self.fish, self.fish_pose = (
-            es.make_creature("fish", pose, n_vertices=300) for pose in (0, 1)
+            es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1)
         )
         self.fish_target = es.matching.prepare_target(self.fish_pose)
         self.fish_match = es.matching.match_shapes(self.fish, self.fish_target)
@@ -718,6 +718,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
     "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
+    "ShapeMatch.pull": lambda v: v.fish_match.pull(v.fish_pose.vertices),
+    "ShapeMatch.sure": lambda v: v.fish_match.sure(0.3),
     "match_shapes": lambda v: [
         es.matching.match_shapes(v.fish, v.fish_target).weights,
     ],
