@@ -725,7 +725,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ],
     "prepare_target": lambda v: es.matching.prepare_target(v.fish).unit,
     "take_pose": lambda v: es.matching.take_pose(v.fish, v.fish_pose, match=v.fish_match),
-    "figure_match": lambda v: es.plot.figure_match(v.fish, v.fish_pose, v.fish_match),
+    "figure_match": lambda v: drawn(es.plot.figure_match(v.fish, v.fish_pose, v.fish_match)),
     "transfer_deformation": lambda v: es.deformation.transfer_deformation(
         v.animal, v.pose, v.pose, v.map
     ),
