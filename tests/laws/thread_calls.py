@@ -35,7 +35,7 @@ class Shared:
             es.make_creature("quadruped", pose, n_vertices=700) for pose in (0, 1)
         )
         self.fish, self.fish_pose = (
-            es.make_creature("fish", pose, n_vertices=300) for pose in (0, 1)
+            es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1)
         )
         self.fish_target = es.matching.prepare_target(self.fish_pose)
         self.fish_scan = es.partial_scan(es.make_creature("fish", n_vertices=1200), [0, 0, 1]).mesh
@@ -725,6 +725,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
     "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
+    "ShapeMatch.pull": lambda v: v.fish_match.pull(v.fish_pose.vertices),
+    "ShapeMatch.sure": lambda v: v.fish_match.sure(0.3),
     "match_shapes": lambda v: [
         es.match_shapes(v.fish, v.fish_target).weights,
     ],
@@ -732,7 +734,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "fuse_scans": lambda v: es.matching.fuse_scans([v.fish_scan]).mesh.vertices,
     "prepare_target": lambda v: es.matching.prepare_target(v.fish).unit,
     "take_pose": lambda v: es.matching.take_pose(v.fish, v.fish_pose, match=v.fish_match),
-    "figure_match": lambda v: es.plot.figure_match(v.fish, v.fish_pose, v.fish_match),
+    "figure_match": lambda v: drawn(es.plot.figure_match(v.fish, v.fish_pose, v.fish_match)),
     "transfer_deformation": lambda v: es.deformation.transfer_deformation(
         v.animal, v.pose, v.pose, v.map
     ),

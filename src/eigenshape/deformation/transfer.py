@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from eigenshape._arrays import whole_number, whole_numbers
+from eigenshape._arrays import real_numbers, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
@@ -121,7 +121,7 @@ def _map_of_vertices(
     before: TriangleMesh, target: TriangleMesh, vertices: ArrayLike
 ) -> FunctionalMap:
     """Return the functional map of 50 modes, or fewer on small meshes, of corresponding vertices."""
-    places = whole_numbers(vertices, "mapping", 0, before.n_vertices - 1)
+    places = whole_numbers(real_numbers(vertices, "mapping"), "mapping", 0, before.n_vertices - 1)
     if len(places) != target.n_vertices:
         raise InvalidParameterError(
             "mapping must be a FunctionalMap or hold a vertex of `before` for each vertex of the "
