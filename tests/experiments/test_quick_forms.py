@@ -11,6 +11,7 @@ SCRIPTS = sorted(path.parent.name + "/run.py" for path in EXPERIMENTS.glob("ch*/
 FIGURES = {script: script.replace("run.py", "expected.json") for script in SCRIPTS}
 FIGURES["ch3_poses/figure_3_4.py"] = "ch3_poses/expected_figure_3_4.json"
 FIGURES["ch5_retrieval/robustness.py"] = "ch5_retrieval/expected_robustness.json"
+FIGURES["ch5_retrieval/frames.py"] = "ch5_retrieval/expected_frames.json"
 
 MADE_UP = (  # what needs no real shapes
     "ch1_compression/run.py",

@@ -1,0 +1,36 @@
+"""The figures on frames of a depth camera: the README shows what was found."""
+
+import json
+import sys
+from pathlib import Path
+
+FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch5_retrieval"
+FULL = json.loads((FOLDER / "expected_frames.json").read_text())["full"]
+sys.path[:0] = [str(FOLDER), str(FOLDER.parent)]
+
+import frames  # noqa: E402
+
+
+def test_the_readme_shows_the_expected_figures():
+    readme = (FOLDER / "README.md").read_text(encoding="utf-8")
+    for line in frames.table(FULL["rates"]).splitlines():
+        assert line in readme
+
+
+def test_the_readme_counts_what_failed():
+    readme = (FOLDER / "README.md").read_text(encoding="utf-8")
+    counts = FULL["counts"]
+    assert f"{counts['queries']} partial queries in {counts['draws']} draws" in readme
+    assert f"{counts['fused frames']:.1f} of five frames" in readme
+    assert len(FULL["without descriptor"]) == 2
+
+
+def test_descriptors_without_frames_are_those_of_today():
+    import eigenshape as es  # noqa: PLC0415
+
+    fish = es.make_creature("fish", n_vertices=500)
+    patches = es.retrieval.extract_patches(fish, n_frames=1)
+    found = es.retrieval.patch_descriptor(patches, es.retrieval.PatchRecipe())
+    today = es.describe(fish)
+    assert len(found.codes) == len(today.codes) + 1
+    assert (frames.without_frames(found).codes == today.codes).all()
