@@ -26,7 +26,7 @@ def test_the_readme_counts_what_failed():
 
 
 def test_descriptors_without_frames_are_those_of_today():
-    import eigenshape as es  # noqa: PLC0415
+    import eigenshape as es
 
     fish = es.make_creature("fish", n_vertices=500)
     patches = es.retrieval.extract_patches(fish, n_frames=1)

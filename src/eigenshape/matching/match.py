@@ -16,24 +16,13 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import submesh, vertex_components
 from eigenshape.matching.evidence import (
     N_COLUMNS,
-    PlacedMap,
     Quality,
     confidence,
     rate_map,
     vertex_evidence,
 )
-from eigenshape.matching.pairs import (
-    FEWEST_PAIRS,
-    FIRST_ROUNDS,
-    Pairs,
-    couplings,
-    descriptor_costs,
-    first_candidates,
-    grow_pairs,
-    place_points,
-    select_pairs,
-    supports,
-)
+from eigenshape.matching.growth import first_support, grow_maps
+from eigenshape.matching.pairs import Pairs, descriptor_costs
 from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.matching.spectral_refinement import modes_of_part, refine_places
 from eigenshape.matching.surface import Surface, describe_surface, turn_over
@@ -175,12 +164,12 @@ def _find_scale(mesh: TriangleMesh, target: MatchTarget) -> float:
     scores = []
     for factor in factors:
         surface = describe_surface(largest, target.unit / factor, N_PART)
-        maps = _grow_maps(surface, target.surface, 1)
+        maps = grow_maps(surface, target.surface, 1)
         scores.append(maps[0].quality.score * np.sqrt(surface.area) if maps else 0.0)
     best = float(factors[int(np.argmax(scores))])
     # Between the sizes that were tried, distances between pairs say how large the part is.
     surface = describe_surface(largest, target.unit / best, N_PART)
-    maps = _grow_maps(surface, target.surface, 1)
+    maps = grow_maps(surface, target.surface, 1)
     return best * _median_stretch(surface, target.surface, maps[0].pairs) if maps else best
 
 
@@ -269,11 +258,11 @@ def _match_piece(mesh: TriangleMesh, target: MatchTarget, factor: float) -> _Pie
     """Match a connected part."""
     whole = target.surface
     part = describe_surface(mesh, target.unit / factor, N_PART)
-    upright, turned = (_first_support(part, whole, turned=side) for side in (False, True))
+    upright, turned = (first_support(part, whole, turned=side) for side in (False, True))
     handed = min(upright, turned) < AS_HANDED * max(upright, turned)
     if handed and turned > upright:
         part = turn_over(part)
-    maps = _grow_maps(part, whole, N_STARTS)
+    maps = grow_maps(part, whole, N_STARTS)
     if maps:
         evidence = vertex_evidence(part, whole, maps[0], maps[1:])
         modes = modes_of_part(part.mesh, target.modes)
@@ -287,37 +276,6 @@ def _match_piece(mesh: TriangleMesh, target: MatchTarget, factor: float) -> _Pie
     faces, weights = _at_vertices(target.mesh, places)
     n = len(places)
     return _Piece(faces, weights, np.zeros(n), np.zeros((n, N_COLUMNS)), quality, handed)
-
-
-def _first_support(part: Surface, whole: Surface, *, turned: bool) -> float:
-    """Return how far candidates by descriptors support each other, if the part is turned over or not."""
-    side = turn_over(part) if turned else part
-    points, partners = first_candidates(descriptor_costs(side, whole))
-    coupling = couplings(side, whole, points, partners)
-    _, chosen = select_pairs(coupling, points, partners, supports(coupling, points, FIRST_ROUNDS))
-    return float(np.abs(coupling[np.ix_(chosen, chosen)].sum(axis=1)).sum())
-
-
-def _grow_maps(part: Surface, whole: Surface, n_starts: int) -> list[PlacedMap]:
-    """Return maps grown from several starts, the best first."""
-    costs = descriptor_costs(part, whole)
-    points, partners = first_candidates(costs)
-    coupling = couplings(part, whole, points, partners)
-    every = np.arange(part.mesh.n_vertices)
-    maps = []
-    for _ in range(n_starts):
-        support = supports(coupling, points, FIRST_ROUNDS)
-        pairs, chosen = select_pairs(coupling, points, partners, support)
-        if len(pairs.points) < FEWEST_PAIRS:
-            break
-        # Pairs that were chosen together support each other no more in the next start.
-        coupling[np.ix_(chosen, chosen)] = 0
-        pairs = grow_pairs(part, whole, costs, pairs)
-        if len(pairs.points) < FEWEST_PAIRS:
-            continue
-        places, misfits = place_points(part, whole, pairs, every)
-        maps.append(rate_map(part, whole, pairs, places, misfits))
-    return sorted(maps, key=lambda found: -found.quality.score)
 
 
 def _at_vertices(
