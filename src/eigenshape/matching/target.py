@@ -84,14 +84,9 @@ def prepare_target(whole: MeshLike) -> MatchTarget:
     >>> whole = es.make_creature("fish", n_vertices=800)
     >>> target = es.matching.prepare_target(whole)
     >>> views = [es.partial_scan(whole, direction).mesh for direction in ([0, 0, 1], [1, 0, 0])]
-    <<<<<<< HEAD
-    >>> [match.n_vertices for match in (es.match_shapes(view, target) for view in views)]
-    ... # doctest: +SKIP
-    =======
-    >>> matches = [es.matching.match_shapes(view, target) for view in views]
+    >>> matches = [es.match_shapes(view, target) for view in views]
     >>> [match.n_vertices == view.n_vertices for match, view in zip(matches, views)]
     [True, True]
-    >>>>>>> match
     """
     mesh = as_mesh(whole, "whole")
     require_matchable(mesh)
