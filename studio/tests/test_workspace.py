@@ -339,6 +339,7 @@ def test_an_index_is_searched(tmp_path):
     call = {"n_matches": 1, "name": "bird.ply"}
     facts, _ = page.call("query", call, {"file": file_of(bird)})
     assert facts["matches"][0]["name"] == "bird"
+    assert facts["warnings"] == []
     assert "without its file" in page.error("finish", kind="open", match=0)["message"]
     page.call("query", n_matches=1)
     assert page.call("finish", kind="open", match=0)[0]["state"]["name"] == "fish"

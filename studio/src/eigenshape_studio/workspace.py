@@ -542,9 +542,12 @@ class Workspace:
         shelf = self._require_shelf()
         n_matches = whole(meta, "n_matches", 1, 100, 5)
         mesh = self.mesh
+        report: tuple[str, ...] = ()
         if "file" in arrays:
-            mesh = self._surface_of(display_name(meta.get("name")), _bytes(arrays, "file"))
+            surface = parse_surface(display_name(meta.get("name")), _bytes(arrays, "file"))
+            mesh, report = surface.mesh, surface.report
         found = shelf.query(mesh, n_matches)
+        found[0]["warnings"] = list(report)
         self.matches = [match["name"] for match in found[0]["matches"]]
         return found
 
