@@ -130,6 +130,7 @@ def test_the_main_output_of_every_verb_is_called_output():
         "deform",
         "pose",
         "query",
+        "fuse",
         "compress",
         "decompress",
         "report",
