@@ -76,12 +76,15 @@ def test_a_header_of_many_lines_is_read_in_proportion(line):
     spent = []
     for count in (5_000, 40_000):
         data = many_declarations(line, count)
-        began = time.process_time()
-        with pytest.raises(
-            FileFormatError, match="must declare an element vertex with the numbers x, y and z"
-        ):
-            ply.parse(data)
-        spent.append(time.process_time() - began)
+        tries = []
+        for _ in range(3):  # the least, since other work slows some of them down
+            began = time.process_time()
+            with pytest.raises(
+                FileFormatError, match="must declare an element vertex with the numbers x, y and z"
+            ):
+                ply.parse(data)
+            tries.append(time.process_time() - began)
+        spent.append(min(tries))
     assert (
         spent[1] < 24 * spent[0]
     )  # eight times the lines; 64 times the work when each looked at all before it

@@ -39,6 +39,7 @@ class Shared:
         )
         self.fish_target = es.matching.prepare_target(self.fish_pose)
         self.fish_scan = es.partial_scan(es.make_creature("fish", n_vertices=1200), [0, 0, 1]).mesh
+        self.motion = es.matching.register_scans(self.fish_scan, self.fish_scan)
         self.fish_match = es.match_shapes(self.fish, self.fish_target)
         self.camera = es.plot.Camera(np.eye(3), 60)
         self.labels = (self.animal.vertices[self.animal.faces[:, 0], 1] > 0).astype(np.int64)
@@ -725,6 +726,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
     "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
+    "Registration.move": lambda v: v.motion.move(v.fish.vertices),
+    "Registration.inverse": lambda v: v.motion.inverse().rotation,
+    "Registration.after": lambda v: v.motion.after(v.motion).rotation,
     "ShapeMatch.pull": lambda v: v.fish_match.pull(v.fish_pose.vertices),
     "ShapeMatch.sure": lambda v: v.fish_match.sure(0.3),
     "match_shapes": lambda v: [

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import eigenshape as es
-from eigenshape.matching.fusion import LEAST_SCORE
+from eigenshape.matching.fusion import LEAST_SCORE, _meshes_of
 from eigenshape.matching.registration import Registration
 
 VIEWS = ([0, 0, 1], [0.6, 0, 1], [1, 0.1, 0.6])
@@ -81,3 +81,5 @@ def test_one_scan_is_its_own_surface_and_none_is_refused(frames):
     assert fused.motions[0].rotation == pytest.approx(np.eye(3))
     with pytest.raises(es.InvalidParameterError, match="scans must hold at least one scan; it is"):
         es.matching.fuse_scans([])
+    with pytest.raises(es.InvalidParameterError, match="scans must be a list of meshes; it is a T"):
+        _meshes_of(frames[0])

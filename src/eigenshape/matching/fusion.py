@@ -94,7 +94,7 @@ def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -
     Raises
     ------
     InvalidParameterError
-        If there are no scans.
+        If `scans` is no list, or empty.
     InvalidShapeError
         If a scan cannot be described (`extract_patches`), or no surface fits the points.
 
@@ -114,9 +114,7 @@ def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -
     >>> areas[2] > max(areas[:2])
     True
     """
-    meshes = [as_mesh(scan, f"scan {number}") for number, scan in enumerate(scans)]
-    if not meshes:
-        raise InvalidParameterError("scans must hold at least one scan; it is empty.")
+    meshes = _meshes_of(scans)
     k = len(meshes)
     pairs = list(combinations(range(k), 2))
     n_steps = k + len(pairs) + 1
@@ -160,6 +158,17 @@ def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -
         freeze(owners[made.source_vertices]),
         freeze(numbers[made.source_vertices]),
     )
+
+
+def _meshes_of(scans: object) -> list[TriangleMesh]:
+    """Return a list of meshes; raise an error if it is none."""
+    if not isinstance(scans, Sequence) or isinstance(scans, str):
+        raise InvalidParameterError(
+            f"scans must be a list of meshes; it is a {type(scans).__name__}. Pass [scans]."
+        )
+    if not scans:
+        raise InvalidParameterError("scans must hold at least one scan; it is empty.")
+    return [as_mesh(scan, f"scan {number}") for number, scan in enumerate(scans)]
 
 
 def _placed(k: int, found: dict[tuple[int, int], Registration]) -> tuple[Registration | None, ...]:

@@ -8,9 +8,11 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from eigenshape._arrays import freeze
+from eigenshape._arguments import require_type
+from eigenshape._arrays import finite_rows, freeze
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -82,9 +84,9 @@ class Registration:
     __repr__ = short_repr
     _repr_html_ = html_repr
 
-    def move(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    def move(self, points: ArrayLike) -> Float[np.ndarray, "n 3"]:
         """Return points of the first scan, placed on the second."""
-        return points @ self.rotation.T + self.translation
+        return finite_rows(points, "points", 3) @ self.rotation.T + self.translation
 
     def inverse(self) -> "Registration":
         """Return the motion that places the second scan on the first."""
@@ -93,6 +95,7 @@ class Registration:
 
     def after(self, first: "Registration") -> "Registration":
         """Return the motion that does another one first; its score is the lower of the two."""
+        require_type(first, Registration, "first")
         return Registration(
             freeze(self.rotation @ first.rotation),
             freeze(self.rotation @ first.translation + self.translation),
