@@ -89,7 +89,7 @@ def map_in_threads(function: Callable[[A], R], items: Iterable[A]) -> list[R]:
     error is raised after all calls that have begun.
     """
     waiting = list(items)
-    n = 1 if _INSIDE.__dict__.get("working") else min(thread_count(), len(waiting))
+    n = 1 if getattr(_INSIDE, "working", False) else min(thread_count(), len(waiting))
     if n <= 1:
         return [function(item) for item in waiting]
 

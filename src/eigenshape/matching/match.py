@@ -155,22 +155,22 @@ def _require_smaller(mesh: TriangleMesh, target: MatchTarget, factor: float) -> 
 
 def _find_scale(mesh: TriangleMesh, target: MatchTarget) -> float:
     """Return the factor for the part at which its largest piece fits the whole best."""
-    piece = max(_pieces(mesh), key=lambda vertices: _area_of(mesh, vertices))
-    largest, _ = submesh(mesh, np.isin(mesh.faces[:, 0], piece))
+    labels, areas = _pieces(mesh)
+    largest, _ = submesh(mesh, labels[mesh.faces[:, 0]] == areas.argmax())
     ours, theirs = (float(np.ptp(m.vertices, axis=0).max()) for m in (largest, target.mesh))
     factors = SIZES * theirs / ours
     share = surface_area(largest) / surface_area(target.mesh)
     factors = factors[factors**2 * share <= MOST_AREA]
-    scores = []
-    for factor in factors:
+    best, highest = 1.0, -1.0
+    for factor in factors.tolist():
         surface = describe_surface(largest, target.unit / factor, N_PART)
         maps = grow_maps(surface, target.surface, 1)
-        scores.append(maps[0].quality.score * np.sqrt(surface.area) if maps else 0.0)
-    best = float(factors[int(np.argmax(scores))])
-    # Between the sizes that were tried, distances between pairs say how large the part is.
-    surface = describe_surface(largest, target.unit / best, N_PART)
-    maps = grow_maps(surface, target.surface, 1)
-    return best * _median_stretch(surface, target.surface, maps[0].pairs) if maps else best
+        score = maps[0].quality.score * np.sqrt(surface.area) if maps else 0.0
+        if score > highest:
+            # Between the sizes that are tried, distances between pairs say how large the part is.
+            stretch = _median_stretch(surface, target.surface, maps[0].pairs) if maps else 1.0
+            best, highest = factor * stretch, score
+    return best
 
 
 def _median_stretch(part: Surface, whole: Surface, pairs: Pairs) -> float:
@@ -181,14 +181,11 @@ def _median_stretch(part: Surface, whole: Surface, pairs: Pairs) -> float:
     return float(np.median(theirs[known] / ours[known])) if known.any() else 1.0
 
 
-def _pieces(mesh: TriangleMesh) -> list[Int[np.ndarray, " k"]]:
-    """Return the vertices of each component."""
+def _pieces(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " k"]]:
+    """Return the component of each vertex, and the area of each component."""
     count, labels = vertex_components(mesh)
-    return [np.flatnonzero(labels == number) for number in range(count)]
-
-
-def _area_of(mesh: TriangleMesh, vertices: Int[np.ndarray, " k"]) -> float:
-    return float(face_areas(mesh)[np.isin(mesh.faces[:, 0], vertices)].sum())
+    owners = labels[mesh.faces[:, 0]]
+    return labels, np.bincount(owners, weights=face_areas(mesh), minlength=count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,34 +206,28 @@ def _match_pieces(mesh: TriangleMesh, target: MatchTarget, factor: float) -> Sha
     faces, weights = np.zeros(n, dtype=np.int64), np.full((n, 3), 1 / 3)
     sure, evidence, done = np.zeros(n), np.zeros((n, N_COLUMNS)), np.zeros(n, dtype=bool)
     least = LEAST_AREA * surface_area(target.mesh) / factor**2
-    pieces = _pieces(mesh)
-    found: list[tuple[float, _Piece]] = []
-    for vertices in pieces:
-        area = _area_of(mesh, vertices)
-        if len(pieces) == 1:
-            piece = _match_piece(mesh, target, factor)
-        elif area >= least:
-            part, _ = submesh(mesh, np.isin(mesh.faces[:, 0], vertices))
-            piece = _match_piece(part, target, factor)
-        else:
-            continue
+    labels, areas = _pieces(mesh)
+    matched = np.flatnonzero(areas >= least) if len(areas) > 1 else np.array([0])
+    found: list[_Piece] = []
+    for number in matched.tolist():
+        part, vertices = submesh(mesh, labels[mesh.faces[:, 0]] == number)
+        piece = _match_piece(part, target, factor)
         faces[vertices], weights[vertices] = piece.faces, piece.weights
         sure[vertices], evidence[vertices], done[vertices] = piece.confidence, piece.evidence, True
-        found.append((area, piece))
+        found.append(piece)
     if not found:
         raise InvalidParameterError(
             f"A part must have a piece with {LEAST_AREA:.0%} of the area of the whole; "
-            f'none of its {len(pieces)} pieces has. Pass scale="unknown" if units may differ.'
+            f'none of its {len(areas)} pieces has. Pass scale="unknown" if units may differ.'
         )
     if not done.all():
         nearest = np.flatnonzero(done)[cKDTree(mesh.vertices[done]).query(mesh.vertices[~done])[1]]
         faces[~done], weights[~done] = faces[nearest], weights[nearest]
     corners = target.mesh.faces[faces]
-    areas = [area for area, _ in found]
 
     def mean(what: str) -> float:
         return float(
-            np.average([getattr(piece.quality, what) for _, piece in found], weights=areas)
+            np.average([getattr(piece.quality, what) for piece in found], weights=areas[matched])
         )
 
     return ShapeMatch(
@@ -249,7 +240,7 @@ def _match_pieces(mesh: TriangleMesh, target: MatchTarget, factor: float) -> Sha
         score=mean("score"),
         orientation=mean("orientation"),
         coverage=mean("coverage"),
-        handed=all(piece.handed for _, piece in found),
+        handed=all(piece.handed for piece in found),
         scale=factor,
     )
 

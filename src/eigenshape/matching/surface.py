@@ -11,18 +11,16 @@ from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import boundary_vertices, edge_table
+from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.codebook import BASES, default_codebook, whiten_numbers
 from eigenshape.retrieval.patches.patch_loops import (
     HEIGHT_BINS,
-    NUMBERS,
     RING_NUMBERS,
     RINGS,
     TURN_BINS,
-    describe_disc,
 )
-from eigenshape.retrieval.patches.patches import AT_BOUNDARY, LEAST_WEIGHT, RADII, Patches
+from eigenshape.retrieval.patches.patches import RADII, Patches, describe_discs, whole_shares
 
 # The unit of length, in roots of the area of the whole. Patches are described in sides of a box,
 # which for animals is about 1.2 roots of the area; the box itself changes with the pose, from 0.7
@@ -36,9 +34,9 @@ class Surface:
     """A mesh in the unit of the whole, and m of its vertices with what matching compares.
 
     `distances` are from the points to all vertices, `columns` the same as rows of vertices, and
-    `between` from point to point. `ways` holds the
-    direction at each point (row) of the shortest path to each other one, as a complex number of
-    modulus 1 at most in a tangent frame; it is shorter where several paths are about as short.
+    `between` from point to point. `ways` holds the direction at each point (row) of the shortest
+    path to each other one, as a complex number of modulus 1 at most in a tangent frame; it is
+    shorter where several paths are about as short.
     """
 
     mesh: TriangleMesh
@@ -71,11 +69,8 @@ def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
     count = min(n_points, mesh.n_vertices)
     chosen, rows, nearest = farthest_points(mesh, count)
     areas, normals = dual_volumes(mesh), mean_normals(mesh)
-    numbers = _describe_discs(mesh, chosen, rows, areas, normals)
-
-    rim = boundary_vertices(mesh)
-    away = rows[:, rim].min(axis=1) if len(rim) else np.full(count, np.inf)
-    weights = np.clip(away[:, None] / (AT_BOUNDARY * MATCHED_RADII), LEAST_WEIGHT, 1.0)
+    numbers = describe_discs(mesh, chosen, rows, MATCHED_RADII, normals, areas)
+    weights = whole_shares(mesh, rows, MATCHED_RADII)
     distances = rows.astype(np.float32)
     between = np.ascontiguousarray(distances[:, chosen])
     patches = Patches(numbers, weights.astype(np.float32), chosen, between)
@@ -124,25 +119,6 @@ def _turned_numbers(numbers: Float32[np.ndarray, "m r c"]) -> Float32[np.ndarray
         heights = slice(first, first + HEIGHT_BINS)
         found[:, :, heights] = numbers[:, :, heights][:, :, ::-1]
     return found
-
-
-def _describe_discs(
-    mesh: TriangleMesh,
-    points: Int[np.ndarray, " m"],
-    rows: Float[np.ndarray, "m n"],
-    areas: Float[np.ndarray, " n"],
-    normals: Float[np.ndarray, "n 3"],
-) -> Float32[np.ndarray, "m r c"]:
-    """Return the 64 numbers of the discs around points (`extract_patches`)."""
-    numbers = np.empty((len(points), len(MATCHED_RADII), NUMBERS), dtype=np.float32)
-    scratch = np.empty(RINGS), np.empty(RINGS)
-    surface = mesh.vertices, normals, areas
-    for point, distances, discs in zip(points, rows, numbers, strict=True):
-        reached = np.flatnonzero(distances <= MATCHED_RADII[-1])
-        order = reached[np.argsort(distances[reached], kind="stable")]
-        for radius, found in zip(MATCHED_RADII, discs, strict=True):
-            describe_disc(distances, mesh.vertices[point], order, surface, radius, *scratch, found)
-    return numbers
 
 
 def _directions(

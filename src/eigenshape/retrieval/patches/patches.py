@@ -5,7 +5,7 @@ from functools import partial
 from typing import SupportsIndex
 
 import numpy as np
-from jaxtyping import Float32, Int
+from jaxtyping import Float, Float32, Int
 from scipy.sparse.csgraph import shortest_path
 
 from eigenshape._arrays import freeze, whole_number
@@ -184,20 +184,11 @@ def surface_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patche
         )
     n_points = min(n_samples, mesh.n_vertices)
     chosen, rows, nearest = farthest_points(mesh, n_points, reach=RADII[-1])
-    numbers = np.empty((len(chosen), len(RADII), NUMBERS), dtype=np.float32)
-    surface = mesh.vertices, mean_normals(mesh), areas
-    scratch = np.empty(RINGS), np.empty(RINGS)
-    for point, distances, discs in zip(chosen, rows, numbers, strict=True):
-        reached = np.flatnonzero(distances <= RADII[-1])
-        order = reached[np.argsort(distances[reached], kind="stable")]
-        for radius, found in zip(RADII, discs, strict=True):
-            describe_disc(distances, mesh.vertices[point], order, surface, radius, *scratch, found)
+    numbers = describe_discs(mesh, chosen, rows, RADII, mean_normals(mesh), areas)
 
     # Weigh each disc by the share of the surface that is nearest to its point.
     cells = np.bincount(nearest, weights=areas / areas.sum(), minlength=len(chosen))
-    rim = boundary_vertices(mesh)
-    away = rows[:, rim].min(axis=1) if len(rim) else np.full(len(chosen), np.inf)
-    weights = cells[:, None] * np.clip(away[:, None] / (AT_BOUNDARY * RADII), LEAST_WEIGHT, 1.0)
+    weights = cells[:, None] * whole_shares(mesh, rows, RADII)
 
     # The waves that measure distances end at the largest radius: fill in longer ones as shortest
     # paths from point to point.
@@ -209,3 +200,35 @@ def surface_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patche
         freeze(source[chosen]),
         freeze(distances.astype(np.float32)),
     )
+
+
+def describe_discs(
+    mesh: TriangleMesh,
+    points: Int[np.ndarray, " m"],
+    rows: Float[np.ndarray, "m n"],
+    radii: Float[np.ndarray, " r"],
+    normals: Float[np.ndarray, "n 3"],
+    areas: Float[np.ndarray, " n"],
+) -> Float32[np.ndarray, "m r c"]:
+    """Return the 64 numbers of the discs around points, given the distances from these.
+
+    Normals and areas are those of the vertices; radii ascend.
+    """
+    numbers = np.empty((len(points), len(radii), NUMBERS), dtype=np.float32)
+    surface = mesh.vertices, normals, areas
+    scratch = np.empty(RINGS), np.empty(RINGS)
+    for point, distances, discs in zip(points, rows, numbers, strict=True):
+        reached = np.flatnonzero(distances <= radii[-1])
+        order = reached[np.argsort(distances[reached], kind="stable")]
+        for radius, found in zip(radii, discs, strict=True):
+            describe_disc(distances, mesh.vertices[point], order, surface, radius, *scratch, found)
+    return numbers
+
+
+def whole_shares(
+    mesh: TriangleMesh, rows: Float[np.ndarray, "m n"], radii: Float[np.ndarray, " r"]
+) -> Float[np.ndarray, "m r"]:
+    """Return how whole the disc around each point is: 1 away from the boundary, less near it."""
+    rim = boundary_vertices(mesh)
+    away = rows[:, rim].min(axis=1) if len(rim) else np.full(len(rows), np.inf)
+    return np.clip(away[:, None] / (AT_BOUNDARY * radii), LEAST_WEIGHT, 1.0)
