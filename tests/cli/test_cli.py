@@ -332,6 +332,7 @@ def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch)
     assert rough > fine > 0
 
 
+@pytest.mark.long
 def test_an_index_names_files_that_it_holds_twice_and_the_methods_that_it_lacks(tmp_path):
     folder = tmp_path / "meshes" / "fish"
     folder.mkdir(parents=True)

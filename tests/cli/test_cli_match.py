@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 import eigenshape as es
 from eigenshape.cli import app
 
+pytestmark = pytest.mark.long
+
 
 def run(*arguments, code=0):
     done = CliRunner().invoke(app, [str(argument) for argument in arguments])

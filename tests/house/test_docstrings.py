@@ -24,9 +24,16 @@ def examples(name):
 
 
 WITH_EXAMPLES = [name for name in THINGS if examples(name)]
+SLOW_ROOMS = ("eigenshape.matching", "eigenshape.plot", "eigenshape.retrieval")
 
 
-@pytest.mark.parametrize("name", WITH_EXAMPLES)
+def marked(name):
+    """Return the name as a parameter; examples of some rooms take a second each."""
+    slow = THINGS[name].__module__.startswith(SLOW_ROOMS)
+    return pytest.param(name, marks=[pytest.mark.long] if slow else [])
+
+
+@pytest.mark.parametrize("name", [marked(name) for name in WITH_EXAMPLES])
 def test_examples_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for test in examples(name):

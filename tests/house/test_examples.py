@@ -7,6 +7,8 @@ import pytest
 
 import eigenshape as es
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

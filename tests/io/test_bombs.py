@@ -178,6 +178,7 @@ def test_bombs_are_refused_with_less_than_200_megabytes(outcomes, name):
     assert grown < 200
 
 
+@pytest.mark.long
 def test_what_nobody_reads_is_not_unpacked(outcomes):
     grown, said = outcomes["unread.vtu"]
     assert said == "SimplicialMesh(4 points in R^3, 1 simplices of dimension 3)"

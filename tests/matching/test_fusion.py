@@ -8,6 +8,8 @@ import eigenshape as es
 from eigenshape.matching.fusion import LEAST_SCORE, _meshes_of
 from eigenshape.matching.registration import Registration
 
+pytestmark = pytest.mark.long
+
 VIEWS = ([0, 0, 1], [0.6, 0, 1], [1, 0.1, 0.6])
 
 

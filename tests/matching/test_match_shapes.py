@@ -9,6 +9,8 @@ from eigenshape.geometry.topology import submesh
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.target import prepare_target
 
+pytestmark = pytest.mark.long
+
 N_VERTICES = 800
 
 

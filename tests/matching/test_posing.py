@@ -7,6 +7,8 @@ from eigenshape.deformation.transfer import transfer_deformation
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.posing import take_pose
 
+pytestmark = pytest.mark.long
+
 
 def creature(pose):
     return es.make_creature("quadruped", pose, n_vertices=800)

@@ -6,6 +6,8 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.matching.match import match_shapes
 from eigenshape.plot.matches import figure_match, place_colors
 
+pytestmark = pytest.mark.long
+
 
 def test_colors_are_places_from_the_lowest_to_the_highest():
     colors = place_colors(np.array([[0.0, 2, 5], [1, 4, 5]]))

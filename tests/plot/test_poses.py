@@ -62,6 +62,7 @@ def test_what_moves_more_is_redder():
     assert red[0] > 1.5 * red[2]
 
 
+@pytest.mark.long
 def test_poses_may_be_meshes_of_several_sizes_but_shares_belong_to_one():
     finer = es.icosphere(3)
     figure = es.plot.figure_poses({"coarse": BALL, "fine": finer})

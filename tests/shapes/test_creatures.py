@@ -76,6 +76,7 @@ def test_triangles_are_even(kind):
     assert high < 1.6
 
 
+@pytest.mark.long
 @each_kind
 def test_poses_bend_and_hardly_stretch(kind):
     poses = [make_creature(kind, pose, n_vertices=2500) for pose in POSES]
@@ -87,6 +88,7 @@ def test_poses_bend_and_hardly_stretch(kind):
             assert np.percentile(change, 95) < 0.15
 
 
+@pytest.mark.long
 @each_kind
 def test_poses_differ_to_the_eye(kind):
     rest = make_creature(kind, n_vertices=N)

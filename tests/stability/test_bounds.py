@@ -23,6 +23,7 @@ def moved_points(n, delta, seed):
     return points, points + delta * steps / np.linalg.norm(steps, axis=1, keepdims=True)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:A kernel of width")
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10**6), st.floats(1e-4, 0.3), st.floats(0.1, 0.5))

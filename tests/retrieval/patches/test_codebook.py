@@ -18,6 +18,8 @@ from eigenshape.retrieval.patches.packing import pack_codes, unpack_codes
 from eigenshape.retrieval.patches.patches import Patches, extract_patches, surface_patches
 from eigenshape.scans.partial import viewpoint
 
+pytestmark = pytest.mark.long
+
 KINDS = ("quadruped", "hand", "octopus", "biped")
 
 

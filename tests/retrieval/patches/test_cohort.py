@@ -12,6 +12,8 @@ from eigenshape.retrieval.patches.cohort import (
 )
 from eigenshape.retrieval.patches.distance import patch_distances, view_distances
 
+pytestmark = pytest.mark.long
+
 KINDS = ("quadruped", "hand", "octopus", "biped", "fish", "bird")
 
 

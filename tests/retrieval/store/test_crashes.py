@@ -19,6 +19,8 @@ from describers import descriptor
 import eigenshape as es
 from eigenshape.retrieval import DescribedShape
 
+pytestmark = pytest.mark.long
+
 kills = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="kill -9 is a Unix thing")
 N_LINES = 5000  # of the store that the four kinds of steps run through, about
 

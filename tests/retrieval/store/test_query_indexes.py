@@ -10,6 +10,8 @@ from search_cases import RECIPE, mixtures
 import eigenshape as es
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 
+pytestmark = pytest.mark.long
+
 N_PARTS, N_SHAPES = 4, 120
 
 

@@ -11,6 +11,8 @@ from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search import candidates
 from eigenshape.retrieval.store import snapshot
 
+pytestmark = pytest.mark.long
+
 N_SHAPES = 300
 
 

@@ -144,6 +144,7 @@ def test_a_hundred_eigenvalues_of_polyhedra(mesh, bracketed, refined, condition)
     assert (inside > 10 * moved[1:]).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mesh", "condition"),
     [(grid(4, 4), "neumann"), (grid(4, 4), "dirichlet"), (cube(2), "neumann")],

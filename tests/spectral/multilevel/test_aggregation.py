@@ -13,6 +13,8 @@ from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.multilevel.aggregation import build_levels
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates
 
+pytestmark = pytest.mark.long
+
 
 def grown(laplacian, size):
     matrix = laplacian.stiffness

@@ -58,6 +58,7 @@ def test_heat_on_poor_triangles():
     assert (off <= 1.5 * found.errors).all()
 
 
+@pytest.mark.long
 def test_the_error_falls_with_the_accuracy():
     _, laplacian = creature()
     times = TIMES * laplacian.mass.sum()

@@ -135,6 +135,7 @@ def test_a_damaged_file_is_computed_again(tmp_path, damage):
     es.spectral.operator_bundle(SQUARE, 4, cache=tmp_path)  # and is kept again
 
 
+@pytest.mark.long
 def test_files_are_described_in_processes_and_failures_are_named(tmp_path):
     es.write_mesh(BALL, tmp_path / "ball.off")
     items = [
