@@ -21,7 +21,8 @@ from report import Report, Row, in_process, options_of
 from scipy.sparse.linalg import splu
 
 import eigenshape as es
-from eigenshape.sparse.elimination import analyze_pattern, factorize_symmetric
+from eigenshape.sparse.elimination import analyze_pattern
+from eigenshape.sparse.symmetric_factor import factorize_symmetric
 
 PACKAGES = [
     "eigenshape",

@@ -21,7 +21,7 @@ from report import Report, Row, one_core, options_of
 from threadpoolctl import threadpool_limits
 
 import eigenshape as es
-from eigenshape.sparse.elimination import SymmetricFactor
+from eigenshape.sparse.symmetric_factor import SymmetricFactor
 from eigenshape.spectral.solver import factor, lanczos, pairs, pencil
 from eigenshape.spectral.solver import inertia as count
 from eigenshape.spectral.solver import strategy as roads

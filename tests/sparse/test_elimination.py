@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.spheres import fibonacci_sphere
-from eigenshape.sparse.elimination import analyze_pattern, factorize_symmetric
+from eigenshape.sparse.elimination import analyze_pattern
 from eigenshape.sparse.front_loops import WIDE
 from eigenshape.sparse.sort_loops import sort_part
+from eigenshape.sparse.symmetric_factor import factorize_symmetric
 
 
 def random_symmetric(n, density, seed):

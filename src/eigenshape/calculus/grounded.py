@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr, short_repr
-from eigenshape.sparse.elimination import SymmetricFactor, factor_matrix
+from eigenshape.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 
 
 @dataclass(frozen=True, eq=False)

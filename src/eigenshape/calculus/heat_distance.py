@@ -27,7 +27,7 @@ from eigenshape.operators.cloud_triangles import cloud_cover
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import delaunay_cover
 from eigenshape.operators.tufted import Triangulation
-from eigenshape.sparse.elimination import SymmetricFactor
+from eigenshape.sparse.symmetric_factor import SymmetricFactor
 
 # Sources that are solved for together: the lanes of a factor, and few enough that the gradients of
 # all simplices fit in the cache.

@@ -15,7 +15,7 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.boundary import require_points
 from eigenshape.operators.laplacian import ASYMMETRY, find_zero_row_sums
-from eigenshape.sparse.elimination import SymmetricFactor, factor_matrix
+from eigenshape.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 
 # Loads on a component where nothing is fixed may sum to this share of their absolute sum. Sums of a
 # million numbers round to 1e-10 of it at most; a source that is not balanced is far above.

@@ -24,7 +24,7 @@ from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import Directions, corner_products, vertex_directions
 from eigenshape.operators.tufted import side_ends
-from eigenshape.sparse.elimination import SymmetricFactor
+from eigenshape.sparse.symmetric_factor import SymmetricFactor
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
-from eigenshape.sparse.elimination import SymmetricFactor, factor_matrix
+from eigenshape.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 
 Points = Float[np.ndarray, "n 3"]
 Step = tuple[Points, Points]  # change of the free vertices in a round, and their new places

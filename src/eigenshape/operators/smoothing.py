@@ -17,7 +17,7 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.sparse.elimination import factor_matrix
+from eigenshape.sparse.symmetric_factor import factor_matrix
 
 # Noise level at which `denoise` lets heat flow one mean edge length: that of Gaussian noise of a
 # quarter of an edge. A larger value smooths less.

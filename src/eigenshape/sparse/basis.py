@@ -1,12 +1,17 @@
 """Tall columns in slots of eight, (s, n, 8): eight numbers of a row are adjacent in memory."""
 
+from itertools import pairwise
+
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape.sparse.basis_loops import add_products, subtract_combination
+from eigenshape._threads import free_threads, map_in_threads
+from eigenshape.sparse.basis_loops import CHUNK, add_products, subtract_combination
 from eigenshape.sparse.lane_loops import LANES
 
 ROWS = 512  # rows of a combination that are computed at once
+# Multiplications that are worth a thread: below, starting it costs more than it saves.
+FEWEST_MULTIPLICATIONS = 1_000_000
 
 Slots = Float[np.ndarray, "s n 8"]
 Block = Float[np.ndarray, "g n 8"]
@@ -25,7 +30,8 @@ def pack_columns(columns: Float[np.ndarray, "n k"]) -> Slots:
 def products(space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
     """Return the product spaceᵀ columns."""
     parts = np.zeros((len(columns), len(space) * LANES, LANES))
-    add_products(space, columns, parts)
+    slots = _shares(len(space), 1, space.size * len(columns) * LANES)
+    map_in_threads(lambda share: add_products(space, columns, parts, *share), slots)
     return np.concatenate(list(parts), axis=1)
 
 
@@ -34,16 +40,30 @@ def subtract(space: Slots, weights: Float[np.ndarray, "m b"], columns: Block) ->
     parts = np.ascontiguousarray(
         weights.reshape(len(weights), len(columns), LANES).transpose(1, 0, 2)
     )
-    subtract_combination(space, parts, columns)
+    rows = _shares(space.shape[1], CHUNK, space.size * len(columns) * LANES)
+    map_in_threads(lambda share: subtract_combination(space, parts, columns, *share), rows)
 
 
 def combine_columns(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
     """Return the product of `space` and `weights` as an ordinary matrix."""
     slots, n, _ = space.shape
-    result, flat = np.empty((n, weights.shape[1])), np.empty((ROWS, slots, LANES))
-    for start in range(0, n, ROWS):
-        count = min(ROWS, n - start)
-        flat[:count] = space[:, start : start + count].transpose(1, 0, 2)
-        rows = flat[:count].reshape(count, slots * LANES)
-        np.matmul(rows, weights, out=result[start : start + count])
+    result = np.empty((n, weights.shape[1]))
+
+    def fill_rows(share: tuple[int, int]) -> None:
+        flat = np.empty((ROWS, slots, LANES))
+        for start in range(*share, ROWS):
+            count = min(ROWS, share[1] - start)
+            flat[:count] = space[:, start : start + count].transpose(1, 0, 2)
+            rows = flat[:count].reshape(count, slots * LANES)
+            np.matmul(rows, weights, out=result[start : start + count])
+
+    map_in_threads(fill_rows, _shares(n, ROWS, space.size * weights.shape[1]))
     return result
+
+
+def _shares(size: int, unit: int, multiplications: int) -> list[tuple[int, int]]:
+    """Divide slots or rows among threads, in whole units: what is computed of each is the same."""
+    n_units = -(-size // unit)
+    n = max(min(free_threads(), multiplications // FEWEST_MULTIPLICATIONS, n_units), 1)
+    ends = [min(unit * (n_units * number // n), size) for number in range(n + 1)]
+    return list(pairwise(ends))

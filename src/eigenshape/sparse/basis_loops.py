@@ -10,8 +10,8 @@ CHUNK = 1024  # rows that fit into the second-level cache
 
 @njit
 @no_type_check
-def add_products(space, columns, parts):
-    """Add the product spaceᵀ columns to `parts`.
+def add_products(space, columns, parts, begin, end):
+    """Add the rows of the product spaceᵀ columns that belong to slots begin to end - 1 to `parts`.
 
     The shapes are (s, n, LANES), (g, n, LANES) and (g, s LANES, LANES).
     """
@@ -19,7 +19,7 @@ def add_products(space, columns, parts):
     groups = len(columns)
     for start in range(0, n, CHUNK):
         count = min(CHUNK, n - start)
-        for slot in range(slots):
+        for slot in range(begin, end):
             for group in range(groups):
                 add_eight_sums(
                     space,
@@ -36,12 +36,15 @@ def add_products(space, columns, parts):
 
 @njit
 @no_type_check
-def subtract_combination(space, parts, columns):
-    """Subtract the product of `space` and `parts` from the columns; shapes as in `add_products`."""
+def subtract_combination(space, parts, columns, begin, end):
+    """Subtract the product of `space` and `parts` from rows begin to end - 1 of the columns.
+
+    The shapes are as in `add_products`.
+    """
     slots, n, _ = space.shape
     groups = len(columns)
-    for start in range(0, n, CHUNK):
-        stop = min(start + CHUNK, n)
+    for start in range(begin, end, CHUNK):
+        stop = min(start + CHUNK, end)
         four = start + (stop - start) // 4 * 4
         for slot in range(slots):
             for group in range(groups):

@@ -1,23 +1,18 @@
-"""Factors L D Lᵀ of symmetric matrices that share a pattern, with pivots on the diagonal."""
+"""The symbolic analysis of symmetric matrices that share a pattern: an order, and fronts."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
-from eigenshape._threads import one_blas_thread
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
-from eigenshape.sparse.blas_loops import addresses
 from eigenshape.sparse.dense_loops import LONG, NARROW
 from eigenshape.sparse.dissection import dissect
-from eigenshape.sparse.lane_loops import LANES
-
-EPS = float(np.finfo(np.float64).eps)
+from eigenshape.sparse.tasks import Tasks, divide_fronts
 
 Indices = Int[np.ndarray, " ..."]
-Scratch = tuple[Float[np.ndarray, "n 8"], Float[np.ndarray, "t 8"], Float[np.ndarray, " p"]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +30,16 @@ class Elimination:
         The rows of front i are rows[begins[i]:begins[i+1]], ascending; its own columns come first.
     above : (s,) int
         The parent of each front; -1 at a root.
+    last_child, older : (s,) int
+        The last child of each front, and its brother before it; -1 where there is none.
     places : (s+1,) int
         Where the entries of each front begin in the array of all entries of L.
-    room : (int, int)
-        Largest size of the stack of updates, in numbers, and the rows of the largest front.
+    tasks : Tasks
+        How threads share the fronts.
+    stacks : (t+1,) int
+        Where the stack of updates of each task begins in the memory of all, in numbers.
+    tallest : int
+        The rows of the largest front.
     lengths : (s,) int
         Bound for the number of roundings of a product up to each front.
     lower_ptr, lower_rows, source : int
@@ -51,8 +52,12 @@ class Elimination:
     begins: Indices
     rows: Indices
     above: Indices
+    last_child: Indices
+    older: Indices
     places: Indices
-    room: tuple[int, int]
+    tasks: Tasks
+    stacks: Indices
+    tallest: int
     lengths: Indices
     lower_ptr: Indices
     lower_rows: Indices
@@ -62,74 +67,6 @@ class Elimination:
     def n_entries(self) -> int:
         """Number of stored entries of L."""
         return int(self.places[-1])
-
-
-@dataclass(frozen=True, eq=False)
-class SymmetricFactor:
-    """A = L D Lᵀ in an order of elimination: L unit lower triangular in panels, D diagonal."""
-
-    elimination: Elimination
-    panels: Float[np.ndarray, " e"]
-    pivots: Float[np.ndarray, " n"]
-
-    def solve(
-        self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None
-    ) -> Float[np.ndarray, "n b"]:
-        """Solve A x = right, in the given scratch memory or in new memory."""
-        width, scratch = right.shape[1], scratch or self.scratch()
-        solution, lanes = np.empty((len(right), width)), np.zeros((len(right), LANES))
-        for start in range(0, width, LANES):
-            stop = min(start + LANES, width)
-            lanes[:, : stop - start] = right[:, start:stop]
-            self.solve_lanes(lanes, lanes, scratch)
-            solution[:, start:stop] = lanes[:, : stop - start]
-        return solution
-
-    def scratch(self) -> Scratch:
-        """Return new scratch memory for solves.
-
-        It has room for right-hand sides in the order of elimination, for those of one front, and
-        for a panel. Callers that solve often keep it, but share it with no other thread: a factor
-        is a value and holds no scratch memory.
-        """
-        e = self.elimination
-        return (
-            np.empty((len(e.order), LANES)),
-            np.empty((e.room[1], LANES)),
-            np.empty(fronts.NEAR * fronts.WIDE),
-        )
-
-    def solve_lanes(
-        self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch
-    ) -> None:
-        """Solve A x = right for eight right-hand sides at once; `out` may be `right` itself.
-
-        Arrays are in C order.
-        """
-        e = self.elimination
-        tree = e.order, e.first, e.begins, e.rows, e.places
-        lanes, gathered, near = scratch
-        fronts.solve_lower(*tree, self.panels, right, lanes, gathered)
-        fronts.solve_upper(*tree, self.panels, self.pivots, lanes, out, gathered, near)
-
-    def rounding(self) -> Float[np.ndarray, " n"]:
-        """Bound the rounding error E = A - L D Lᵀ by a diagonal: |xᵀEx| ≤ Σ r_i x_i². Return r.
-
-        |E_ij| ≤ m eps (|L||D||L|ᵀ)_ij if each of the products that are summed up in an entry is
-        rounded at most m times: once for every other term, in whatever order they are added, or
-        fewer times since sums are split, as `_measure_fronts` counts (Higham 2002, sections 4.2
-        and 10.1). Four more roundings are for forming A and for the sums formed here. For a symmetric
-        E, |xᵀEx| is at most Σ r_i x_i² with the row sums r_i of |E|.
-        """
-        e = self.elimination
-        n = len(e.order)
-        weights, sizes, terms = np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.int64)
-        tree = e.first, e.begins, e.rows, e.places
-        fronts.add_sizes(*tree, self.panels, self.pivots, weights, sizes, terms)
-        lengths = np.repeat(e.lengths, np.diff(e.first))
-        bounds = np.empty_like(sizes)
-        bounds[e.order] = EPS * (np.minimum(terms, lengths) + 4) * sizes
-        return bounds
 
 
 def analyze_pattern(pattern: sp.csc_array) -> Elimination:
@@ -159,9 +96,22 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     rows = np.sort(np.repeat(front * n, heights) + rows) % n  # ascending in each front
     lower_ptr, lower_rows, source = _lower(indptr, indices, place)
     places = _panel_places(np.diff(first), heights)
-    room, lengths = _measure_fronts(np.diff(first), heights, above)
+    tasks = divide_fronts(first, begins, rows, above, places)
     return Elimination(
-        order, first, begins, rows, above, places, room, lengths, lower_ptr, lower_rows, source
+        order=order,
+        first=first,
+        begins=begins,
+        rows=rows,
+        above=above,
+        **_children(above),
+        places=places,
+        tasks=tasks,
+        stacks=_stacks(heights - np.diff(first), above, tasks),
+        tallest=int(heights.max()),
+        lengths=_count_roundings(np.diff(first), heights, above),
+        lower_ptr=lower_ptr,
+        lower_rows=lower_rows,
+        source=source,
     )
 
 
@@ -212,22 +162,40 @@ def _panel_places(widths: Indices, heights: Indices) -> Indices:
     return np.concatenate([[0], np.cumsum(entries)])
 
 
-def _measure_fronts(
-    widths: Indices, heights: Indices, above: Indices
-) -> tuple[tuple[int, int], Indices]:
-    """Return `room` and `lengths` of an `Elimination`.
+def _children(above: Indices) -> dict[str, Indices]:
+    """Return the last child of each front, and the brother before it; -1 where there is none."""
+    last_child, older = _unknown(len(above)), _unknown(len(above))
+    by_parent = np.argsort(above, kind="stable")
+    parents = above[by_parent]
+    brothers = (parents[1:] == parents[:-1]) & (parents[1:] >= 0)
+    older[by_parent[1:][brothers]] = by_parent[:-1][brothers]
+    last_child[parents[parents >= 0]] = by_parent[parents >= 0]  # the last of several stays
+    return {"last_child": last_child, "older": older}
+
+
+def _stacks(counts: Indices, above: Indices, tasks: Tasks) -> Indices:
+    """Return where the updates of each task begin, given the rows of the update of each front.
+
+    An update waits on the stack of its task until its parent is processed, or the last task is.
+    """
+    task = np.repeat(np.arange(tasks.n), np.diff(tasks.first))
+    change = counts**2
+    inside = np.flatnonzero((above >= 0) & (task[above] == task))
+    np.subtract.at(change, above[inside], counts[inside] ** 2)
+    sizes = np.cumsum(change)
+    before = np.concatenate([[0], sizes])[tasks.first[:-1]]
+    largest = np.maximum.reduceat(sizes, tasks.first[:-1]) - before
+    return np.concatenate([[0], np.cumsum(largest)])
+
+
+def _count_roundings(widths: Indices, heights: Indices, above: Indices) -> Indices:
+    """Return `lengths` of an `Elimination`.
 
     A front adds the updates of its children. Then blocks of its columns update others, LONG terms
     at a time.
     """
     size = len(above)
-    has_parent = above >= 0
-    children = np.bincount(above[has_parent], minlength=size)
-    # An update waits on the stack until its parent is processed.
-    updates = (heights - widths) ** 2
-    waiting = np.zeros(size, dtype=np.int64)
-    np.add.at(waiting, above[has_parent], updates[has_parent])
-    stack = np.cumsum(updates - waiting)
+    children = np.bincount(above[above >= 0], minlength=size)
     # Blocks of NARROW columns are doubled until they are as wide as the front.
     doublings = np.ceil(np.log2(np.maximum(widths / NARROW, 1))).astype(np.int64)
     own = np.where(heights > fronts.SMALL, widths // LONG + 2 + doublings, widths) + children
@@ -236,7 +204,7 @@ def _measure_fronts(
         longest[s] += roundings
         if parent >= 0:
             longest[parent] = max(longest[parent], longest[s])
-    return (int(stack.max()), int(heights.max())), np.array(longest)
+    return np.array(longest)
 
 
 def _lower(indptr: Indices, indices: Indices, place: Indices) -> tuple[Indices, Indices, Indices]:
@@ -245,33 +213,3 @@ def _lower(indptr: Indices, indices: Indices, place: Indices) -> tuple[Indices, 
     kept = kept[np.argsort(columns[kept], kind="stable")]
     pointers = np.concatenate([[0], np.cumsum(np.bincount(columns[kept], minlength=len(place)))])
     return pointers, rows[kept], kept
-
-
-def factorize_symmetric(
-    elimination: Elimination, data: Float[np.ndarray, " e"], spent: SymmetricFactor | None = None
-) -> SymmetricFactor | None:
-    """Factor the matrix with these entries; return None if a pivot is zero or not finite.
-
-    The memory of a spent factor, if one is given, is used again.
-    """
-    e = elimination
-    panels = (
-        np.empty(e.n_entries) if spent is None else spent.panels
-    )  # new memory pages cost half as much as a factorization
-    pivots = np.empty(len(e.order))
-    lower = e.lower_ptr, e.lower_rows, data[e.source]
-    tree = e.first, e.begins, e.rows, e.above, e.places
-    waiting, tallest = e.room
-    places = np.empty(len(e.order), dtype=np.int64), np.empty(len(e.above), dtype=np.int64)
-    workspace = np.empty(waiting), np.empty(tallest**2), np.empty(tallest**2), *places
-    children = np.bincount(e.above[e.above >= 0], minlength=len(e.above))
-    sound = fronts.factor_fronts(*lower, *tree, panels, pivots, workspace, children, addresses())
-    return SymmetricFactor(e, panels, pivots) if sound else None
-
-
-def factor_matrix(matrix: sp.sparray) -> SymmetricFactor | None:
-    """Factor one symmetric matrix; return None if a pivot is zero or not finite."""
-    columns = sp.csc_array(matrix)
-    columns.sort_indices()
-    with one_blas_thread():
-        return factorize_symmetric(analyze_pattern(columns), columns.data)

@@ -9,6 +9,7 @@ from eigenshape._compile import njit
 from eigenshape.sparse.dense_loops import eliminate_blocked, eliminate_plain
 from eigenshape.sparse.lane_loops import (
     add_row,
+    clear_row,
     copy_row,
     divide_row,
     subtract_four_sums,
@@ -24,145 +25,163 @@ NEAR = 32  # rows of a panel that fit into the first-level cache
 
 @njit
 @no_type_check
-def factor_fronts(
-    lower_ptr,
-    lower_rows,
-    values,
-    first,
-    begins,
-    rows,
-    above,
-    places,
-    panels,
-    pivots,
-    room,
-    children,
-    blas,
-):
-    """Fill panels and pivots with L and D of a matrix; return whether all pivots are usable.
+def factor_fronts(tree, lower, panels, pivots, updates, room, begin, end, top, blas):
+    """Fill panels and pivots with L and D of the fronts begin to end - 1; return whether all pivots are usable.
 
-    The matrix is given by the columns of its lower triangle. This is the multifrontal method (Duff
-    and Reid 1983) without pivoting: a front gathers the entries of its columns and the updates of
-    its children, eliminates its columns, and passes the rest to its parent as an update.
-
-    `room` is memory for the stack of updates, for two fronts, for one number per row (n) and one
-    per front (s). `children` is the number of children of each front.
+    This is the multifrontal method (Duff and Reid 1983) without pivoting: a front gathers the
+    entries of its columns and the updates of its children, eliminates its columns, and passes the
+    rest to its parent as an update. `tree` is the elimination, `lower` the matrix by the columns of
+    its lower triangle, `updates` memory for updates and the place of each, `room` memory for two
+    fronts and a number for each row. The updates of these fronts are a stack that begins at `top`.
     """
-    size = len(first) - 1
-    stack, front, times, local, waiting = room
-    n_waiting = top = 0
-    for s in range(size):
-        low, high, start = first[s], first[s + 1], begins[s]
-        height, width = begins[s + 1] - start, high - low
-        for i in range(height * height):
-            front[i] = 0.0
-        for i in range(height):
-            local[rows[start + i]] = i
-        for j in range(low, high):
-            for at in range(lower_ptr[j], lower_ptr[j + 1]):
-                front[local[lower_rows[at]] * height + j - low] += values[at]
-        for _ in range(children[s]):
-            n_waiting -= 1
-            child = waiting[n_waiting]
-            skip = begins[child] + first[child + 1] - first[child]
-            count = begins[child + 1] - skip
-            top -= count * count
-            for i in range(count):
-                target, given = local[rows[skip + i]] * height, top + i * count
-                for j in range(i + 1):
-                    front[target + local[rows[skip + j]]] += stack[given + j]
+    for s in range(begin, end):
+        top = gather_front(tree, lower, updates, room, s, begin, top)
+        first, begins = tree[0], tree[1]
+        height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
         if height <= SMALL:
-            sound = eliminate_plain(front, height, width, pivots, low)
+            sound = eliminate_plain(room[0], height, width, pivots, first[s])
         else:
-            sound = eliminate_blocked(front, height, width, pivots, low, times, blas)
+            sound = eliminate_blocked(room[0], height, width, pivots, first[s], room[1], blas)
         if not sound:
             return False
-        at = places[s]
-        for block in range(0, width, WIDE):
-            end = min(block + WIDE, width)
-            for i in range(block, height):
-                for j in range(block, end):
-                    panels[at] = front[i * height + j]
-                    at += 1
-        count = height - width
-        for i in range(count):
-            given = (width + i) * height + width
-            for j in range(i + 1):
-                stack[top + i * count + j] = front[given + j]
-        top += count * count
-        if above[s] >= 0:
-            waiting[n_waiting] = s
-            n_waiting += 1
+        top = keep_front(tree, panels, updates, room, s, top)
     return True
 
 
 @njit
 @no_type_check
-def solve_lower(order, first, begins, rows, places, panels, right, lanes, gathered):
-    """Fill `lanes` (n, LANES) with L⁻¹ times the right-hand sides, in the order of elimination."""
-    for i in range(len(order)):
-        copy_row(right, order[i], lanes, i)
-    for s in range(len(first) - 1):
-        at = places[s]
-        for mine in range(first[s], first[s + 1], WIDE):
-            # A panel is a triangle in the rows of its own columns, and a rectangle below.
-            columns = min(WIDE, first[s + 1] - mine)
-            below = begins[s] + mine - first[s] + columns
-            rest = begins[s + 1] - below
-            for i in range(1, columns):
-                subtract_sum(panels, at + i * columns, 1, 0, lanes, mine, i, lanes, mine + i)
-            at += columns * columns
-            four = rest // 4 * 4
-            for i in range(0, four, 4):
-                write_four_negative_sums(
-                    panels, at + i * columns, 1, columns, lanes, mine, columns, gathered, i
-                )
-            for i in range(four, rest):
-                write_negative_sum(
-                    panels, at + i * columns, 1, 0, lanes, mine, columns, gathered, i
-                )
-            for i in range(rest):
-                add_row(gathered, i, lanes, rows[below + i])
-            at += rest * columns
+def gather_front(tree, lower, updates, room, s, begin, top):
+    """Sum up front s; take updates of fronts from `begin` on off the stack, and return its new top."""
+    first, begins, rows, last_child, older, _ = tree
+    lower_ptr, lower_rows, values = lower
+    stack, places = updates
+    front, _, local = room
+    height = begins[s + 1] - begins[s]
+    for i in range(height * height):
+        front[i] = 0.0
+    for i in range(height):
+        local[rows[begins[s] + i]] = i
+    for j in range(first[s], first[s + 1]):
+        for at in range(lower_ptr[j], lower_ptr[j + 1]):
+            front[local[lower_rows[at]] * height + j - first[s]] += values[at]
+    child = last_child[s]
+    while child >= 0:
+        skip = begins[child] + first[child + 1] - first[child]
+        count = begins[child + 1] - skip
+        for i in range(count):
+            target, given = local[rows[skip + i]] * height, places[child] + i * count
+            for j in range(i + 1):
+                front[target + local[rows[skip + j]]] += stack[given + j]
+        if child >= begin:
+            top -= count * count
+        child = older[child]
+    return top
 
 
 @njit
 @no_type_check
-def solve_upper(
-    order, first, begins, rows, places, panels, pivots, lanes, solution, gathered, near
-):
-    """Fill `solution` (n, LANES) with L⁻ᵀ D⁻¹ times the result of `solve_lower` in `lanes`.
+def keep_front(tree, panels, updates, room, s, top):
+    """Store the panels of front s, and its update on the stack; return the new top."""
+    first, begins, _, _, _, panel_places = tree
+    stack, places = updates
+    front = room[0]
+    height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
+    at = panel_places[s]
+    for block in range(0, width, WIDE):
+        end = min(block + WIDE, width)
+        for i in range(block, height):
+            for j in range(block, end):
+                panels[at] = front[i * height + j]
+                at += 1
+    count = height - width
+    places[s] = top
+    for i in range(count):
+        given = (width + i) * height + width
+        for j in range(i + 1):
+            stack[top + i * count + j] = front[given + j]
+    return top + count * count
 
-    Rows are in the order of the matrix. `gathered` and `near` are scratch.
+
+@njit
+@no_type_check
+def solve_lower(tree, tasks, panels, right, lanes, gathered, begin, end):
+    """Fill rows of `lanes` with L⁻¹ times the right-hand sides, in the order of elimination.
+
+    The rows of tasks begin to end - 1; `tree` and `tasks` are the elimination and its tasks.
     """
-    for i in range(len(order)):
-        divide_row(lanes, i, pivots[i])
-    for s in range(len(first) - 2, -1, -1):
-        height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
-        end = places[s + 1]
-        for block in range((width - 1) // WIDE * WIDE, -1, -WIDE):
-            columns, mine = min(WIDE, width - block), first[s] + block
-            rest = height - block - columns
-            below = end - rest * columns
-            at = below - columns * columns
-            for i in range(rest):
-                copy_row(lanes, rows[begins[s + 1] - rest + i], gathered, i)
-            four = columns // 4 * 4
-            for low in range(0, rest, NEAR):
-                count, corner = min(NEAR, rest - low), below + low * columns
-                for i in range(count * columns):
-                    near[i] = panels[corner + i]
-                for j in range(0, four, 4):
-                    subtract_four_sums(near, j, columns, 1, gathered, low, count, lanes, mine + j)
-                for j in range(four, columns):
-                    subtract_sum(near, j, columns, 0, gathered, low, count, lanes, mine + j)
-            for j in range(columns - 2, -1, -1):
-                count, given = columns - 1 - j, mine + j + 1
-                place = at + (j + 1) * columns + j
-                subtract_sum(panels, place, columns, 0, lanes, given, count, lanes, mine + j)
-            end = at
-    for i in range(len(order)):
-        copy_row(lanes, i, solution, order[i])
+    order, first, begins, places = tree
+    fronts, rows, own_rows, fetches, fetched, to = tasks
+    for task in range(begin, end):
+        for i in range(first[fronts[task]], first[fronts[task + 1]]):
+            copy_row(right, order[i], lanes, i)
+        for row in range(own_rows[task], own_rows[task + 1]):
+            clear_row(lanes, row)
+        for i in range(fetches[task], fetches[task + 1]):
+            add_row(lanes, fetched[i], lanes, to[i])
+        for s in range(fronts[task], fronts[task + 1]):
+            at = places[s]
+            for mine in range(first[s], first[s + 1], WIDE):
+                # A panel is a triangle in the rows of its own columns, and a rectangle below.
+                columns = min(WIDE, first[s + 1] - mine)
+                below = begins[s] + mine - first[s] + columns
+                rest = begins[s + 1] - below
+                for i in range(1, columns):
+                    subtract_sum(panels, at + i * columns, 1, 0, lanes, mine, i, lanes, mine + i)
+                at += columns * columns
+                four = rest // 4 * 4
+                for i in range(0, four, 4):
+                    write_four_negative_sums(
+                        panels, at + i * columns, 1, columns, lanes, mine, columns, gathered, i
+                    )
+                for i in range(four, rest):
+                    write_negative_sum(
+                        panels, at + i * columns, 1, 0, lanes, mine, columns, gathered, i
+                    )
+                for i in range(rest):
+                    add_row(gathered, i, lanes, rows[below + i])
+                at += rest * columns
+
+
+@njit
+@no_type_check
+def solve_upper(tree, rows, fronts, panels, pivots, lanes, solution, gathered, near, begin, end):
+    """Fill rows of `solution` with L⁻ᵀ D⁻¹ times the result of `solve_lower` in `lanes`.
+
+    The rows of tasks begin to end - 1, in the order of the matrix. `gathered` and `near` are
+    scratch.
+    """
+    order, first, begins, places = tree
+    for task in range(end - 1, begin - 1, -1):
+        for i in range(first[fronts[task]], first[fronts[task + 1]]):
+            divide_row(lanes, i, pivots[i])
+        for s in range(fronts[task + 1] - 1, fronts[task] - 1, -1):
+            height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
+            stop = places[s + 1]
+            for block in range((width - 1) // WIDE * WIDE, -1, -WIDE):
+                columns, mine = min(WIDE, width - block), first[s] + block
+                rest = height - block - columns
+                below = stop - rest * columns
+                at = below - columns * columns
+                for i in range(rest):
+                    copy_row(lanes, rows[begins[s + 1] - rest + i], gathered, i)
+                four = columns // 4 * 4
+                for low in range(0, rest, NEAR):
+                    count, corner = min(NEAR, rest - low), below + low * columns
+                    for i in range(count * columns):
+                        near[i] = panels[corner + i]
+                    for j in range(0, four, 4):
+                        subtract_four_sums(
+                            near, j, columns, 1, gathered, low, count, lanes, mine + j
+                        )
+                    for j in range(four, columns):
+                        subtract_sum(near, j, columns, 0, gathered, low, count, lanes, mine + j)
+                for j in range(columns - 2, -1, -1):
+                    count, given = columns - 1 - j, mine + j + 1
+                    place = at + (j + 1) * columns + j
+                    subtract_sum(panels, place, columns, 0, lanes, given, count, lanes, mine + j)
+                stop = at
+        for i in range(first[fronts[task]], first[fronts[task + 1]]):
+            copy_row(lanes, i, solution, order[i])
 
 
 @njit

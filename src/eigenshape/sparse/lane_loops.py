@@ -113,6 +113,21 @@ def add_row(context: Any, given: Any, start: Any, taken: Any, to: Any) -> Any:
     return _row_change(given, taken, lambda builder, row, old: builder.fadd(old, row))
 
 
+@intrinsic
+def clear_row(context: Any, rows: Any, at: Any) -> Any:
+    """Set row `at` of `rows` to zero."""
+    signature = types.void(rows, types.int64)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        rows, at = arguments
+        data = context.make_array(signature.args[0])(context, builder, rows).data
+        pointer = _pointer(builder, data, builder.mul(at, ir.Constant(at.type, LANES)))
+        builder.store(ir.Constant(VECTOR, None), pointer, align=8)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
 def _row_change(given: Any, taken: Any, change: Any) -> Any:
     whole = types.int64
     signature = types.void(given, whole, taken, whole)

@@ -10,7 +10,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian, mass_floor
 from eigenshape.shapes.domains import ball, interval
 from eigenshape.shapes.surfaces import grid, icosphere
-from eigenshape.sparse.elimination import EPS
+from eigenshape.sparse.symmetric_factor import EPS
 from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
 from eigenshape.spectral.solve import solve_spectrum
 

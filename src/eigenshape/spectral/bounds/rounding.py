@@ -6,7 +6,7 @@ from jaxtyping import Float
 from eigenshape.geometry.simplices import scaled_corners, triangular_sides
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.sparse.elimination import EPS
+from eigenshape.sparse.symmetric_factor import EPS
 from eigenshape.spectral.spectrum import Spectrum
 
 

@@ -14,7 +14,7 @@ from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian, find_zero_row_sums, require_matrix
-from eigenshape.sparse.elimination import SymmetricFactor, factorize_symmetric
+from eigenshape.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
 from eigenshape.spectral.diffusion.decay import decay_factors
 from eigenshape.spectral.diffusion.implicit_steps import group_times, step_coefficients, step_time
 from eigenshape.spectral.solver.pencil import Pencil, normalize

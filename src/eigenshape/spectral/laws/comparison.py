@@ -6,7 +6,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.sparse.elimination import EPS
+from eigenshape.sparse.symmetric_factor import EPS
 from eigenshape.spectral.laws.report import Law, Outcome, SkippedLaw, make_law
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape.sparse.elimination import SymmetricFactor, factorize_symmetric
+from eigenshape.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
 from eigenshape.spectral.solver.pencil import Pencil
 
 

@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.sparse.basis import Block, Slots, combine_columns, pack_columns, products, subtract
-from eigenshape.sparse.elimination import Scratch
 from eigenshape.sparse.lane_loops import LANES
+from eigenshape.sparse.symmetric_factor import Scratch
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 

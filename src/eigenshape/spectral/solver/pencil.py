@@ -10,7 +10,8 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
-from eigenshape.sparse.elimination import Elimination, analyze_pattern, factorize_symmetric
+from eigenshape.sparse.elimination import Elimination, analyze_pattern
+from eigenshape.sparse.symmetric_factor import factorize_symmetric
 from eigenshape.spectral.solver.residual_loops import add_sums
 
 # Columns that are processed together: enough for fast products, with little memory.

@@ -1,0 +1,190 @@
+"""Factors L D Lᵀ of symmetric matrices that share a pattern, with pivots on the diagonal."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from eigenshape._threads import free_threads, map_in_threads, one_blas_thread
+from eigenshape.sparse import front_loops as fronts
+from eigenshape.sparse.blas_loops import addresses
+from eigenshape.sparse.elimination import Elimination, analyze_pattern
+from eigenshape.sparse.lane_loops import LANES
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class Scratch:
+    """Memory for solves: the rows of all tasks, and spare room for the panels of each thread."""
+
+    lanes: Float[np.ndarray, "m 8"]
+    rooms: list[tuple[Float[np.ndarray, "t 8"], Float[np.ndarray, " p"]]]
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetricFactor:
+    """A = L D Lᵀ in an order of elimination: L unit lower triangular in panels, D diagonal."""
+
+    elimination: Elimination
+    panels: Float[np.ndarray, " e"]
+    pivots: Float[np.ndarray, " n"]
+
+    def solve(
+        self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None
+    ) -> Float[np.ndarray, "n b"]:
+        """Solve A x = right, in the given scratch memory or in new memory."""
+        width, scratch = right.shape[1], scratch or self.scratch()
+        solution, lanes = np.empty((len(right), width)), np.zeros((len(right), LANES))
+        for start in range(0, width, LANES):
+            stop = min(start + LANES, width)
+            lanes[:, : stop - start] = right[:, start:stop]
+            self.solve_lanes(lanes, lanes, scratch)
+            solution[:, start:stop] = lanes[:, : stop - start]
+        return solution
+
+    def scratch(self) -> Scratch:
+        """Return new scratch memory for solves.
+
+        Callers that solve often keep it, but share it with no other caller: a factor is a value and
+        holds no scratch memory.
+        """
+        return Scratch(np.empty((int(self.elimination.tasks.own_rows[-1]), LANES)), [])
+
+    def solve_lanes(
+        self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch
+    ) -> None:
+        """Solve A x = right for eight right-hand sides at once; `out` may be `right` itself.
+
+        Arrays are in C order.
+        """
+        e, lanes = self.elimination, scratch.lanes
+        tree, tasks = (e.order, e.first, e.begins, e.places), e.tasks
+        division = (
+            tasks.first,
+            tasks.rows,
+            tasks.own_rows,
+            tasks.fetches,
+            tasks.fetched,
+            tasks.to,
+        )
+
+        def lower(begin: int, end: int) -> None:
+            gathered, near = _take_room(scratch, e.tallest)
+            fronts.solve_lower(tree, division, self.panels, right, lanes, gathered, begin, end)
+            scratch.rooms.append((gathered, near))
+
+        def upper(begin: int, end: int) -> None:
+            gathered, near = _take_room(scratch, e.tallest)
+            fronts.solve_upper(
+                tree,
+                e.rows,
+                tasks.first,
+                self.panels,
+                self.pivots,
+                lanes,
+                out,
+                gathered,
+                near,
+                begin,
+                end,
+            )
+            scratch.rooms.append((gathered, near))
+
+        _run_tasks(e, lower)
+        _run_tasks(e, upper, downward=True)
+
+    def rounding(self) -> Float[np.ndarray, " n"]:
+        """Bound the rounding error E = A - L D Lᵀ by a diagonal: |xᵀEx| ≤ Σ r_i x_i². Return r.
+
+        |E_ij| ≤ m eps (|L||D||L|ᵀ)_ij if each of the products that are summed up in an entry is
+        rounded at most m times: once for every other term, in whatever order they are added, or
+        fewer times since sums are split, as `Elimination.lengths` counts (Higham 2002, sections 4.2
+        and 10.1). Four more roundings are for forming A and for the sums formed here. For a symmetric
+        E, |xᵀEx| is at most Σ r_i x_i² with the row sums r_i of |E|.
+        """
+        e = self.elimination
+        n = len(e.order)
+        weights, sizes, terms = np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.int64)
+        tree = e.first, e.begins, e.rows, e.places
+        fronts.add_sizes(*tree, self.panels, self.pivots, weights, sizes, terms)
+        lengths = np.repeat(e.lengths, np.diff(e.first))
+        bounds = np.empty_like(sizes)
+        bounds[e.order] = EPS * (np.minimum(terms, lengths) + 4) * sizes
+        return bounds
+
+
+def _take_room(
+    scratch: Scratch, tallest: int
+) -> tuple[Float[np.ndarray, "t 8"], Float[np.ndarray, " p"]]:
+    """Return spare room for the panels of one thread, or new room."""
+    try:
+        return scratch.rooms.pop()
+    except IndexError:
+        return np.empty((tallest, LANES)), np.empty(fronts.NEAR * fronts.WIDE)
+
+
+def _run_tasks(e: Elimination, run: Callable[[int, int], None], *, downward: bool = False) -> None:
+    """Run a loop on all tasks, from the leaves up or from the roots down: `run(begin, end)`."""
+    if e.tasks.n == 1 or free_threads() == 1:
+        run(0, e.tasks.n)
+        return
+    for tasks in reversed(e.tasks.rounds) if downward else e.tasks.rounds:
+        map_in_threads(lambda task: run(task, task + 1), tasks.tolist())
+
+
+def factorize_symmetric(
+    elimination: Elimination, data: Float[np.ndarray, " e"], spent: SymmetricFactor | None = None
+) -> SymmetricFactor | None:
+    """Factor the matrix with these entries; return None if a pivot is zero or not finite.
+
+    The memory of a spent factor, if one is given, is used again.
+    """
+    e = elimination
+    panels = (
+        np.empty(e.n_entries) if spent is None else spent.panels
+    )  # new memory pages cost half as much as a factorization
+    pivots = np.empty(len(e.order))
+    lower = e.lower_ptr, e.lower_rows, data[e.source]
+    tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
+    updates = np.empty(e.stacks[-1]), np.empty(len(e.above), dtype=np.int64)
+    rooms: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    sound = []
+
+    def run(begin: int, end: int) -> None:
+        for task in range(begin, end):
+            room = _take_fronts(rooms, e)
+            limits = int(e.tasks.first[task]), int(e.tasks.first[task + 1]), int(e.stacks[task])
+            sound.append(
+                fronts.factor_fronts(
+                    tree, lower, panels, pivots, updates, room, *limits, addresses()
+                )
+            )
+            rooms.append(room)
+
+    _run_tasks(e, run)
+    return SymmetricFactor(e, panels, pivots) if all(sound) else None
+
+
+def _take_fronts(
+    rooms: list[tuple[np.ndarray, np.ndarray, np.ndarray]], e: Elimination
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return spare room for two fronts and a number for each row, or new room."""
+    try:
+        return rooms.pop()
+    except IndexError:
+        return (
+            np.empty(e.tallest**2),
+            np.empty(e.tallest**2),
+            np.empty(len(e.order), dtype=np.int64),
+        )
+
+
+def factor_matrix(matrix: sp.sparray) -> SymmetricFactor | None:
+    """Factor one symmetric matrix; return None if a pivot is zero or not finite."""
+    columns = sp.csc_array(matrix)
+    columns.sort_indices()
+    with one_blas_thread():
+        return factorize_symmetric(analyze_pattern(columns), columns.data)

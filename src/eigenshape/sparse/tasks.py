@@ -1,0 +1,120 @@
+"""Tasks of a factor, which several threads share: subtrees of fronts, then the fronts above them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+Indices = Int[np.ndarray, " ..."]
+
+# Numbers in the smallest factor that is divided: below, threads cost more than they save.
+FEWEST_ENTRIES = 2_000_000
+# A subtree is one task if it has at most this share of all entries.
+LARGEST_SHARE = 1 / 24
+
+
+@dataclass(frozen=True, eq=False)
+class Tasks:
+    """Fronts in tasks: those of one round need nothing of each other.
+
+    How fronts are divided depends on the factor alone, so that digits do not depend on the number
+    of threads. A task adds what concerns rows of later tasks to rows of its own, n and following;
+    the task that eliminates such a row begins by fetching it from all of them, in order.
+
+    Attributes
+    ----------
+    first : (t+1,) int
+        First front of each task.
+    rounds : tuple of (r,) int
+        The tasks of each round, ascending.
+    rows : (r,) int
+        The rows of fronts as in `Elimination.rows`, but own rows for those of later tasks.
+    own_rows : (t+1,) int
+        Where the own rows of each task begin; the first is n.
+    fetches : (t+1,) int
+        Where the fetches of each task begin.
+    fetched, to : (f,) int
+        The row that is fetched, and the row that it is added to.
+    """
+
+    first: Indices
+    rounds: tuple[Indices, ...]
+    rows: Indices
+    own_rows: Indices
+    fetches: Indices
+    fetched: Indices
+    to: Indices
+
+    @property
+    def n(self) -> int:
+        """Number of tasks."""
+        return len(self.first) - 1
+
+
+def divide_fronts(
+    first: Indices, begins: Indices, rows: Indices, above: Indices, places: Indices
+) -> Tasks:
+    """Divide the fronts of an elimination into tasks; the arguments are its attributes."""
+    n = int(first[-1])
+    starts = _task_starts(above, np.diff(places).astype(float))
+    task = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    of_entry = np.repeat(task, np.diff(begins))
+    later = np.flatnonzero(rows >= first[starts[1:]][of_entry])
+    keys, inverse = np.unique(of_entry[later] * n + rows[later], return_inverse=True)
+    own = rows.copy()
+    own[later] = n + inverse
+    own_rows = n + np.searchsorted(keys, n * np.arange(len(starts)))
+    eliminated_by = np.repeat(task, np.diff(first))[keys % n]
+    order = np.argsort(eliminated_by, kind="stable")
+    fetches = np.searchsorted(eliminated_by[order], np.arange(len(starts)))
+    rounds = _rounds(task, above)
+    return Tasks(starts, rounds, own, own_rows, fetches, n + order, keys[order] % n)
+
+
+def _task_starts(above: Indices, entries: Float[np.ndarray, " s"]) -> Indices:
+    """Return the first front of each task, and the number of fronts at the end.
+
+    Small subtrees that follow each other are one task, as long as all of them together are small.
+    Fronts above them are one task as long as each is the parent of the one before.
+    """
+    size, most = len(above), LARGEST_SHARE * entries.sum()
+    if entries.sum() < FEWEST_ENTRIES:
+        return np.array([0, size])
+    leaf, total = _subtrees(above, entries)
+    high = total > most
+    is_root = ~high & ((above < 0) | high[above])
+    root_above = dict(zip(leaf[is_root].tolist(), np.flatnonzero(is_root).tolist(), strict=True))
+    starts, weight = [0], 0.0
+    for s in range(1, size):
+        chain = high[s] and high[s - 1] and above[s - 1] == s
+        added = total[root_above[s]] if s in root_above else 0.0
+        fits = not high[s] and not high[s - 1] and weight + added <= most
+        if chain or fits:
+            weight += added
+        else:
+            starts.append(s)
+            weight = added
+    return np.array([*starts, size])
+
+
+def _subtrees(
+    above: Indices, entries: Float[np.ndarray, " s"]
+) -> tuple[Indices, Float[np.ndarray, " s"]]:
+    """Return the first front of the subtree of each front, and the entries of all its fronts."""
+    leaf, total = list(range(len(above))), entries.tolist()
+    for s, parent in enumerate(above.tolist()):
+        if parent >= 0:
+            leaf[parent] = min(leaf[parent], leaf[s])
+            total[parent] += total[s]
+    return np.array(leaf), np.array(total)
+
+
+def _rounds(task: Indices, above: Indices) -> tuple[Indices, ...]:
+    """Return the tasks of each round; all that a task needs is done in rounds before."""
+    has_parent = np.flatnonzero(above >= 0)
+    needed, needing = task[has_parent], task[above[has_parent]]
+    edges = np.unique(np.stack([needed, needing])[:, needed != needing], axis=1)
+    number = np.zeros(int(task[-1]) + 1, dtype=np.int64)
+    for one, other in edges.T.tolist():  # sorted by the task that is needed, which comes before
+        number[other] = max(number[other], number[one] + 1)
+    return tuple(np.flatnonzero(number == each) for each in range(number.max() + 1))
