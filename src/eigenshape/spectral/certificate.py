@@ -41,7 +41,8 @@ class Certificate:
         Eigenvalues closer than this, in 1/length², count as equal: the rounding of the factor and
         of the eigenvectors, and at least 1e-6 of the largest eigenvalue.
     orthonormality : float
-        Largest entry of |ΦᵀBΦ - I|.
+        Largest entry of |ΦᵀBΦ - I|, or a bound of it: entries of pairs that are more than 512 apart
+        are not computed where residuals prove that they are below 1e-10.
     max_residual : float
         Largest of `Spectrum.residuals`, relative to the largest eigenvalue found.
     n_split : int

@@ -55,7 +55,7 @@ def _uncounted_certificate(pencil: Pencil, pairs: Pairs) -> Certificate:
         n_found=len(pairs.values),
         gap=(float(pairs.values[-1]), np.inf),
         resolution=float(pairs.residuals.max()),
-        orthonormality=require_orthonormal(pencil, pairs.vectors),
+        orthonormality=require_orthonormal(pencil, pairs),
         max_residual=float(
             pairs.residuals.max() / max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)
         ),

@@ -145,7 +145,7 @@ def block_lanczos(
         inner, space[: first + groups], rng.standard_normal((groups, pencil.n, LANES)), rng
     )
     missing = wanted.below + wanted.above
-    check = min(min(missing, capacity // 4) + 2 * block, capacity)
+    check = min(8 * missing // 5 + 8 * block, capacity)  # sooner they have never all converged
     for size in range(block, capacity + 1, block):
         filled = first + size // LANES
         image = inner.image(space[filled - groups : filled])
@@ -288,7 +288,7 @@ def _weigh(inner: Operator, column: Float[np.ndarray, " n"]) -> Float[np.ndarray
 
 
 def _ritz(krylov: Krylov, shift: float) -> Ritz:
-    thetas, coefficients = sl.eigh(krylov.projected, lower=False)
+    thetas, coefficients = sl.eigh(krylov.projected, lower=False, driver="evd")
     block = len(krylov.coupling)
     values = shift + 1 / np.where(thetas == 0, np.finfo(np.float64).tiny, thetas)
     rests = np.linalg.norm(krylov.coupling @ coefficients[-block:], axis=0)

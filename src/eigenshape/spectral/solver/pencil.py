@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import map_in_threads
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.sparse.elimination import Elimination, analyze_pattern
 from eigenshape.sparse.symmetric_factor import factorize_symmetric
@@ -290,7 +291,8 @@ def _residuals(
         (part.indptr.astype(np.int64), part.indices.astype(np.int64), part.data)
         for part in (pencil.stiffness, pencil.mass)
     )
-    for columns in column_chunks(vectors.shape[1]):
+
+    def measure(columns: slice) -> None:
         part = np.ascontiguousarray(vectors[:, columns])
         k = part.shape[1]
         scratch = np.empty((2, k)), np.zeros((3, k))
@@ -303,7 +305,23 @@ def _residuals(
         sums = np.zeros((3, k))
         add_sums(*matrices, part, values[columns], pencil.mass_diagonal, True, *scratch, sums)
         norms[columns] = np.sqrt(sums[2] / pencil.mass_floor / sums[1])
+
+    map_in_threads(measure, column_chunks(vectors.shape[1]))
     return values, norms
+
+
+def gram_columns(
+    pencil: Pencil, vectors: Float[np.ndarray, "n k"], columns: slice, first: int = 0
+) -> Float[np.ndarray, "j c"]:
+    """Return ΦᵀBΦ - I in some columns, and in the rows from `first` to the last of these columns."""
+    weighed = pencil.weigh(vectors[:, columns])
+    rows = np.flatnonzero(weighed.any(axis=1))  # few where vectors live on parts
+    before = vectors[:, first : columns.stop]
+    every = len(rows) == pencil.n
+    off = before.T @ weighed if every else before[rows].T @ weighed[rows]
+    own = np.arange(off.shape[1])
+    off[columns.start - first + own, own] -= 1
+    return off
 
 
 def column_chunks(k: int) -> list[slice]:
@@ -318,11 +336,14 @@ def to_user_vectors(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[
     """
     vectors = np.ascontiguousarray(vectors)
     signs = np.ones(vectors.shape[1])
-    for columns in column_chunks(vectors.shape[1]):
+
+    def choose_signs(columns: slice) -> None:
         part = vectors[:, columns]
         sizes = np.abs(part)
         leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
         signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
+
+    map_in_threads(choose_signs, column_chunks(vectors.shape[1]))
     vectors *= pencil.vectors_out(signs[None])
     vectors.flags.writeable = False
     return vectors
