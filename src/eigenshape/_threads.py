@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from functools import cache
+from itertools import pairwise
 from threading import Lock, local
 from typing import Any, Generic, SupportsIndex, TypeVar
 
@@ -111,6 +112,17 @@ def map_in_threads(function: Callable[[A], R], items: Iterable[A]) -> list[R]:
             # Those of the team who have not come yet are not needed any more.
             wait(helper for helper in helpers if not helper.cancel())
     return work.results()
+
+
+def share_units(size: int, unit: int, n: int) -> list[tuple[int, int]]:
+    """Divide a range from 0 to `size` into n equal shares of whole units, or fewer where there are fewer.
+
+    What is computed of a unit must not depend on the share that it is in.
+    """
+    n_units = -(-size // unit)
+    n = max(min(n, n_units), 1)
+    ends = [min(unit * (n_units * number // n), size) for number in range(n + 1)]
+    return list(pairwise(ends))
 
 
 class _SharedWork(Generic[A, R]):

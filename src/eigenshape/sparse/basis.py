@@ -1,11 +1,9 @@
 """Tall columns in slots of eight, (s, n, 8): eight numbers of a row are adjacent in memory."""
 
-from itertools import pairwise
-
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._threads import free_threads, map_in_threads
+from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.sparse.basis_loops import CHUNK, add_products, subtract_combination
 from eigenshape.sparse.lane_loops import LANES
 
@@ -62,8 +60,6 @@ def combine_columns(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np
 
 
 def _shares(size: int, unit: int, multiplications: int) -> list[tuple[int, int]]:
-    """Divide slots or rows among threads, in whole units: what is computed of each is the same."""
-    n_units = -(-size // unit)
-    n = max(min(free_threads(), multiplications // FEWEST_MULTIPLICATIONS, n_units), 1)
-    ends = [min(unit * (n_units * number // n), size) for number in range(n + 1)]
-    return list(pairwise(ends))
+    """Divide slots or rows among as many threads as the work is worth."""
+    worth = max(multiplications // FEWEST_MULTIPLICATIONS, 1)
+    return share_units(size, unit, min(free_threads(), worth))

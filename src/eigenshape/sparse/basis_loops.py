@@ -3,9 +3,16 @@
 from typing import no_type_check
 
 from eigenshape._compile import njit
-from eigenshape.sparse.lane_loops import LANES, add_eight_sums, subtract_four_sums, subtract_sum
+from eigenshape.sparse.lane_loops import (
+    AHEAD,
+    LANES,
+    add_eight_sums,
+    fetch_row,
+    subtract_four_sums,
+    subtract_sum,
+)
 
-CHUNK = 1024  # rows that fit into the second-level cache
+CHUNK = 4096  # rows of a block that take a quarter of the second-level cache
 
 
 @njit
@@ -47,22 +54,17 @@ def subtract_combination(space, parts, columns, begin, end):
         stop = min(start + CHUNK, end)
         four = start + (stop - start) // 4 * 4
         for slot in range(slots):
-            for group in range(groups):
-                given, to = (group * slots + slot) * LANES, group * n
-                for row in range(start, four, 4):
-                    place = (slot * n + row) * LANES
+            for row in range(start, four, 4):
+                place = slot * n + row
+                for ahead in range(AHEAD, AHEAD + 4):
+                    fetch_row(space, place + ahead)
+                for group in range(groups):
+                    given, to = (group * slots + slot) * LANES, group * n + row
                     subtract_four_sums(
-                        space, place, 1, LANES, parts, given, LANES, columns, to + row
+                        space, place * LANES, 1, LANES, parts, given, LANES, columns, to
                     )
-                for row in range(four, stop):
-                    subtract_sum(
-                        space,
-                        (slot * n + row) * LANES,
-                        1,
-                        0,
-                        parts,
-                        given,
-                        LANES,
-                        columns,
-                        to + row,
-                    )
+            for row in range(four, stop):
+                place = slot * n + row
+                for group in range(groups):
+                    given, to = (group * slots + slot) * LANES, group * n + row
+                    subtract_sum(space, place * LANES, 1, 0, parts, given, LANES, columns, to)

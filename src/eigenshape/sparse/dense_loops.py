@@ -51,45 +51,64 @@ def eliminate_blocked(front, height, width, pivots, low, times, blas):
     update the rest of the front. L D is written to `times`, row by row. The other arguments are
     those of `eliminate_plain`.
     """
-    gemm, trsm = blas
     for start in range(0, width, NARROW):
         end = min(start + NARROW, width)
-        # The triangular block on the diagonal, column by column.
-        for j in range(start, end):
-            corner = j * height + j
-            pivot = front[corner]
-            if not 0.0 < abs(pivot) < np.inf:
-                return False
-            pivots[low + j] = pivot
-            front[corner] = 1.0
-            for i in range(j + 1, end):
-                row = i * height
-                share = front[row + j]
-                times[i * width + j] = share
-                front[row + j] = share / pivot
-                for k in range(j + 1, i + 1):
-                    front[row + k] -= share * front[k * height + j]
-        # The rows below the triangle.
-        for i in range(end, height):
-            for j in range(start, end):
-                times[i * width + j] = front[i * height + j]
-        size, corner = (height - end, end - start), start * height + start
-        solve_triangle(trsm, size, front, corner, height, times, end * width + start, width)
-        for i in range(end, height):
-            for j in range(start, end):
-                front[i * height + j] = times[i * width + j] / pivots[low + j]
-        # Update the columns to the right, on and below the diagonal.
-        first, stop = 0, height
-        if end < width:
-            done = (end + NARROW - 1) // NARROW
-            span = (done & -done) * NARROW
-            first, stop = max(end - span, 0), min(end + span, width)
-        for top in range(end, height, TALL):
-            bottom = min(top + TALL, height)
-            for term in range(first, end, LONG):
-                size = (bottom - top, min(bottom, stop) - end, min(term + LONG, end) - term)
-                left, right, taken = top * width + term, end * height + term, top * height + end
-                subtract_product(
-                    gemm, size, times, left, width, front, right, height, front, taken, height
-                )
+        if not eliminate_narrow(front, height, width, pivots, low, times, start, blas):
+            return False
+        update_rows(front, height, width, times, end, end, height, blas)
     return True
+
+
+@njit
+@no_type_check
+def eliminate_narrow(front, height, width, pivots, low, times, start, blas):
+    """Eliminate the NARROW columns from `start` on; return whether their pivots are usable."""
+    end = min(start + NARROW, width)
+    # The triangular block on the diagonal, column by column.
+    for j in range(start, end):
+        corner = j * height + j
+        pivot = front[corner]
+        if not 0.0 < abs(pivot) < np.inf:
+            return False
+        pivots[low + j] = pivot
+        front[corner] = 1.0
+        for i in range(j + 1, end):
+            row = i * height
+            share = front[row + j]
+            times[i * width + j] = share
+            front[row + j] = share / pivot
+            for k in range(j + 1, i + 1):
+                front[row + k] -= share * front[k * height + j]
+    # The rows below the triangle.
+    for i in range(end, height):
+        for j in range(start, end):
+            times[i * width + j] = front[i * height + j]
+    size, corner = (height - end, end - start), start * height + start
+    solve_triangle(blas[1], size, front, corner, height, times, end * width + start, width)
+    for i in range(end, height):
+        for j in range(start, end):
+            front[i * height + j] = times[i * width + j] / pivots[low + j]
+    return True
+
+
+@njit
+@no_type_check
+def update_rows(front, height, width, times, end, begin, stop, blas):
+    """Update rows begin to stop - 1 to the right of the columns before `end`, which are eliminated.
+
+    Rows are updated TALL at a time, from `end` on; `begin` is `end` plus a multiple of TALL.
+    """
+    first, last = 0, height
+    if end < width:
+        done = (end + NARROW - 1) // NARROW
+        span = (done & -done) * NARROW
+        first, last = max(end - span, 0), min(end + span, width)
+    for top in range(begin, stop, TALL):
+        bottom = min(top + TALL, stop)
+        for term in range(first, end, LONG):
+            # On and below the diagonal.
+            size = (bottom - top, min(bottom, last) - end, min(term + LONG, end) - term)
+            left, right, taken = top * width + term, end * height + term, top * height + end
+            subtract_product(
+                blas[0], size, times, left, width, front, right, height, front, taken, height
+            )

@@ -25,33 +25,34 @@ NEAR = 32  # rows of a panel that fit into the first-level cache
 
 @njit
 @no_type_check
-def factor_fronts(tree, lower, panels, pivots, updates, room, begin, end, top, blas):
-    """Fill panels and pivots with L and D of the fronts begin to end - 1; return whether all pivots are usable.
+def factor_fronts(tree, lower, panels, pivots, updates, room, task_begin, begin, end, top, blas):
+    """Fill panels and pivots with L and D of the fronts begin to end - 1 of one task.
 
     This is the multifrontal method (Duff and Reid 1983) without pivoting: a front gathers the
     entries of its columns and the updates of its children, eliminates its columns, and passes the
     rest to its parent as an update. `tree` is the elimination, `lower` the matrix by the columns of
     its lower triangle, `updates` memory for updates and the place of each, `room` memory for two
-    fronts and a number for each row. The updates of these fronts are a stack that begins at `top`.
+    fronts and a number for each row. The updates of a task are a stack. Returns its new top, or -1
+    where a pivot is zero or not finite.
     """
+    first, begins = tree[0], tree[1]
     for s in range(begin, end):
-        top = gather_front(tree, lower, updates, room, s, begin, top)
-        first, begins = tree[0], tree[1]
+        top = gather_front(tree, lower, updates, room, task_begin, s, top)
         height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
         if height <= SMALL:
             sound = eliminate_plain(room[0], height, width, pivots, first[s])
         else:
             sound = eliminate_blocked(room[0], height, width, pivots, first[s], room[1], blas)
         if not sound:
-            return False
+            return -1
         top = keep_front(tree, panels, updates, room, s, top)
-    return True
+    return top
 
 
 @njit
 @no_type_check
-def gather_front(tree, lower, updates, room, s, begin, top):
-    """Sum up front s; take updates of fronts from `begin` on off the stack, and return its new top."""
+def gather_front(tree, lower, updates, room, task_begin, s, top):
+    """Sum up front s; take updates of its own task off the stack, and return the new top."""
     first, begins, rows, last_child, older, _ = tree
     lower_ptr, lower_rows, values = lower
     stack, places = updates
@@ -72,7 +73,7 @@ def gather_front(tree, lower, updates, room, s, begin, top):
             target, given = local[rows[skip + i]] * height, places[child] + i * count
             for j in range(i + 1):
                 front[target + local[rows[skip + j]]] += stack[given + j]
-        if child >= begin:
+        if child >= task_begin:
             top -= count * count
         child = older[child]
     return top

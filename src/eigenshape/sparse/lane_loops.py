@@ -16,11 +16,15 @@ LANES = 8
 VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
 
-def _summation(n_targets: int, change: str, *, kept: bool = True) -> Any:
+# Rows after the present one that memory is asked for, since it takes long to answer (measured).
+AHEAD = 32
+
+
+def _summation(n_targets: int, change: str, *, kept: bool = True, ahead: int = 0) -> Any:
     """Return the intrinsic that changes `n_targets` rows at once by sums: "fadd" or "fsub".
 
     Rows that are not kept count as 0. More rows use the multipliers better, as long as all fit into
-    registers.
+    registers. Shares are fetched from memory this many terms ahead.
     """
 
     @intrinsic
@@ -58,6 +62,9 @@ def _summation(n_targets: int, change: str, *, kept: bool = True) -> Any:
             with cgutils.for_range(builder, count) as loop:
                 row = _load(builder, given, builder.mul(builder.add(start, loop.index), eight))
                 place = builder.add(at, builder.mul(loop.index, stride))
+                if ahead:
+                    far = builder.mul(stride, ir.Constant(at.type, ahead))
+                    _fetch(builder, shares, builder.add(place, far))
                 for total in sums:
                     share = _repeat_scalar(builder, builder.load(builder.gep(shares, [place])))
                     builder.store(_multiply_add(builder, share, row, builder.load(total)), total)
@@ -83,6 +90,15 @@ def _load(builder: Any, data: Any, offset: Any) -> Any:
     return builder.load(_pointer(builder, data, offset), align=8)
 
 
+def _fetch(builder: Any, data: Any, offset: Any) -> None:
+    byte, flag = ir.IntType(8).as_pointer(), ir.IntType(32)
+    kind = ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag])
+    fetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+    # For reading, into the caches of all levels, data and no code.
+    flags = [ir.Constant(flag, value) for value in (0, 3, 1)]
+    builder.call(fetch, [builder.bitcast(builder.gep(data, [offset]), byte), *flags])
+
+
 def _repeat_scalar(builder: Any, scalar: Any) -> Any:
     zero = ir.Constant(ir.IntType(32), 0)
     one = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), scalar, zero)
@@ -98,7 +114,21 @@ subtract_sum = _summation(1, "fsub")
 subtract_four_sums = _summation(4, "fsub")
 write_negative_sum = _summation(1, "fsub", kept=False)
 write_four_negative_sums = _summation(4, "fsub", kept=False)
-add_eight_sums = _summation(8, "fadd")
+add_eight_sums = _summation(8, "fadd", ahead=AHEAD)
+
+
+@intrinsic
+def fetch_row(context: Any, rows: Any, at: Any) -> Any:
+    """Ask memory for row `at` of `rows`, which may lie beyond the end."""
+    signature = types.void(rows, types.int64)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        rows, at = arguments
+        data = context.make_array(signature.args[0])(context, builder, rows).data
+        _fetch(builder, data, builder.mul(at, ir.Constant(at.type, LANES)))
+        return context.get_dummy_value()
+
+    return signature, generate
 
 
 @intrinsic

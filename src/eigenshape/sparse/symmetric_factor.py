@@ -1,19 +1,27 @@
 """Factors L D Lᵀ of symmetric matrices that share a pattern, with pivots on the diagonal."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from eigenshape._threads import free_threads, map_in_threads, one_blas_thread
+from eigenshape._threads import free_threads, map_in_threads, one_blas_thread, share_units
+from eigenshape.sparse import dense_loops as dense
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse.blas_loops import addresses
 from eigenshape.sparse.elimination import Elimination, analyze_pattern
 from eigenshape.sparse.lane_loops import LANES
 
 EPS = float(np.finfo(np.float64).eps)
+# Rows from which on several threads update one front: below, starting them costs more.
+SHARED_HEIGHT = 400
+
+Indices = Int[np.ndarray, " ..."]
+# Two fronts, and a number for each row.
+Room = tuple[Float[np.ndarray, " f"], Float[np.ndarray, " f"], Indices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,10 +128,9 @@ def _take_room(
     scratch: Scratch, tallest: int
 ) -> tuple[Float[np.ndarray, "t 8"], Float[np.ndarray, " p"]]:
     """Return spare room for the panels of one thread, or new room."""
-    try:
+    with suppress(IndexError):
         return scratch.rooms.pop()
-    except IndexError:
-        return np.empty((tallest, LANES)), np.empty(fronts.NEAR * fronts.WIDE)
+    return np.empty((tallest, LANES)), np.empty(fronts.NEAR * fronts.WIDE)
 
 
 def _run_tasks(e: Elimination, run: Callable[[int, int], None], *, downward: bool = False) -> None:
@@ -143,43 +150,78 @@ def factorize_symmetric(
     The memory of a spent factor, if one is given, is used again.
     """
     e = elimination
-    panels = (
-        np.empty(e.n_entries) if spent is None else spent.panels
-    )  # new memory pages cost half as much as a factorization
-    pivots = np.empty(len(e.order))
-    lower = e.lower_ptr, e.lower_rows, data[e.source]
-    tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
-    updates = np.empty(e.stacks[-1]), np.empty(len(e.above), dtype=np.int64)
-    rooms: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    sound = []
-
-    def run(begin: int, end: int) -> None:
-        for task in range(begin, end):
-            room = _take_fronts(rooms, e)
-            limits = int(e.tasks.first[task]), int(e.tasks.first[task + 1]), int(e.stacks[task])
-            sound.append(
-                fronts.factor_fronts(
-                    tree, lower, panels, pivots, updates, room, *limits, addresses()
-                )
-            )
-            rooms.append(room)
-
-    _run_tasks(e, run)
-    return SymmetricFactor(e, panels, pivots) if all(sound) else None
+    making = _Making(
+        elimination=e,
+        lower=(e.lower_ptr, e.lower_rows, data[e.source]),
+        # New memory pages cost half as much as a factorization.
+        panels=np.empty(e.n_entries) if spent is None else spent.panels,
+        pivots=np.empty(len(e.order)),
+        updates=(np.empty(e.stacks[-1]), np.empty(len(e.above), dtype=np.int64)),
+    )
+    for tasks in e.tasks.rounds:
+        if not all(map_in_threads(making.factor_task, tasks.tolist())):
+            return None
+    return SymmetricFactor(e, making.panels, making.pivots)
 
 
-def _take_fronts(
-    rooms: list[tuple[np.ndarray, np.ndarray, np.ndarray]], e: Elimination
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return spare room for two fronts and a number for each row, or new room."""
-    try:
-        return rooms.pop()
-    except IndexError:
-        return (
-            np.empty(e.tallest**2),
-            np.empty(e.tallest**2),
-            np.empty(len(e.order), dtype=np.int64),
-        )
+@dataclass(frozen=True, eq=False)
+class _Making:
+    """A factor in the making: what is given, what is filled, and memory that its fronts share."""
+
+    elimination: Elimination
+    lower: tuple[Indices, Indices, Float[np.ndarray, " l"]]
+    panels: Float[np.ndarray, " e"]
+    pivots: Float[np.ndarray, " n"]
+    updates: tuple[Float[np.ndarray, " u"], Indices]
+    rooms: list[Room] = field(default_factory=list)
+
+    def factor_task(self, task: int) -> bool:
+        """Factor the fronts of a task; return whether all pivots are usable."""
+        e, room = self.elimination, self._take_room()
+        begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
+        tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
+        low, top = begin, int(e.stacks[task])
+        while low < end and top >= 0:
+            if free_threads() > 1 and e.begins[low + 1] - e.begins[low] >= SHARED_HEIGHT:
+                top = fronts.gather_front(tree, self.lower, self.updates, room, begin, low, top)
+                if not self._eliminate_together(low, room):
+                    return False
+                top = fronts.keep_front(tree, self.panels, self.updates, room, low, top)
+                low += 1
+                continue
+            high = low + 1
+            while high < end and e.begins[high + 1] - e.begins[high] < SHARED_HEIGHT:
+                high += 1
+            filled = tree, self.lower, self.panels, self.pivots, self.updates
+            top = fronts.factor_fronts(*filled, room, begin, low, high, top, addresses())
+            low = high
+        self.rooms.append(room)
+        return top >= 0
+
+    def _eliminate_together(self, s: int, room: Room) -> bool:
+        """Eliminate the columns of a front whose rows several threads update."""
+        e, blas = self.elimination, addresses()
+        front, times, _ = room
+        height, width = int(e.begins[s + 1] - e.begins[s]), int(e.first[s + 1] - e.first[s])
+        shape = front, height, width
+        for start in range(0, width, dense.NARROW):
+            low = int(e.first[s])
+            if not dense.eliminate_narrow(*shape, self.pivots, low, times, start, blas):
+                return False
+            end = min(start + dense.NARROW, width)
+
+            def update(share: tuple[int, int], end: int = end) -> None:
+                dense.update_rows(*shape, times, end, end + share[0], end + share[1], blas)
+
+            map_in_threads(update, share_units(height - end, dense.TALL, free_threads()))
+        return True
+
+    def _take_room(self) -> Room:
+        """Return spare memory, or new memory."""
+        with suppress(IndexError):
+            return self.rooms.pop()
+        square, n = self.elimination.tallest**2, len(self.pivots)
+        return np.empty(square), np.empty(square), np.empty(n, dtype=np.int64)
 
 
 def factor_matrix(matrix: sp.sparray) -> SymmetricFactor | None:

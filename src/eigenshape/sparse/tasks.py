@@ -87,7 +87,7 @@ def _task_starts(above: Indices, entries: Float[np.ndarray, " s"]) -> Indices:
     starts, weight = [0], 0.0
     for s in range(1, size):
         chain = high[s] and high[s - 1] and above[s - 1] == s
-        added = total[root_above[s]] if s in root_above else 0.0
+        added = float(total[root_above[s]]) if s in root_above else 0.0
         fits = not high[s] and not high[s - 1] and weight + added <= most
         if chain or fits:
             weight += added

@@ -121,12 +121,13 @@ def block_lanczos(
     groups: int = 1,
     report: Callable[[float], None],
 ) -> tuple[Float[np.ndarray, " j"], Float[np.ndarray, "n j"]]:
-    """Return eigenvalues around the shift, and B-orthonormal eigenvectors, orthogonal to the B-orthonormal `locked`.
+    """Return eigenvalues around the shift, ascending, and B-orthonormal eigenvectors, orthogonal to `locked`.
 
-    Unrestarted block Lanczos on (W - σB)⁻¹B in the inner product of B (Grimes, Lewis and Simon
-    1994), in blocks of `groups` times eight columns, every block orthogonalized against all before
-    it. It stops when what the space has seen of `wanted` has converged; copies of an eigenvalue
-    beyond the width of the block may be missing, which an inertia count tells afterwards.
+    The columns of `locked` are B-orthonormal. Unrestarted block Lanczos on (W - σB)⁻¹B in the
+    inner product of B (Grimes, Lewis and Simon 1994), in blocks of `groups` times eight columns,
+    every block orthogonalized against all before it. It stops when what the space has seen of
+    `wanted` has converged; copies of an eigenvalue beyond the width of the block may be missing,
+    which an inertia count tells afterwards.
 
     Raises
     ------
@@ -156,6 +157,7 @@ def block_lanczos(
             ritz = _ritz(krylov, factor.shift)
             chosen, missing = _choose(ritz, wanted)
             if not missing:
+                chosen = chosen[np.argsort(ritz.values[chosen], kind="stable")]
                 return ritz.values[chosen], inner.leave(_vectors(krylov, ritz, chosen))
             check = size + min(max(missing // 2, size // 20, block), max(size // 4, block))
         report(size / (size + 0.6 * (wanted.below + wanted.above) + block))

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
-from eigenshape._threads import map_in_threads
+from eigenshape._threads import map_in_threads, share_units
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import (
     Pencil,
@@ -22,6 +22,8 @@ LOOSE = 1e-12
 SKEW = 1e-5
 # Columns before one that it may lean on: more than a slice has.
 LEANING_COLUMNS = 384
+# Rows that are corrected at once.
+ROWS = 512
 # Residual, relative to the largest eigenvalue, above which a pair takes one more solve.
 POLISHED = 2e-9
 
@@ -59,7 +61,10 @@ def polish(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
 
 
 def lowest_pairs(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> Pairs:
-    """Return the k lowest eigenpairs of nearly B-orthonormal vectors, by their Rayleigh quotients."""
+    """Return the k lowest eigenpairs of nearly B-orthonormal vectors, by their Rayleigh quotients.
+
+    The vectors are used up.
+    """
     vectors = _orthonormalize(pencil, vectors)
     values, residuals = rayleigh_residuals(pencil, vectors)
     order = np.argsort(values, kind="stable")[:k]
@@ -69,7 +74,7 @@ def lowest_pairs(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> P
 
 
 def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.ndarray, "n j"]:
-    """Return B-orthonormal columns, where these are so up to the tolerance of the iteration.
+    """Make columns B-orthonormal, in place, that are so up to the tolerance of the iteration.
 
     That is one Newton step towards the nearest such columns. Columns ascend nearly, and lean on
     those whose eigenvalues are near; what is further apart is orthogonal by its residuals.
@@ -91,12 +96,16 @@ def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[
     for columns, start, each in zip(chunks, starts, offs, strict=True):
         gram[start : columns.stop, columns] = each
         gram[columns, start : columns.start] = each[: columns.start - start].T
-    corrected = np.empty_like(vectors)
 
-    def correct(columns: slice) -> None:
-        near = slice(max(columns.start - LEANING_COLUMNS, 0), columns.stop + LEANING_COLUMNS)
-        step = vectors[:, near] @ gram[near, columns]
-        np.subtract(vectors[:, columns], 0.5 * step, out=corrected[:, columns])
+    def correct(share: tuple[int, int]) -> None:
+        rows = vectors[slice(*share)]
+        step = np.empty_like(rows)
+        for columns in chunks:
+            near = slice(max(columns.start - LEANING_COLUMNS, 0), columns.stop + LEANING_COLUMNS)
+            np.matmul(rows[:, near], gram[near, columns], out=step[:, columns])
+        step *= 0.5
+        rows -= step
 
-    map_in_threads(correct, chunks)
-    return corrected
+    # In place, since touching new memory costs as much as the products.
+    map_in_threads(correct, share_units(len(vectors), ROWS, -(-len(vectors) // ROWS)))
+    return vectors

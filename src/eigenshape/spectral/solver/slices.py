@@ -64,11 +64,10 @@ def walk_on(
         values, vectors = block_lanczos(
             pencil, factor, wanted, locked=none, report=_within(report, *share)
         )
-        ascending = np.argsort(values, kind="stable")
         if last:
-            return np.hstack([*parts, vectors[:, ascending]]), factor
+            return np.hstack([*parts, vectors]) if parts else vectors, factor
         kept, floor = _find_cut(values, factor.shift)
-        parts.append(vectors[:, ascending[: np.count_nonzero(values < floor)]])
+        parts.append(vectors[:, values < floor])
         known = factor.count + kept
         upper_half = np.sort(values[values < floor])[parts[-1].shape[1] // 2 :]
         spacing = (floor - float(upper_half[0])) / len(upper_half)
