@@ -143,6 +143,32 @@ def test_four_threads_get_what_one_gets_bit_for_bit(tmp_path, monkeypatch):
     assert {name: digest(value) for name, value in vars(values).items()} == before
 
 
+# What decides whether work is worth threads; with these small values it is for every small shape.
+SMALL_WORK = {
+    "eigenshape.sparse.tasks.FEWEST_ENTRIES": 500,
+    "eigenshape.sparse.basis.FEWEST_MULTIPLICATIONS": 1,
+    "eigenshape.sparse.basis.ROWS": 64,
+    "eigenshape.sparse.symmetric_factor.SHARED_HEIGHT": 48,
+    "eigenshape.spectral.multilevel.vcycle.ROWS": 64,
+    "eigenshape.spectral.multilevel.residuals.ROWS": 64,
+}
+
+
+def test_the_number_of_threads_changes_no_digit(tmp_path, monkeypatch):
+    monkeypatch.setattr("eigenshape.plot.render.FINER", 1)
+    for place, value in SMALL_WORK.items():
+        monkeypatch.setattr(place, value)
+    values, found = Shared(tmp_path), []
+    try:
+        for n in (1, 2, 4):
+            es.set_threads(n)
+            found.append({name: digest(call(values)) for name, call in CALLS.items()})
+    finally:
+        es.set_threads(None)
+    wrong = [name for name in CALLS if len({each[name] for each in found}) > 1]
+    assert not wrong
+
+
 def test_two_threads_bend_one_binding(tmp_path):
     values = Shared(tmp_path)
     handles = [

@@ -16,7 +16,8 @@ from eigenshape.sparse.elimination import Elimination, analyze_pattern
 from eigenshape.sparse.lane_loops import LANES
 
 EPS = float(np.finfo(np.float64).eps)
-# Rows from which on several threads update one front: below, starting them costs more.
+# Rows from which on several threads update one front: below, starting them costs more. Always more
+# than `SMALL`, below which fronts are eliminated in another order.
 SHARED_HEIGHT = 400
 
 Indices = Int[np.ndarray, " ..."]

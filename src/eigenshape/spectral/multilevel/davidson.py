@@ -8,12 +8,13 @@ from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.multilevel.residuals import (
+    change_rows,
     images,
     keep_outside,
+    map_groups,
     norms_of_residuals,
     pick_columns,
     residual_block,
-    row_chunks,
 )
 from eigenshape.spectral.multilevel.vcycle import Tower, correct, multiply, smooth
 
@@ -177,8 +178,7 @@ def _smooth_all(
         )
         corrections = smooth(tower, block, values[some].astype(np.float32), steps)
         _require_finite(corrections, some)
-        for rows in row_chunks(tower):
-            space.columns[rows, start : start + len(some)] -= corrections[rows]
+        space.columns[:, some[0] : some[-1] + 1] -= corrections
     return norms
 
 
@@ -209,8 +209,7 @@ def _add_corrections(
         )
         corrections = correct(tower, block, values[some].astype(np.float32), steps)
         _require_finite(corrections, some)
-        for rows in row_chunks(tower):
-            space.added[rows, start : start + len(some)] = corrections[rows]
+        space.added[:, start : start + len(some)] = corrections
 
 
 def _require_finite(corrections: np.ndarray, some: np.ndarray) -> None:
@@ -259,11 +258,14 @@ def _ritz(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> np.nd
 def _combine(tower: Tower, space: Space, weights: np.ndarray) -> None:
     m, weights = space.columns.shape[1], weights.astype(space.columns.dtype)
     late = len(weights) - m
-    for rows in row_chunks(tower):
+
+    def combine(rows: slice) -> None:
         part = space.columns[rows] @ weights[:m]
         if late:
             part += space.added[rows, :late].astype(part.dtype) @ weights[m:]
         space.columns[rows] = part
+
+    change_rows(tower, combine)
 
 
 def _combination(
@@ -290,16 +292,21 @@ def _combination(
 def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[np.ndarray, np.ndarray]:
     """Return SᵀMS and SᵀAS, except the block of the columns before the fresh ones."""
     size, m = fresh.stop, space.columns.shape[1]
-    gram, projected = np.zeros((size, size)), np.zeros((size, size))
     of = space.columns if fresh.start == 0 else space.added[:, : size - m]
-    for rows, image, weighed in images(tower, of):
-        for block, start in ((space.columns, 0), (space.added, m)):
-            if start < size:
-                part = block[rows, : size - start].astype(np.float64)
-                places = slice(start, start + part.shape[1])
-                gram[places, fresh] += part.T @ weighed
-                projected[places, fresh] += part.T @ image
-    for square in (gram, projected):
+
+    def sum_rows(chunks: list[slice]) -> np.ndarray:
+        grams = np.zeros((2, size, of.shape[1]))
+        for rows, image, weighed in images(tower, of, chunks):
+            for block, start in ((space.columns, 0), (space.added, m)):
+                if start < size:
+                    part = block[rows, : size - start].astype(np.float64)
+                    grams[0, start : start + part.shape[1]] += part.T @ weighed
+                    grams[1, start : start + part.shape[1]] += part.T @ image
+        return grams
+
+    squares = np.zeros((2, size, size))
+    squares[:, :, fresh] = sum(map_groups(tower, sum_rows))
+    for square in squares:
         square[fresh, : fresh.start] = square[: fresh.start, fresh].T
         square[fresh, fresh] = (square[fresh, fresh] + square[fresh, fresh].T) / 2
-    return gram, projected
+    return squares[0], squares[1]

@@ -127,28 +127,28 @@ def _double_array(array, more):
 
 @njit
 @no_type_check
-def multiply_rows(starts, columns, values, block, product):
-    """Write a sparse matrix times a block of columns; `starts` may cover some rows only."""
-    for i in range(len(starts) - 1):
-        _row_product(starts, columns, values, block, i, product)
+def multiply_rows(starts, columns, values, block, product, begin, end, first):
+    """Write rows begin to end - 1 of a sparse matrix times columns to `product`, from row `first` on."""
+    for i in range(begin, end):
+        _row_product(starts, columns, values, block, i, first + i - begin, product)
 
 
 @njit
 @no_type_check
-def _row_product(starts, columns, values, block, i, product):
+def _row_product(starts, columns, values, block, i, to, product):
     width = block.shape[1]
     for c in range(width):
-        product[i, c] = 0
+        product[to, c] = 0
     for entry in range(starts[i], starts[i + 1]):
         value, j = values[entry], columns[entry]
         for c in range(width):
-            product[i, c] += value * block[j, c]
+            product[to, c] += value * block[j, c]
 
 
 @njit
 @no_type_check
-def smoothing_step(matrix, scales, terms, block, step, moved, old, new):
-    """Compute one Chebyshev step in place, and the block after it.
+def smoothing_step(matrix, scales, terms, block, step, moved, old, new, begin, end):
+    """Compute rows begin to end - 1 of one Chebyshev step in place, and of the block after it.
 
     step = old step + new D⁻¹ (r - (A - θ M) block), and moved = block + step. The diagonals M and
     D⁻¹ are in `scales`.
@@ -157,8 +157,8 @@ def smoothing_step(matrix, scales, terms, block, step, moved, old, new):
     weights, inverse = scales
     right, shifts = terms
     width = block.shape[1]
-    for i in range(len(starts) - 1):
-        _row_product(starts, columns, values, block, i, moved)
+    for i in range(begin, end):
+        _row_product(starts, columns, values, block, i, i, moved)
         weight, factor = weights[i, 0], inverse[i, 0] * new
         for c in range(width):
             rest = (right[i, c] - moved[i, c]) + (weight * shifts[c]) * block[i, c]

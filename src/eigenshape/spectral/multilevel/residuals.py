@@ -1,27 +1,54 @@
 """Images and residuals of tall blocks of columns, computed in chunks of rows."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._threads import map_in_threads
 from eigenshape.spectral.multilevel.vcycle import Tower, multiply
+
+R = TypeVar("R")
 
 # Rows in a chunk: two products of 32 columns then take 2 MiB, which fit into the cache.
 ROWS = 4096
+# Chunks of a group, which one thread sums up, at least; and groups at most, each of which keeps
+# sums of its own.
+CHUNKS_A_GROUP = 4
+MOST_GROUPS = 16
 
 
-def row_chunks(tower: Tower) -> list[slice]:
-    """Return the rows of the finest level in chunks that fit into the cache."""
+def map_groups(tower: Tower, function: Callable[[list[slice]], R]) -> list[R]:
+    """Return what a function returns of each group of chunks of rows, computed side by side.
+
+    The groups depend on the number of rows alone, and so do sums over them.
+    """
     n = tower.levels[0].n
-    return [slice(start, min(start + ROWS, n)) for start in range(0, n, ROWS)]
+    chunks = [slice(start, min(start + ROWS, n)) for start in range(0, n, ROWS)]
+    n_groups = min(max(len(chunks) // CHUNKS_A_GROUP, 1), MOST_GROUPS)
+    ends = [len(chunks) * number // n_groups for number in range(n_groups + 1)]
+    return map_in_threads(function, [chunks[low:high] for low, high in pairwise(ends)])
 
 
-def images(tower: Tower, columns: np.ndarray) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+def change_rows(tower: Tower, change: Callable[[slice], None]) -> None:
+    """Run a function on all chunks of rows, side by side."""
+
+    def change_group(chunks: list[slice]) -> None:
+        for rows in chunks:
+            change(rows)
+
+    map_groups(tower, change_group)
+
+
+def images(
+    tower: Tower, columns: np.ndarray, chunks: list[slice]
+) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
     """Yield A S and M S for columns S in chunks of rows, in double precision."""
     level = tower.levels[0]
     room = [np.empty((min(ROWS, level.n), columns.shape[1])) for _ in range(2)]
-    for rows in row_chunks(tower):
+    for rows in chunks:
         image, weighed = (part[: rows.stop - rows.start] for part in room)
         multiply(level.stiffness, columns, image, rows)
         if level.mass is None:
@@ -32,10 +59,10 @@ def images(tower: Tower, columns: np.ndarray) -> Iterator[tuple[slice, np.ndarra
 
 
 def _residual_rows(
-    tower: Tower, columns: np.ndarray, values: np.ndarray
+    tower: Tower, columns: np.ndarray, values: np.ndarray, chunks: list[slice]
 ) -> Iterator[tuple[slice, np.ndarray]]:
     """Yield the residuals A S - M S θ in chunks of rows."""
-    for rows, image, weighed in images(tower, columns):
+    for rows, image, weighed in images(tower, columns, chunks):
         np.multiply(weighed, values, out=weighed)
         yield rows, np.subtract(image, weighed, out=image)
 
@@ -44,10 +71,12 @@ def norms_of_residuals(
     tower: Tower, columns: np.ndarray, values: np.ndarray
 ) -> Float[np.ndarray, " m"]:
     """Return the norms of the columns' residuals for the inverse of M or of its diagonal."""
-    squares = np.zeros(len(values))
-    for rows, rest in _residual_rows(tower, columns, values):
-        squares += _squares(tower, rows, rest)
-    return np.sqrt(squares)
+
+    def squares(chunks: list[slice]) -> np.ndarray:
+        rests = _residual_rows(tower, columns, values, chunks)
+        return np.sum([_squares(tower, rows, rest) for rows, rest in rests], axis=0)
+
+    return np.sqrt(np.sum(map_groups(tower, squares), axis=0))
 
 
 def _squares(tower: Tower, rows: slice, rest: np.ndarray) -> np.ndarray:
@@ -59,8 +88,11 @@ def _squares(tower: Tower, rows: slice, rest: np.ndarray) -> np.ndarray:
 def pick_columns(tower: Tower, columns: np.ndarray, some: np.ndarray) -> np.ndarray:
     """Return some of the columns as a contiguous block."""
     picked = np.empty((len(columns), len(some)), dtype=columns.dtype)
-    for rows in row_chunks(tower):
+
+    def fill(rows: slice) -> None:
         picked[rows] = np.take(columns[rows], some, axis=1)
+
+    change_rows(tower, fill)
     return picked
 
 
@@ -68,12 +100,16 @@ def residual_block(
     tower: Tower, columns: np.ndarray, values: np.ndarray, scales: np.ndarray
 ) -> tuple[np.ndarray, Float[np.ndarray, " b"]]:
     """Return residuals, scaled and in single precision, and their norms."""
-    squares = np.zeros(len(values))
     block = np.empty(columns.shape, dtype=np.float32)
-    for rows, rest in _residual_rows(tower, columns, values):
-        block[rows] = rest * scales
-        squares += _squares(tower, rows, rest)
-    return block, np.sqrt(squares)
+
+    def fill(chunks: list[slice]) -> np.ndarray:
+        squares = np.zeros(len(values))
+        for rows, rest in _residual_rows(tower, columns, values, chunks):
+            block[rows] = rest * scales
+            squares += _squares(tower, rows, rest)
+        return squares
+
+    return block, np.sqrt(np.sum(map_groups(tower, fill), axis=0))
 
 
 def keep_outside(tower: Tower, columns: np.ndarray, block: np.ndarray) -> None:
@@ -82,8 +118,16 @@ def keep_outside(tower: Tower, columns: np.ndarray, block: np.ndarray) -> None:
     Orthonormal is meant for M or its diagonal.
     """
     weights = tower.levels[0].weights
-    inside = np.zeros((columns.shape[1], block.shape[1]))
-    for rows in row_chunks(tower):
-        inside += columns[rows].T @ (weights[rows] * block[rows]).astype(columns.dtype)
-    for rows in row_chunks(tower):
-        block[rows] -= columns[rows] @ inside.astype(columns.dtype)
+
+    def share_inside(chunks: list[slice]) -> np.ndarray:
+        inside = np.zeros((columns.shape[1], block.shape[1]))
+        for rows in chunks:
+            inside += columns[rows].T @ (weights[rows] * block[rows]).astype(columns.dtype)
+        return inside
+
+    inside = np.sum(map_groups(tower, share_inside), axis=0).astype(columns.dtype)
+
+    def subtract_inside(rows: slice) -> None:
+        block[rows] -= columns[rows] @ inside
+
+    change_rows(tower, subtract_inside)

@@ -1,16 +1,20 @@
 """Corrections of approximate eigenvectors by a V-cycle through all levels."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.spectral.multilevel.aggregation import Loaded
 from eigenshape.spectral.multilevel.multilevel_loops import multiply_rows, smoothing_step
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 
+# Rows that are worth a thread.
+ROWS = 4096
 INNER_STEPS = 8  # smoothing steps on the levels between the finest and the coarsest
 
 
@@ -65,8 +69,13 @@ def multiply(
     matrix: sp.csr_array, block: np.ndarray, product: np.ndarray, rows: slice | None = None
 ) -> np.ndarray:
     """Write the matrix times a block, or some rows of it, to `product`, and return it."""
-    starts = matrix.indptr if rows is None else matrix.indptr[rows.start : rows.stop + 1]
-    multiply_rows(starts, matrix.indices, matrix.data, block, product)
+    begin, end = (rows.start, rows.stop) if rows else (0, matrix.shape[0])
+
+    def fill(share: tuple[int, int]) -> None:
+        parts = matrix.indptr, matrix.indices, matrix.data
+        multiply_rows(*parts, block, product, begin + share[0], begin + share[1], share[0])
+
+    map_in_threads(fill, share_units(end - begin, ROWS, free_threads()))
     return product
 
 
@@ -81,10 +90,15 @@ def _smooth(
     matrix = level.rough.indptr, level.rough.indices, level.rough.data
     step, moved = np.zeros_like(block), np.empty_like(block)
     precision = block.dtype.type
+    shares = share_units(len(block), ROWS, free_threads())
     for _ in range(steps):
-        smoothing_step(
-            matrix, level.rough_scales, terms, block, step, moved, precision(old), precision(new)
-        )
+        given = matrix, level.rough_scales, terms, block, step, moved
+        factors = precision(old), precision(new)
+
+        def smooth_rows(share: tuple[int, int], given: Any = (*given, *factors)) -> None:
+            smoothing_step(*given, *share)
+
+        map_in_threads(smooth_rows, shares)
         block, moved = moved, block
         following = 1 / (2 * sharpness - rho)
         old, new, rho = following * rho, 2 * following / half, following

@@ -15,11 +15,12 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.multilevel.davidson import Goal, refine
 from eigenshape.spectral.multilevel.residuals import (
+    change_rows,
     images,
     keep_outside,
+    map_groups,
     pick_columns,
     residual_block,
-    row_chunks,
 )
 from eigenshape.spectral.multilevel.start import (
     ROUNDS,
@@ -180,9 +181,12 @@ def _approximate_signature(
     lowest = from_pencil(pencil.kernel, lowest)
     decay = exponential_decay(lowest, times)
     heat = np.empty((pencil.n, len(times)))
-    for rows in row_chunks(start.tower):
+
+    def fill(rows: slice) -> None:
         part = columns[rows, : goal.k].astype(np.float64)
         heat[rows] = (part * part) @ decay
+
+    change_rows(start.tower, fill)
     errors = _errors(start.tower, columns, ritz, decay, np.ldexp(times, pencil.value_exponent))
     sizes = np.sqrt(pencil.mass_diagonal[start.order] @ heat**2)
     values = np.empty_like(heat)
@@ -237,10 +241,15 @@ def _changes(
     keep_outside(tower, columns, step)
     before, step = vectors.astype(np.float64), step.astype(np.float64)
     step /= np.sqrt((mass * step**2).sum(axis=0)) + np.finfo(np.float32).tiny
-    beside, above = np.zeros(len(sample)), np.zeros(len(sample))
-    for rows, image, _ in images(tower, step):
-        beside += (before[rows] * image).sum(axis=0)
-        above += (step[rows] * image).sum(axis=0)
+
+    def sum_rows(chunks: list[slice]) -> np.ndarray:
+        found = [
+            ((before[rows] * image).sum(axis=0), (step[rows] * image).sum(axis=0))
+            for rows, image, _ in images(tower, step, chunks)
+        ]
+        return np.sum(found, axis=0)
+
+    beside, above = np.sum(map_groups(tower, sum_rows), axis=0)
     turn = np.arctan2(2 * beside, above - values) / 2  # of the lowest Ritz vector of the two
     better = np.cos(turn) * before - np.sin(turn) * step
     fall = np.hypot((above - values) / 2, beside) - (above - values) / 2
