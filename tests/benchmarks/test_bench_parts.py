@@ -41,6 +41,15 @@ def test_parts_sum_to_the_whole_and_none_beats_its_bound(run_quick):
     assert f"| icosphere, n = 2,562, k = 40 | {rows[0]['part']} |" in text
 
 
+def test_threads_are_measured_and_give_the_same_digits(run_quick):
+    rows, _, text = run_quick("bench_threads.py")
+    assert {"spectrum", "factor", "solves", "patches", "waves", "heat"} < {
+        row["case"] for row in rows
+    }
+    assert all(seconds > 0 for row in rows for seconds in row["seconds"].values())
+    assert "| spectrum |" in text
+
+
 def test_the_operations_of_a_factor_are_counted_by_columns():
     sys.path.insert(0, str(BENCHMARKS))
     try:

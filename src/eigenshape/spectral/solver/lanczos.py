@@ -290,7 +290,7 @@ def _weigh(inner: Operator, column: Float[np.ndarray, " n"]) -> Float[np.ndarray
 
 
 def _ritz(krylov: Krylov, shift: float) -> Ritz:
-    thetas, coefficients = sl.eigh(krylov.projected, lower=False, driver="evd")
+    thetas, coefficients = sl.eigh(krylov.projected, lower=False)
     block = len(krylov.coupling)
     values = shift + 1 / np.where(thetas == 0, np.finfo(np.float64).tiny, thetas)
     rests = np.linalg.norm(krylov.coupling @ coefficients[-block:], axis=0)
