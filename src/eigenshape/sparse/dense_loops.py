@@ -42,52 +42,44 @@ def eliminate_plain(front, height, width, pivots, low):
 
 @njit
 @no_type_check
-def eliminate_blocked(front, height, width, pivots, low, times, blas):
-    """Eliminate the first columns by recursive halving, so that most work is in matrix products.
+def eliminate_blocked(front, height, width, pivots, low, times, begin, stop, alone, blas):
+    """Eliminate columns begin to stop - 1 by recursive halving, so that most work is in matrix products.
 
     The left half of a block of columns is eliminated, then updates the right half by a product.
     This loop does so in the order of the recursion: after every NARROW columns, the largest block
     of 2^k NARROW columns that is complete updates as many columns after it. At the end all columns
-    update the rest of the front. L D is written to `times`, row by row. The other arguments are
-    those of `eliminate_plain`.
+    update the rest of the front. Where this thread is not alone, the caller updates after every
+    NARROW columns. L D is written to `times`, row by row. The other arguments, and what is
+    returned, are those of `eliminate_plain`.
     """
-    for start in range(0, width, NARROW):
+    for start in range(begin, stop, NARROW):
         end = min(start + NARROW, width)
-        if not eliminate_narrow(front, height, width, pivots, low, times, start, blas):
-            return False
-        update_rows(front, height, width, times, end, end, height, blas)
-    return True
-
-
-@njit
-@no_type_check
-def eliminate_narrow(front, height, width, pivots, low, times, start, blas):
-    """Eliminate the NARROW columns from `start` on; return whether their pivots are usable."""
-    end = min(start + NARROW, width)
-    # The triangular block on the diagonal, column by column.
-    for j in range(start, end):
-        corner = j * height + j
-        pivot = front[corner]
-        if not 0.0 < abs(pivot) < np.inf:
-            return False
-        pivots[low + j] = pivot
-        front[corner] = 1.0
-        for i in range(j + 1, end):
-            row = i * height
-            share = front[row + j]
-            times[i * width + j] = share
-            front[row + j] = share / pivot
-            for k in range(j + 1, i + 1):
-                front[row + k] -= share * front[k * height + j]
-    # The rows below the triangle.
-    for i in range(end, height):
+        # The triangular block on the diagonal, column by column.
         for j in range(start, end):
-            times[i * width + j] = front[i * height + j]
-    size, corner = (height - end, end - start), start * height + start
-    solve_triangle(blas[1], size, front, corner, height, times, end * width + start, width)
-    for i in range(end, height):
-        for j in range(start, end):
-            front[i * height + j] = times[i * width + j] / pivots[low + j]
+            corner = j * height + j
+            pivot = front[corner]
+            if not 0.0 < abs(pivot) < np.inf:
+                return False
+            pivots[low + j] = pivot
+            front[corner] = 1.0
+            for i in range(j + 1, end):
+                row = i * height
+                share = front[row + j]
+                times[i * width + j] = share
+                front[row + j] = share / pivot
+                for k in range(j + 1, i + 1):
+                    front[row + k] -= share * front[k * height + j]
+        # The rows below the triangle.
+        for i in range(end, height):
+            for j in range(start, end):
+                times[i * width + j] = front[i * height + j]
+        size, corner = (height - end, end - start), start * height + start
+        solve_triangle(blas[1], size, front, corner, height, times, end * width + start, width)
+        for i in range(end, height):
+            for j in range(start, end):
+                front[i * height + j] = times[i * width + j] / pivots[low + j]
+        if alone:
+            update_rows(front, height, width, times, end, end, height, blas)
     return True
 
 

@@ -180,24 +180,32 @@ class _Making:
         """Factor the fronts of a task; return whether all pivots are usable."""
         e, room = self.elimination, self._take_room()
         begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
+        filled = self.lower, self.panels, self.pivots, self.updates, room, begin
         tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
+
+        def run(low: int, high: int, top: int, stage: int = fronts.WHOLE) -> int:
+            return int(fronts.factor_fronts(tree, *filled, low, high, top, stage, addresses()))
+
         low, top = begin, int(e.stacks[task])
-        while low < end and top >= 0:
-            if free_threads() > 1 and e.begins[low + 1] - e.begins[low] >= SHARED_HEIGHT:
-                top = fronts.gather_front(tree, self.lower, self.updates, room, begin, low, top)
-                if not self._eliminate_together(low, room):
+        for tall in [*self._shared_fronts(begin, end), end]:
+            top = run(low, tall, top)
+            if top < 0:
+                return False
+            if tall < end:
+                top = run(tall, tall + 1, top, fronts.GATHER)
+                if not self._eliminate_together(tall, room):
                     return False
-                top = fronts.keep_front(tree, self.panels, self.updates, room, low, top)
-                low += 1
-                continue
-            high = low + 1
-            while high < end and e.begins[high + 1] - e.begins[high] < SHARED_HEIGHT:
-                high += 1
-            filled = tree, self.lower, self.panels, self.pivots, self.updates
-            top = fronts.factor_fronts(*filled, room, begin, low, high, top, addresses())
-            low = high
+                top = run(tall, tall + 1, top, fronts.KEEP)
+            low = tall + 1
         self.rooms.append(room)
-        return top >= 0
+        return True
+
+    def _shared_fronts(self, begin: int, end: int) -> list[int]:
+        """Return the tall fronts of a range, if there are threads to share them."""
+        if free_threads() == 1:
+            return []
+        heights = np.diff(self.elimination.begins[begin : end + 1])
+        return (begin + np.flatnonzero(heights >= SHARED_HEIGHT)).tolist()
 
     def _eliminate_together(self, s: int, room: Room) -> bool:
         """Eliminate the columns of a front whose rows several threads update."""
@@ -206,10 +214,10 @@ class _Making:
         height, width = int(e.begins[s + 1] - e.begins[s]), int(e.first[s + 1] - e.first[s])
         shape = front, height, width
         for start in range(0, width, dense.NARROW):
-            low = int(e.first[s])
-            if not dense.eliminate_narrow(*shape, self.pivots, low, times, start, blas):
-                return False
             end = min(start + dense.NARROW, width)
+            given = self.pivots, int(e.first[s]), times, start, end, False
+            if not dense.eliminate_blocked(*shape, *given, blas):
+                return False
 
             def update(share: tuple[int, int], end: int = end) -> None:
                 dense.update_rows(*shape, times, end, end + share[0], end + share[1], blas)
