@@ -125,6 +125,24 @@ def share_units(size: int, unit: int, n: int) -> list[tuple[int, int]]:
     return list(pairwise(ends))
 
 
+class SpareMemory(Generic[R]):
+    """Memory that threads take and give back, made when none is spare."""
+
+    def __init__(self, make: Callable[[], R]) -> None:
+        self._make = make
+        self._spare: list[R] = []  # to pop and to append is one step each
+
+    @contextmanager
+    def lend(self) -> Iterator[R]:
+        """Lend memory for the length of the block."""
+        try:
+            memory = self._spare.pop()
+        except IndexError:
+            memory = self._make()
+        yield memory
+        self._spare.append(memory)
+
+
 class _SharedWork(Generic[A, R]):
     """Items that several threads take one after the other until none is left."""
 

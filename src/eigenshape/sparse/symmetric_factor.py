@@ -1,14 +1,18 @@
 """Factors L D Lᵀ of symmetric matrices that share a pattern, with pivots on the diagonal."""
 
-from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._threads import free_threads, map_in_threads, one_blas_thread, share_units
+from eigenshape._threads import (
+    SpareMemory,
+    free_threads,
+    map_in_threads,
+    one_blas_thread,
+    share_units,
+)
 from eigenshape.sparse import dense_loops as dense
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse.blas_loops import addresses
@@ -27,10 +31,10 @@ Room = tuple[Float[np.ndarray, " f"], Float[np.ndarray, " f"], Indices]
 
 @dataclass(frozen=True, eq=False)
 class Scratch:
-    """Memory for solves: the rows of all tasks, and spare room for the panels of each thread."""
+    """Memory for solves: the rows of all tasks, and for each thread rows and a panel of a front."""
 
     lanes: Float[np.ndarray, "m 8"]
-    rooms: list[tuple[Float[np.ndarray, "t 8"], Float[np.ndarray, " p"]]]
+    rooms: SpareMemory[tuple[Float[np.ndarray, "t 8"], Float[np.ndarray, " p"]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +64,11 @@ class SymmetricFactor:
         Callers that solve often keep it, but share it with no other caller: a factor is a value and
         holds no scratch memory.
         """
-        return Scratch(np.empty((int(self.elimination.tasks.own_rows[-1]), LANES)), [])
+        tallest, n_rows = self.elimination.tallest, int(self.elimination.tasks.own_rows[-1])
+        rooms = SpareMemory(
+            lambda: (np.empty((tallest, LANES)), np.empty(fronts.NEAR * fronts.WIDE))
+        )
+        return Scratch(np.empty((n_rows, LANES)), rooms)
 
     def solve_lanes(
         self, right: Float[np.ndarray, "n 8"], out: Float[np.ndarray, "n 8"], scratch: Scratch
@@ -71,39 +79,25 @@ class SymmetricFactor:
         """
         e, lanes = self.elimination, scratch.lanes
         tree, tasks = (e.order, e.first, e.begins, e.places), e.tasks
-        division = (
-            tasks.first,
-            tasks.rows,
-            tasks.own_rows,
-            tasks.fetches,
-            tasks.fetched,
-            tasks.to,
-        )
 
-        def lower(begin: int, end: int) -> None:
-            gathered, near = _take_room(scratch, e.tallest)
-            fronts.solve_lower(tree, division, self.panels, right, lanes, gathered, begin, end)
-            scratch.rooms.append((gathered, near))
+        def solve_lower(*task: int) -> None:
+            with scratch.rooms.lend() as (gathered, _):
+                given = tree, tasks.arrays, self.panels, right, lanes, gathered
+                fronts.solve_lower(*given, *task)
 
-        def upper(begin: int, end: int) -> None:
-            gathered, near = _take_room(scratch, e.tallest)
-            fronts.solve_upper(
-                tree,
-                e.rows,
-                tasks.first,
-                self.panels,
-                self.pivots,
-                lanes,
-                out,
-                gathered,
-                near,
-                begin,
-                end,
-            )
-            scratch.rooms.append((gathered, near))
+        def solve_upper(*task: int) -> None:
+            with scratch.rooms.lend() as room:
+                given = tree, e.rows, tasks.first, self.panels, self.pivots, lanes, out, *room
+                fronts.solve_upper(*given, *task)
 
-        _run_tasks(e, lower)
-        _run_tasks(e, upper, downward=True)
+        if tasks.n == 1 or free_threads() == 1:
+            solve_lower(0, tasks.n)
+            solve_upper(0, tasks.n)
+            return
+        for each in tasks.rounds:
+            map_in_threads(lambda task: solve_lower(task, task + 1), each.tolist())
+        for each in reversed(tasks.rounds):
+            map_in_threads(lambda task: solve_upper(task, task + 1), each.tolist())
 
     def rounding(self) -> Float[np.ndarray, " n"]:
         """Bound the rounding error E = A - L D Lᵀ by a diagonal: |xᵀEx| ≤ Σ r_i x_i². Return r.
@@ -125,24 +119,6 @@ class SymmetricFactor:
         return bounds
 
 
-def _take_room(
-    scratch: Scratch, tallest: int
-) -> tuple[Float[np.ndarray, "t 8"], Float[np.ndarray, " p"]]:
-    """Return spare room for the panels of one thread, or new room."""
-    with suppress(IndexError):
-        return scratch.rooms.pop()
-    return np.empty((tallest, LANES)), np.empty(fronts.NEAR * fronts.WIDE)
-
-
-def _run_tasks(e: Elimination, run: Callable[[int, int], None], *, downward: bool = False) -> None:
-    """Run a loop on all tasks, from the leaves up or from the roots down: `run(begin, end)`."""
-    if e.tasks.n == 1 or free_threads() == 1:
-        run(0, e.tasks.n)
-        return
-    for tasks in reversed(e.tasks.rounds) if downward else e.tasks.rounds:
-        map_in_threads(lambda task: run(task, task + 1), tasks.tolist())
-
-
 def factorize_symmetric(
     elimination: Elimination, data: Float[np.ndarray, " e"], spent: SymmetricFactor | None = None
 ) -> SymmetricFactor | None:
@@ -151,13 +127,17 @@ def factorize_symmetric(
     The memory of a spent factor, if one is given, is used again.
     """
     e = elimination
+    n, square = len(e.order), e.tallest**2
     making = _Making(
         elimination=e,
         lower=(e.lower_ptr, e.lower_rows, data[e.source]),
         # New memory pages cost half as much as a factorization.
         panels=np.empty(e.n_entries) if spent is None else spent.panels,
-        pivots=np.empty(len(e.order)),
+        pivots=np.empty(n),
         updates=(np.empty(e.stacks[-1]), np.empty(len(e.above), dtype=np.int64)),
+        rooms=SpareMemory(
+            lambda: (np.empty(square), np.empty(square), np.empty(n, dtype=np.int64))
+        ),
     )
     for tasks in e.tasks.rounds:
         if not all(map_in_threads(making.factor_task, tasks.tolist())):
@@ -174,17 +154,21 @@ class _Making:
     panels: Float[np.ndarray, " e"]
     pivots: Float[np.ndarray, " n"]
     updates: tuple[Float[np.ndarray, " u"], Indices]
-    rooms: list[Room] = field(default_factory=list)
+    rooms: SpareMemory[Room]
 
     def factor_task(self, task: int) -> bool:
         """Factor the fronts of a task; return whether all pivots are usable."""
-        e, room = self.elimination, self._take_room()
+        with self.rooms.lend() as room:
+            return self._factor_in(room, task)
+
+    def _factor_in(self, room: Room, task: int) -> bool:
+        e = self.elimination
         begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
-        filled = self.lower, self.panels, self.pivots, self.updates, room, begin
         tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
+        given = tree, self.lower, self.panels, self.pivots, self.updates, room, begin
 
         def run(low: int, high: int, top: int, stage: int = fronts.WHOLE) -> int:
-            return int(fronts.factor_fronts(tree, *filled, low, high, top, stage, addresses()))
+            return int(fronts.factor_fronts(*given, low, high, top, stage, addresses()))
 
         low, top = begin, int(e.stacks[task])
         for tall in [*self._shared_fronts(begin, end), end]:
@@ -197,7 +181,6 @@ class _Making:
                     return False
                 top = run(tall, tall + 1, top, fronts.KEEP)
             low = tall + 1
-        self.rooms.append(room)
         return True
 
     def _shared_fronts(self, begin: int, end: int) -> list[int]:
@@ -224,13 +207,6 @@ class _Making:
 
             map_in_threads(update, share_units(height - end, dense.TALL, free_threads()))
         return True
-
-    def _take_room(self) -> Room:
-        """Return spare memory, or new memory."""
-        with suppress(IndexError):
-            return self.rooms.pop()
-        square, n = self.elimination.tallest**2, len(self.pivots)
-        return np.empty(square), np.empty(square), np.empty(n, dtype=np.int64)
 
 
 def factor_matrix(matrix: sp.sparray) -> SymmetricFactor | None:

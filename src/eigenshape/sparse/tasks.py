@@ -46,6 +46,11 @@ class Tasks:
     to: Indices
 
     @property
+    def arrays(self) -> tuple[Indices, ...]:
+        """What compiled loops need of the tasks."""
+        return self.first, self.rows, self.own_rows, self.fetches, self.fetched, self.to
+
+    @property
     def n(self) -> int:
         """Number of tasks."""
         return len(self.first) - 1
