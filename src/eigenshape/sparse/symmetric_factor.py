@@ -48,14 +48,30 @@ class SymmetricFactor:
     def solve(
         self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None
     ) -> Float[np.ndarray, "n b"]:
-        """Solve A x = right, in the given scratch memory or in new memory."""
-        width, scratch = right.shape[1], scratch or self.scratch()
-        solution, lanes = np.empty((len(right), width)), np.zeros((len(right), LANES))
-        for start in range(0, width, LANES):
-            stop = min(start + LANES, width)
-            lanes[:, : stop - start] = right[:, start:stop]
-            self.solve_lanes(lanes, lanes, scratch)
-            solution[:, start:stop] = lanes[:, : stop - start]
+        """Solve A x = right, in the given scratch memory or in new memory.
+
+        Threads share eight right-hand sides; if there are more, each takes eight at a time.
+        """
+        solution = np.empty(right.shape)
+
+        def solve_part(start: int, memory: Scratch) -> None:
+            part = right[:, start : start + LANES]
+            lanes = np.zeros((len(right), LANES))
+            lanes[:, : part.shape[1]] = part
+            self.solve_lanes(lanes, lanes, memory)
+            solution[:, start : start + LANES] = lanes[:, : part.shape[1]]
+
+        starts = range(0, right.shape[1], LANES)
+        if len(starts) == 1:
+            solve_part(0, scratch or self.scratch())
+            return solution
+        spare = SpareMemory(self.scratch)
+
+        def solve_in_spare(start: int) -> None:
+            with spare.lend() as memory:
+                solve_part(start, memory)
+
+        map_in_threads(solve_in_spare, starts)
         return solution
 
     def scratch(self) -> Scratch:
