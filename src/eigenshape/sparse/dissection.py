@@ -1,12 +1,14 @@
 """Nested dissection of a graph: an order of elimination with few entries in the factor."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._threads import SpareMemory, free_threads, map_in_threads
 from eigenshape.sparse.dissection_loops import (
     LEAF,
     WORD,
@@ -20,6 +22,24 @@ from eigenshape.sparse.dissection_loops import (
 Indices = Int[np.ndarray, " ..."]
 # Units of distance per edge: smoothing needs values between whole edges.
 FINE = 64
+# Segments into which a graph is cut before threads share them,
+SEGMENTS_TO_SHARE = 16
+# and points of a segment that is worth a thread.
+WORTH_A_THREAD = 4000
+
+
+@dataclass(frozen=True)
+class _Segment:
+    """Points nodes[start:stop] that are still to be ordered; whether they are known to be connected."""
+
+    start: int
+    stop: int
+    connected: bool
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return self.stop - self.start
 
 
 def dissect(indptr: Indices, indices: Indices) -> Indices:
@@ -28,10 +48,10 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
     Each segment of the graph is cut in two. The key of a point is the difference of its distances,
     in edges, from two points that are far apart. Of all cuts at a value of the key, the one with
     the fewest points relative to its smaller side is taken. Small segments are ordered by minimum
-    degree.
+    degree. Threads share the segments: what becomes of one does not depend on the others.
 
-    This loop runs once per segment of some hundred points, so only the functions that it calls are
-    compiled.
+    Segments are taken one after the other, some hundred points each, so only the functions that do
+    something to all points of one are compiled.
 
     Parameters
     ----------
@@ -39,61 +59,107 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
         The neighbors of each point; the graph is symmetric.
     """
     n = len(indptr) - 1
-    nodes, place = np.arange(n), np.arange(n)  # nodes[place[v]] = v
-    owner = np.zeros(
-        n, dtype=np.int64
-    )  # the name of the segment that a point lies in; -1 when its place is final
-    one, two, queue, key = (np.empty(n, dtype=np.int64) for _ in range(4))
-    bits = np.empty(LEAF * -(-n // WORD), dtype=np.int64)
-    leaf = np.full(n, -1), np.empty(LEAF, dtype=np.int64), np.empty(LEAF, dtype=np.int64), bits
-    measure_distances = partial(breadth_first, indptr, indices)
-    waiting = [(0, n, False)]
-    name = 0
-    while waiting:
-        start, stop, connected = waiting.pop()
-        size = stop - start
-        if size <= LEAF:
-            order_leaf(indptr, indices, nodes, start, stop, owner, place, *leaf)
-            continue
-        segment = nodes[start:stop]
-        name += 1
-        owner[segment] = name
-        if not connected:
-            ends = _find_pieces(measure_distances, segment, owner, name, one, queue)
-            nodes[start:stop] = queue[:size]
-            place[segment] = np.arange(start, stop)
-            waiting += [(start + low, start + high, True) for low, high in pairwise([0, *ends])]
-            continue
-        reached = measure_distances(segment[0], owner, name, one, queue)
-        reached = measure_distances(queue[reached - 1], owner, name, one, queue)
-        measure_distances(queue[reached - 1], owner, name, two, queue)
-        key[segment] = FINE * (one[segment] - two[segment])
-        smooth_keys(indptr, indices, segment, owner, name, key, one)
-        low, high = key[segment].min(), key[segment].max()
+    dissection = _Dissection(indptr, indices)
+    waiting, name = [_Segment(0, n, False)], 1
+    # Rounds of cuts side by side, until there are segments for all threads; names may be any that
+    # are not in use.
+    while free_threads() > 1 and 0 < len(waiting) < SEGMENTS_TO_SHARE:
+        if max(segment.size for segment in waiting) < WORTH_A_THREAD:
+            break
+        named = list(zip(waiting, count(name), strict=False))
+        name += len(named)
+        waiting = [part for parts in map_in_threads(dissection.cut_named, named) for part in parts]
+    waiting.sort(key=lambda segment: -segment.size)
+    names = range(name, name + (n + 1) * len(waiting), n + 1)
+    map_in_threads(dissection.finish_named, list(zip(waiting, names, strict=True)))
+    return dissection.nodes
+
+
+class _Dissection:
+    """The order so far, and memory in which segments have places of their own."""
+
+    def __init__(self, indptr: Indices, indices: Indices) -> None:
+        n = len(indptr) - 1
+        self.graph = indptr, indices
+        self.nodes, self.place = np.arange(n), np.arange(n)  # nodes[place[v]] = v
+        # The name of the segment that a point lies in; -1 when its place is final.
+        self.owner = np.zeros(n, dtype=np.int64)
+        self.one, self.two, self.queue, self.key = (np.empty(n, dtype=np.int64) for _ in range(4))
+        bits = LEAF * -(-n // WORD)
+        self.leaf_memory = SpareMemory(
+            lambda: (
+                np.full(n, -1),
+                np.empty(LEAF, dtype=np.int64),
+                np.empty(LEAF, dtype=np.int64),
+                np.empty(bits, dtype=np.int64),
+            )
+        )
+
+    def finish_named(self, named: tuple[_Segment, int]) -> None:
+        """Order all points of a segment; names from the given one on are free."""
+        segment, name = named
+        waiting = [segment]
+        while waiting:
+            waiting += self.cut_named((waiting.pop(), name))
+            name += 1
+
+    def cut_named(self, named: tuple[_Segment, int]) -> list[_Segment]:
+        """Order a small segment, or give a large one its name and cut it; return what is left of it."""
+        segment, name = named
+        start, stop, graph = segment.start, segment.stop, self.graph
+        if segment.size <= LEAF:
+            with self.leaf_memory.lend() as memory:
+                order_leaf(*graph, self.nodes, start, stop, self.owner, self.place, *memory)
+            return []
+        points, owner = self.nodes[start:stop], self.owner
+        owner[points] = name
+        queue = self.queue[start:stop]
+        if not segment.connected:
+            measure = partial(breadth_first, *graph)
+            ends = _find_pieces(measure, points, owner, name, self.one, queue)
+            points[:] = queue
+            self.place[points] = np.arange(start, stop)
+            return [_Segment(start + low, start + high, True) for low, high in pairwise([0, *ends])]
+        numbers = self._sort_by_sides(points, name, queue)
+        if numbers is None:
+            owner[points] = -1
+            return []
+        n_first, n_cut = numbers
+        self.place[points] = np.arange(start, stop)
+        middle, cut = start + n_first, stop - n_cut
+        owner[points[segment.size - n_cut :]] = -1
+        halves = _Segment(start, middle, False), _Segment(middle, cut, False)
+        return [half for half in halves if half.size]
+
+    def _sort_by_sides(self, points: Indices, name: int, queue: Indices) -> tuple[int, int] | None:
+        """Sort a segment: below the cheapest cut, above it, on it; return the first and last number.
+
+        None where it is nearly a clique, or nothing would be left beside the cut.
+        """
+        graph, owner, key, one, two = self.graph, self.owner, self.key, self.one, self.two
+        size = len(points)
+        # A search from any point ends far away, one from there farther; the distances from both
+        # ends of that way make the key.
+        breadth_first(*graph, points[0], owner, name, one, queue)
+        breadth_first(*graph, queue[-1], owner, name, one, queue)
+        breadth_first(*graph, queue[-1], owner, name, two, queue)
+        key[points] = FINE * (one[points] - two[points])
+        smooth_keys(*graph, points, owner, name, key, one)
+        low, high = key[points].min(), key[points].max()
         counts = np.zeros((3, high - low + 2), dtype=np.int64)
-        n_joined = count_cuts(indptr, indices, segment, owner, name, key, low, *counts)
+        n_joined = count_cuts(*graph, points, owner, name, key, low, *counts)
         cut_at, above = _cheapest_cut(counts.cumsum(axis=1))
+        side = np.empty(size, dtype=np.int8)
+        take_sides(*graph, points, owner, name, key, low + cut_at, above, side)
+        n_first, _, n_cut = np.bincount(side, minlength=3).tolist()
         # If half of all pairs are joined, no order saves much, and cuts of one point each take
         # long.
         full = 2 * n_joined >= size * size
-        side = np.empty(size, dtype=np.int8)
-        level = low + cut_at
-        take_sides(indptr, indices, segment, owner, name, key, level, above, side)
-        n_first, _, n_cut = np.bincount(side, minlength=3)
         parted = n_first > 0 and n_first + n_cut < size
-        if n_cut in (0, size) or (
-            full and not parted
-        ):  # nearly a clique, or nothing is left to cut
-            owner[segment] = -1
-            continue
-        nodes[start:stop] = segment[np.argsort(side, kind="stable")]
-        place[segment] = np.arange(start, stop)
-        middle, cut = start + n_first, stop - n_cut
-        owner[nodes[cut:stop]] = -1
-        waiting += [
-            (first, last, False) for first, last in ((start, middle), (middle, cut)) if first < last
-        ]
-    return nodes
+        if n_cut in (0, size) or (full and not parted):
+            return None
+        points[:] = points[np.argsort(side, kind="stable")]
+        return n_first, n_cut
 
 
 def _find_pieces(
