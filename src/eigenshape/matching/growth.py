@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._threads import map_in_threads
 from eigenshape.matching.evidence import FittedMap
 from eigenshape.matching.fitting import fit_part, plan_fit
 from eigenshape.matching.pairs import (
@@ -23,7 +24,10 @@ from eigenshape.matching.surface import Surface, turn_over
 
 
 def first_support(part: Surface, whole: Surface, *, turned: bool) -> float:
-    """Return how far candidates by descriptors support each other, if the part is turned over or not."""
+    """Return how far candidates by descriptors support each other.
+
+    If `turned`, the part is turned over before.
+    """
     side = turn_over(part) if turned else part
     points, partners = first_candidates(descriptor_costs(patch_differences(side, whole)))
     coupling = couplings(side, whole, points, partners)
@@ -34,7 +38,7 @@ def first_support(part: Surface, whole: Surface, *, turned: bool) -> float:
 def grow_starts(
     part: Surface, whole: Surface, costs: Float[np.ndarray, "m k"], n_starts: int
 ) -> list[Pairs]:
-    """Return sets of pairs, grown from the best candidates by three slacks, given descriptor costs.
+    """Return sets of pairs, grown from the best candidates by three slacks, given costs.
 
     There are up to `n_starts` of each slack; each excludes the pairs of those before.
     """
@@ -61,8 +65,9 @@ def fitted_maps(
     """Return maps of a part that is bent onto the whole, from several starts, the best fit first."""
     starts = grow_starts(part, whole, descriptor_costs(differences), n_starts)
     plan = plan_fit(part, whole)
-    found = []
-    for pairs in starts:
+
+    def fit(pairs: Pairs) -> FittedMap:
         ends = place_points(part, whole, pairs, part.points)[0]
-        found.append(FittedMap(pairs, fit_part(plan, ends)))
-    return sorted(found, key=lambda one: one.fit.misfit)
+        return FittedMap(pairs, fit_part(plan, ends))
+
+    return sorted(map_in_threads(fit, starts), key=lambda one: one.fit.misfit)
