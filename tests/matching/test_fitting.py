@@ -67,7 +67,7 @@ def test_the_fit_does_not_depend_on_how_the_part_lies_in_space(surfaces):
 
 def test_a_part_of_four_points_has_a_fit():
     grid = describe_surface(es.shapes.grid(1, 1), 1.2, 300)
-    fit = fit_part(plan_fit(grid, grid), np.arange(4))
+    fit = fit_part(plan_fit(grid, grid), grid.points)
     assert fit.places.tolist() == [0, 1, 2, 3]
     assert fit.misfit < 1e-6
 
