@@ -32,11 +32,9 @@ def functional_map(pair: Pair, landmarks: np.ndarray) -> np.ndarray:
 
     meshes = [TriMesh(np.array(m.vertices), np.array(m.faces)) for m in (pair.whole, pair.part)]
     model = FunctionalMapping(*meshes)
-    model.preprocess(
-        n_ev=(N_FIRST, N_FIRST), n_descr=100, descr_type="WKS", landmarks=landmarks, k_process=160
-    )
-    model.fit(w_descr=1e0, w_lap=1e-2, w_dcomm=1e-1, w_orient=0, verbose=False)
-    model.zoomout_refine(nit=N_STEPS, step=STEP, verbose=False)
+    model.preprocess(landmarks=landmarks)
+    model.fit(K=(N_FIRST, N_FIRST))
+    model.zoomout_refine(nit=N_STEPS, step=STEP)
     return np.asarray(model.get_p2p())
 
 
