@@ -6,7 +6,7 @@ from each_creature import KINDS
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import enclosed_volume, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.orientation import orient_outward
+from eigenshape.geometry.orientation import orient_outward, outward_vote
 from eigenshape.geometry.repair import repair
 from eigenshape.geometry.repair_steps import orient
 from eigenshape.geometry.union import disjoint_union
@@ -56,8 +56,16 @@ def test_neither_rotation_nor_unit_matters():
         require_out(TriangleMesh(scan.vertices * scale, scan.faces))
 
 
+def test_the_vote_is_near_one_where_the_hull_is_the_surface_and_changes_its_sign():
+    ball = icosphere(3)
+    assert 0.99 < outward_vote(ball) <= 1 + 1e-12
+    assert outward_vote(everted(ball)) == pytest.approx(-outward_vote(ball))
+    assert 0.3 < outward_vote(torus()) < 1
+
+
 def test_what_is_flat_has_no_outside():
     flat = grid(3, 3)
+    assert outward_vote(flat) == 0
     assert orient_outward(flat) is flat
     assert orient_outward(everted(flat)).faces.tolist() == everted(flat).faces.tolist()
 

@@ -62,15 +62,19 @@ def orient_outward(mesh: MeshLike) -> TriangleMesh:
     """
     mesh = as_mesh(mesh)
     require_oriented(mesh)
+    return mesh if outward_vote(mesh) >= 0 else TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def outward_vote(mesh: TriangleMesh) -> float:
+    """Return how far normals agree with those of the convex hull, -1 to 1; 0 for a flat surface."""
     points, _ = scale_to_unit(mesh)
     try:
         hull = ConvexHull(points)
     except QhullError:
-        return mesh
+        return 0.0
     areas = np.linalg.norm(area_vectors(points[hull.simplices]), axis=1)
-    sums = mean_normals(mesh)[hull.simplices].sum(axis=1)
-    vote = areas @ np.einsum("fi,fi->f", sums, hull.equations[:, :3])
-    return mesh if vote >= 0 else TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    means = mean_normals(mesh)[hull.simplices].mean(axis=1)
+    return float(areas @ np.einsum("fi,fi->f", means, hull.equations[:, :3]) / areas.sum())
 
 
 def orient_closed_outward(mesh: TriangleMesh) -> TriangleMesh:

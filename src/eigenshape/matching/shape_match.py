@@ -30,14 +30,15 @@ class ShapeMatch:
     confidence : (n,) float
         Probability, 0 to 1, that the point is less than 0.05 √area of the whole from the true one,
         along the surface. 0 on pieces that are too small to be matched.
-    evidence : (n, 10) float
-        Numbers from which the confidence is computed by logistic regression; 0 where there are
-        none: local orientation, misfit of distances, distance to the next matched point, distance to
-        where other starts put the vertex, local stretch, weight of the nearest patch, its difference from
-        that of its image; and orientation, support and mean difference of the whole map.
+    evidence : (n, 12) float
+        Numbers from which the confidence is computed by logistic regression; 0 where there are none:
+        local orientation, misfit of distances, distance to the next matched point, distance to where
+        other starts put the vertex, local stretch, gap that is left after bending, weight of the
+        nearest patch, its difference from that of its image; and of the whole map orientation,
+        support, mean difference, and the logarithm of the gap after bending times the root of strain.
     score : float
         How good the whole map is, 0 to 1: orientation × coverage² × support of pairs × likeness⁴ of
-        patches. Of several maps of one part, the one with the highest score is taken.
+        patches. Of several scales the one with the highest score is taken.
     orientation : float
         Share of the part's area that the map keeps, minus the share that it turns over.
     coverage : float

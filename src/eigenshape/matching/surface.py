@@ -13,14 +13,14 @@ from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.smoothing import denoise
-from eigenshape.retrieval.patches.codebook import BASES, default_codebook, whiten_numbers
+from eigenshape.retrieval.patches.codebook import BASES, default_codebook, standardize
 from eigenshape.retrieval.patches.patch_loops import (
     HEIGHT_BINS,
     RING_NUMBERS,
     RINGS,
     TURN_BINS,
 )
-from eigenshape.retrieval.patches.patches import RADII, Patches, describe_discs, whole_shares
+from eigenshape.retrieval.patches.patches import RADII, describe_discs, whole_shares
 
 # The unit of length, in roots of the area of the whole. Patches are described in sides of a box,
 # which for animals is about 1.2 roots of the area; the box itself changes with the pose, from 0.7
@@ -30,13 +30,22 @@ MATCHED_RADII = RADII[list(BASES)]  # of the discs that are compared, in units
 
 
 @dataclass(frozen=True, eq=False)
+class View:
+    """Points of a whole, by number, that one viewpoint sees, and their whitened discs there."""
+
+    points: Int[np.ndarray, " q"]
+    numbers: Float32[np.ndarray, "q r d"]
+    weights: Float32[np.ndarray, "q r"]
+
+
+@dataclass(frozen=True, eq=False)
 class Surface:
     """A mesh in the unit of the whole, and m of its vertices with what matching compares.
 
     `distances` are from the points to all vertices, `columns` the same as rows of vertices, and
     `between` from point to point. `ways` holds the direction at each point (row) of the shortest
     path to each other one, as a complex number of modulus 1 at most in a tangent frame; it is
-    shorter where several paths are about as short.
+    shorter where several paths are about as short. `views` are what viewpoints see of a whole.
     """
 
     mesh: TriangleMesh
@@ -51,6 +60,7 @@ class Surface:
     turned_numbers: Float32[np.ndarray, "m r d"]
     between: Float32[np.ndarray, "m m"]
     ways: Complex64[np.ndarray, "m m"]
+    views: tuple[View, ...] = ()
 
     @property
     def area(self) -> float:
@@ -73,7 +83,7 @@ def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
     weights = whole_shares(mesh, rows, MATCHED_RADII)
     distances = rows.astype(np.float32)
     between = np.ascontiguousarray(distances[:, chosen])
-    patches = Patches(numbers, weights.astype(np.float32), chosen, between)
+    weights = weights.astype(np.float32)
     return Surface(
         mesh,
         areas,
@@ -82,9 +92,9 @@ def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
         distances,
         np.ascontiguousarray(distances.T),
         nearest,
-        _whiten(patches),
-        patches.weights,
-        _whiten(replace(patches, numbers=_turned_numbers(numbers))),
+        whiten_discs(numbers),
+        weights,
+        whiten_discs(_turned_numbers(numbers)),
         between,
         _directions(mesh, chosen, rows, normals),
     )
@@ -104,10 +114,14 @@ def turn_over(surface: Surface) -> Surface:
     )
 
 
-def _whiten(patches: Patches) -> Float32[np.ndarray, "m r d"]:
+def whiten_discs(numbers: Float32[np.ndarray, "m r c"]) -> Float32[np.ndarray, "m r d"]:
     """Whiten the numbers at each radius by the codebook that comes with the library."""
     codebook = default_codebook()
-    rows = [whiten_numbers(patches, place, codebook, place) for place in range(len(BASES))]
+    rows = []
+    for place in range(len(BASES)):
+        at_radius = numbers[:, place].astype(np.float64)
+        scaled = standardize(at_radius, codebook.means[place], codebook.spreads[place])
+        rows.append(scaled @ codebook.axes[place])
     return np.stack(rows, axis=1).astype(np.float32)
 
 

@@ -1,0 +1,228 @@
+"""A part bent onto a whole: from the map, then to nearest points. What is left tells good from bad.
+
+The part is carried by rigid frames at its points (embedded deformation, Sumner, Schmid and Pauly
+2007) that stay alike between neighbors (Sorkine and Alexa 2007), and is drawn to the nearest points
+of the whole that face the same way (non-rigid registration, compare Li, Sumner and Pauly 2008).
+A wrong map needs strong bending and stays far from the whole, so that few wrong ones pass.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial import cKDTree
+
+from eigenshape.matching.match_loops import nearest_rows
+from eigenshape.matching.surface import Surface
+
+N_LINKS = 6  # nearest points that a frame stays alike to
+N_CARRIERS = 4  # frames that carry a vertex
+MOST_SAMPLES = 1000  # vertices that are drawn to the whole; all are carried
+# How much neighboring frames resist, beside a pull of 1 in all: ever less, so that large moves come
+# first. Three times more or less changed no error by more than 0.2.
+STIFFNESS = (1.0, 0.3, 0.1, 0.05, 0.03, 0.02, 0.02, 0.02, 0.02, 0.02)
+N_GIVEN = 2  # steps towards where the map places vertices; later ones are towards nearest points
+N_FIRST, N_NEXT = 12, 2  # turns of the frames in the first step, and in each later one
+SIZES = 0.8, 1.25  # least and most stretch of a frame that costs nothing
+FACING = 0.08  # length, in units, that a difference of normals counts for
+SOFT = 0.03  # units from the whole at which the pull on a point is halved
+ALONG = 0.5  # share of a step along the surface; the rest is towards its plane
+FARTHEST = 0.2  # units: longer gaps say no more
+TINY = np.finfo(float).tiny
+
+
+@dataclass(frozen=True, eq=False)
+class FitPlan:
+    """What fits of one part on one whole share: samples, frames and the whole as a tree.
+
+    Row s of `shares` (samples × frames) says how far each frame carries a sample; `carriers` and
+    `portions` say the same of every vertex. Edges go from frame `one` to `two`, both ways.
+    """
+
+    part: Surface
+    whole: Surface
+    tree: cKDTree
+    samples: Int[np.ndarray, " s"]
+    pull: Float[np.ndarray, " s"]
+    carriers: Int[np.ndarray, "n c"]
+    portions: Float[np.ndarray, "n c"]
+    shares: sp.csr_array
+    one: Int[np.ndarray, " e"]
+    two: Int[np.ndarray, " e"]
+    gather: sp.csr_array
+    graph: Float[np.ndarray, "m m"]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A part bent onto a whole.
+
+    `places` are the nearest vertices of the whole, `gaps` how far vertices stay from there, in
+    units, with their normals. `misfit` is the mean gap times the root of the strain.
+    """
+
+    places: Int[np.ndarray, " n"]
+    gaps: Float[np.ndarray, " n"]
+    misfit: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Pose:
+    """Where the frames are: a matrix (a rotation times a size) and a place for each."""
+
+    turns: Float[np.ndarray, "m 3 3"]
+    places: Float[np.ndarray, "m 3"]
+
+
+def plan_fit(part: Surface, whole: Surface) -> FitPlan:
+    """Prepare to bend a part onto a whole."""
+    n, m = part.mesh.n_vertices, len(part.points)
+    samples = np.unique(np.linspace(0, n - 1, min(n, MOST_SAMPLES)).astype(np.int64))
+    carriers, portions = _carriers(part)
+    rows = np.repeat(np.arange(len(samples)), carriers.shape[1])
+    entries = portions[samples].ravel(), (rows, carriers[samples].ravel())
+    near = np.argsort(part.between, axis=1, kind="stable")[:, 1 : N_LINKS + 1]
+    starts, ends = np.repeat(np.arange(m), near.shape[1]), near.ravel()
+    one, two = np.concatenate([starts, ends]), np.concatenate([ends, starts])
+    ones = np.full(len(one), 2 / len(one))  # each edge is there both ways
+    links = sp.coo_array((ones, (one, two)), shape=(m, m)).toarray()
+    areas = part.areas[samples]
+    return FitPlan(
+        part,
+        whole,
+        cKDTree(np.hstack([whole.mesh.vertices, FACING * whole.normals])),
+        samples,
+        areas / areas.sum(),
+        carriers,
+        portions,
+        sp.coo_array(entries, shape=(len(samples), m)).tocsr(),
+        one,
+        two,
+        sp.coo_array((ones, (one, np.arange(len(one)))), shape=(m, len(one))).tocsr(),
+        np.diag(links.sum(axis=1)) - links,
+    )
+
+
+def _carriers(part: Surface) -> tuple[Int[np.ndarray, "n c"], Float[np.ndarray, "n c"]]:
+    """Return the nearest frames of each vertex, and how far each carries it."""
+    count = min(N_CARRIERS, len(part.points) - 1)
+    found = nearest_rows(part.distances, count + 1)
+    lengths = np.take_along_axis(part.distances.T, found, axis=1).astype(np.float64)
+    # A frame lets go of a vertex that is as far from it as from the next frame.
+    portions = np.maximum(1 - lengths[:, :-1] / np.maximum(lengths[:, -1:], TINY), 1e-4) ** 2
+    return found[:, :-1], portions / portions.sum(axis=1, keepdims=True)
+
+
+def fit_part(plan: FitPlan, ends: Int[np.ndarray, " m"]) -> Fit:
+    """Bend a part, given the vertices of the whole where its points lie by a map."""
+    # Each sample goes where the frames that carry it go.
+    targets = plan.shares @ plan.whole.mesh.vertices[ends]
+    pose = _lay_down(plan, targets)
+    pull = plan.pull
+    for step, stiffness in enumerate(STIFFNESS):
+        if step >= N_GIVEN:
+            targets, pull = _nearest_targets(plan, pose)
+        pose = _bend(plan, pose, targets, pull, stiffness, N_FIRST if step == 0 else N_NEXT)
+    points, normals = _carry(plan, pose, np.arange(plan.part.mesh.n_vertices))
+    gaps, found = plan.tree.query(np.hstack([points, FACING * normals]))
+    gaps = np.minimum(gaps, FARTHEST)
+    areas = plan.part.areas
+    return Fit(found, gaps, float(areas @ gaps / areas.sum() * np.sqrt(_strain(plan, pose))))
+
+
+def _lay_down(plan: FitPlan, targets: Float[np.ndarray, "s 3"]) -> _Pose:
+    """Return the rigid motion that brings samples nearest to their targets (Kabsch 1976)."""
+    points = plan.part.mesh.vertices[plan.samples]
+    pull = plan.pull
+    middle, target = pull @ points, pull @ targets
+    turn = _rotations((((targets - target) * pull[:, None]).T @ (points - middle))[None])[0][0]
+    frames = plan.part.mesh.vertices[plan.part.points]
+    turns = np.repeat(turn[None], len(frames), axis=0)
+    return _Pose(turns, target + (frames - middle) @ turn.T)
+
+
+def _rotations(
+    products: Float[np.ndarray, "m 3 3"],
+) -> tuple[Float[np.ndarray, "m 3 3"], Float[np.ndarray, " m"]]:
+    """Return the rotation nearest to each matrix, and its inner product with it."""
+    left, values, right = np.linalg.svd(products)
+    side = np.sign(np.linalg.det(left @ right))
+    left[:, :, 2] *= side[:, None]
+    return left @ right, values[:, 0] + values[:, 1] + side * values[:, 2]
+
+
+def _bend(
+    plan: FitPlan,
+    pose: _Pose,
+    targets: Float[np.ndarray, "s 3"],
+    pull: Float[np.ndarray, " s"],
+    stiffness: float,
+    rounds: int,
+) -> _Pose:
+    """Move frames so that samples come nearer to their targets, and turn frames to follow."""
+    pulled = sp.csr_array(plan.shares * pull[:, None])
+    matrix = (pulled.T @ plan.shares).toarray() + stiffness * plan.graph
+    matrix[np.diag_indices_from(matrix)] += 1e-9 / len(matrix)  # of frames that nothing pulls
+    factor = cho_factor(matrix)
+    frames = plan.part.mesh.vertices[plan.part.points]
+    arms = frames[plan.two] - frames[plan.one]
+    squares = plan.gather @ (arms**2).sum(axis=1)
+    turns, places = pose.turns, pose.places
+    for _ in range(rounds):
+        carried = _offsets(plan, turns, plan.samples)
+        between = 0.5 * (turns[plan.one] + turns[plan.two])
+        turned = np.einsum("eij,ej->ei", between, arms)
+        right = pulled.T @ (targets - carried) - stiffness * (plan.gather @ turned)
+        places = cho_solve(factor, right)
+        moved = places[plan.two] - places[plan.one]
+        products = plan.gather @ (moved[:, :, None] * arms[:, None, :]).reshape(-1, 9)
+        turns, sums = _rotations(products.reshape(-1, 3, 3))
+        turns = turns * np.clip(sums / np.maximum(squares, TINY), *SIZES)[:, None, None]
+    return _Pose(turns, places)
+
+
+def _offsets(
+    plan: FitPlan, turns: Float[np.ndarray, "m 3 3"], vertices: Int[np.ndarray, " v"]
+) -> Float[np.ndarray, "v 3"]:
+    """Return mean offsets of vertices from the frames that carry them, as the frames turn."""
+    mesh, carriers = plan.part.mesh, plan.carriers[vertices]
+    arms = mesh.vertices[vertices][:, None] - mesh.vertices[plan.part.points[carriers]]
+    turned = np.einsum("vcij,vcj->vci", turns[carriers], arms)
+    return np.einsum("vc,vci->vi", plan.portions[vertices], turned)
+
+
+def _carry(
+    plan: FitPlan, pose: _Pose, vertices: Int[np.ndarray, " v"]
+) -> tuple[Float[np.ndarray, "v 3"], Float[np.ndarray, "v 3"]]:
+    """Return where the frames carry vertices, and their normals there."""
+    carriers, portions = plan.carriers[vertices], plan.portions[vertices]
+    centers = np.einsum("vc,vci->vi", portions, pose.places[carriers])
+    turns = np.einsum("vc,vcij->vij", portions, pose.turns[carriers])
+    normals = np.einsum("vij,vj->vi", turns, plan.part.normals[vertices])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
+    return centers + _offsets(plan, pose.turns, vertices), normals
+
+
+def _nearest_targets(
+    plan: FitPlan, pose: _Pose
+) -> tuple[Float[np.ndarray, "s 3"], Float[np.ndarray, " s"]]:
+    """Return the nearest points of the whole that face the same way, and how strong they pull."""
+    points, normals = _carry(plan, pose, plan.samples)
+    nearest = plan.tree.query(np.hstack([points, FACING * normals]))[1]
+    planes = plan.whole.normals[nearest]
+    steps = plan.whole.mesh.vertices[nearest] - points
+    flat = np.einsum("si,si->s", steps, planes)[:, None] * planes
+    away = (steps**2).sum(axis=1)
+    facing = np.clip(np.einsum("si,si->s", normals, planes), 0, 1)
+    return points + flat + ALONG * (steps - flat), plan.pull * facing / (1 + away / SOFT**2)
+
+
+def _strain(plan: FitPlan, pose: _Pose) -> float:
+    """Return how far edges are from what their frames make of them, as a share of squares."""
+    frames = plan.part.mesh.vertices[plan.part.points]
+    arms = frames[plan.two] - frames[plan.one]
+    moved = pose.places[plan.two] - pose.places[plan.one]
+    wrong = np.einsum("eij,ej->ei", pose.turns[plan.one], arms) - moved
+    return float((wrong**2).sum() / max(float((arms**2).sum()), TINY))

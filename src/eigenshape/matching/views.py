@@ -1,0 +1,47 @@
+"""The points of a whole as single viewpoints see them: discs that end where the view ends."""
+
+from functools import partial
+
+import numpy as np
+from jaxtyping import Int
+
+from eigenshape._threads import map_in_threads
+from eigenshape.geometry.geodesic import geodesic_waves
+from eigenshape.geometry.measure import mean_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import dual_volumes
+from eigenshape.geometry.topology import is_closed
+from eigenshape.matching.surface import MATCHED_RADII, View, whiten_discs
+from eigenshape.retrieval.patches.patches import describe_discs, whole_shares
+from eigenshape.scans.partial import view_of
+
+# Viewpoints around a whole. With them, the five most similar points hold the right one for 0.50 of
+# the points of scans, without for 0.37 (46 hard pairs of the tuning half); six views reach 0.46.
+N_VIEWS = 8
+
+
+def describe_views(mesh: TriangleMesh, points: Int[np.ndarray, " m"]) -> tuple[View, ...]:
+    """Describe those of some vertices that each viewpoint sees; an open mesh has no views."""
+    if not is_closed(mesh):
+        return ()
+    views = map_in_threads(
+        lambda job: job(), [partial(_describe_view, mesh, points, k) for k in range(N_VIEWS)]
+    )
+    return tuple(view for view in views if len(view.points))
+
+
+def _describe_view(mesh: TriangleMesh, points: Int[np.ndarray, " m"], number: int) -> View:
+    part = view_of(mesh, number)
+    places = np.full(mesh.n_vertices, -1)
+    places[part.source_vertices] = np.arange(part.mesh.n_vertices)
+    seen = np.flatnonzero(places[points] >= 0)
+    chosen = places[points[seen]]
+    wave = geodesic_waves(part.mesh)
+    reach = float(MATCHED_RADII[-1])
+    rows = np.empty((len(chosen), part.mesh.n_vertices))
+    for row, vertex in zip(rows, chosen.tolist(), strict=True):
+        row[:] = wave(vertex, reach)
+    normals, areas = mean_normals(part.mesh), dual_volumes(part.mesh)
+    numbers = describe_discs(part.mesh, chosen, rows, MATCHED_RADII, normals, areas)
+    weights = whole_shares(part.mesh, rows, MATCHED_RADII).astype(np.float32)
+    return View(seen, whiten_discs(numbers), weights)
