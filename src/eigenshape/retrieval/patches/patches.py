@@ -23,7 +23,12 @@ from eigenshape.geometry.requirements import require_describable, require_orient
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, is_closed, submesh
 from eigenshape.operators.smoothing import denoise
-from eigenshape.retrieval.patches.patch_loops import NUMBERS, RINGS, describe_disc
+from eigenshape.retrieval.patches.patch_loops import (
+    BUCKETS,
+    NUMBERS,
+    RINGS,
+    describe_discs_of,
+)
 from eigenshape.scans.depth_camera import simulate_scan
 from eigenshape.scans.partial import view_of, viewpoint
 
@@ -216,12 +221,14 @@ def describe_discs(
     """
     numbers = np.empty((len(points), len(radii), NUMBERS), dtype=np.float32)
     surface = mesh.vertices, normals, areas
-    scratch = np.empty(RINGS), np.empty(RINGS)
+    scratch = (
+        np.empty(mesh.n_vertices, dtype=np.int64),
+        np.empty(BUCKETS + 1, dtype=np.int64),
+        np.empty(RINGS),
+        np.empty(RINGS),
+    )
     for point, distances, discs in zip(points, rows, numbers, strict=True):
-        reached = np.flatnonzero(distances <= radii[-1])
-        order = reached[np.argsort(distances[reached], kind="stable")]
-        for radius, found in zip(radii, discs, strict=True):
-            describe_disc(distances, mesh.vertices[point], order, surface, radius, *scratch, found)
+        describe_discs_of(distances, mesh.vertices[point], surface, radii, scratch, discs)
     return numbers
 
 
