@@ -1,7 +1,7 @@
 """eigenshape spectrum: the lowest eigenvalues of a shape by any operator, with their proof."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -170,7 +170,7 @@ def spectrum(
         "form": form,
         "distance": distance,
     }
-    options = {name: value for name, value in given.items() if value is not None}
+    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if correct == "none":
         options["correct"] = None
     found = steps.load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
