@@ -102,7 +102,7 @@ def _may_collapse(
     while corner >= 0:
         if alive[corner // 3]:
             one, two = faces[corner // 3, (corner + 1) % 3], faces[corner // 3, (corner + 2) % 3]
-            if one == kept or two == kept:
+            if kept in (one, two):
                 n_shared += 1
             elif marks[one, 0] == mark and marks[two, 0] == mark:
                 return False  # this face would lie on another one

@@ -38,9 +38,9 @@ N_SAMPLES = 150  # points of a surface; time and stored bytes grow with their sq
 # description and 6 KB in the index.
 N_VIEWS = 6
 RADII = 0.05 * 1.25 ** np.arange(1, 10)  # of the discs, in sides of the box
-# Vertices above which a surface is thinned out first. A description of so many takes 4 CPU seconds
+# Vertices above which a surface is thinned out first. A description of so many takes 5 CPU seconds
 # with six views, and of a million 300 otherwise; what the discs measure hardly changes.
-MOST_VERTICES = 25_000
+MOST_VERTICES = 30_000
 # A disc nearer to a boundary than this share of its radius weighs less, since part of it is cut
 # off, but never less than LEAST_WEIGHT of a whole one.
 AT_BOUNDARY = 0.5
@@ -103,7 +103,7 @@ def extract_patches(
     that ring over that of a flat disc; and the mean ratio of straight to geodesic distance.
 
     Components whose area is less than that of a point are left out (`fragment_vertices`). A surface
-    of more than 25,000 vertices is thinned out to fewer first: short edges collapse, and topology
+    of more than 30,000 vertices is thinned out to fewer first: short edges collapse, and topology
     stays. The points are vertices of the surface that was given.
 
     Parameters
