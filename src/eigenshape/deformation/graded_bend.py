@@ -49,7 +49,7 @@ def bend_uncrossed(binding: Binding, handles: Sequence[Handle]) -> Float[np.ndar
         If faces cross that did not cross before, with the number of pairs and the first pair.
     """
     mesh = binding.rig.mesh
-    before = {tuple(pair) for pair in self_intersections(mesh).tolist()}
+    before: set[tuple[int, ...]] | None = None
     best, crossing = mesh.vertices, list[list[int]]()
     for strength in (0.0, *PULLS, np.inf):
         if np.isinf(strength):
@@ -57,6 +57,10 @@ def bend_uncrossed(binding: Binding, handles: Sequence[Handle]) -> Float[np.ndar
         else:
             found = bend_graded(pull_binding(binding, strength) if strength else binding, handles)
         pairs = self_intersections(TriangleMesh(found, mesh.faces)).tolist()
+        if not pairs:
+            return found
+        if before is None:  # what crosses at rest matters only if something crosses now
+            before = {tuple(pair) for pair in self_intersections(mesh).tolist()}
         new = [pair for pair in pairs if tuple(pair) not in before]
         if not strength or len(new) < len(crossing):
             best, crossing = found, new
