@@ -31,7 +31,7 @@ LEAST_CONTRAST = 1e-9
 SMOOTHNESS = 1e-3
 # Share of the depth of a region, or of the rest if that is less deep, up to which vertices on
 # either side of the boundary are free. Of 0.3, 0.5 and 0.7, on scenes of experiments/ch6_deformation
-# at 2,000 to 6,000 vertices: 0.3 changes edge errors little, 0.5 divides them by 1.3 to 1.9 on seven
+# at 2,000 to 6,000 vertices: 0.3 changes edge errors little, 0.5 divides them by 1.3 to 1.8 on six
 # of eight, 0.7 by more, but then little of a region follows its handle exactly.
 FREE_DEPTH = 0.5
 

@@ -39,7 +39,7 @@ N_SAMPLES = 150  # points of a surface; time and stored bytes grow with their sq
 N_VIEWS = 6
 RADII = 0.05 * 1.25 ** np.arange(1, 10)  # of the discs, in sides of the box
 # Vertices above which a surface is thinned out first. A description of so many takes 5 CPU seconds
-# with six views, and of a million 300 otherwise; what the discs measure hardly changes.
+# with six views, and of a million 270 otherwise; what the discs measure hardly changes.
 MOST_VERTICES = 30_000
 # A disc nearer to a boundary than this share of its radius weighs less, since part of it is cut
 # off, but never less than LEAST_WEIGHT of a whole one.
