@@ -58,8 +58,9 @@ SURFACES: dict[str, Build] = {
     "mesh, geodesic": lambda mesh: es.mesh_laplacian(mesh, correct="log", distance="geodesic"),
 }
 POINTS: dict[str, Build] = {
-    "point cloud": lambda mesh: es.point_cloud_laplacian(
-        es.PointCloud(mesh.points, mesh.dim), correct="log"
+    "point cloud": lambda mesh: es.point_cloud_laplacian(es.PointCloud(mesh.points, mesh.dim)),
+    "point cloud, literal": lambda mesh: es.point_cloud_laplacian(
+        es.PointCloud(mesh.points, mesh.dim), edge_factor=2, correct=None, form="literal"
     ),
 }
 CLOSED = LINEAR | {"P2": es.operators.fem_laplacian} | SURFACES | KERNELS | POINTS

@@ -35,7 +35,7 @@ def operators(mesh: es.TriangleMesh, t: float) -> dict[str, es.Laplacian]:
     found[CORRECTED] = es.mesh_laplacian(mesh, t=t, correct="log")
     found[RANDOM_WALK] = es.mesh_laplacian(mesh, t=t, correct="log", form="random-walk")
     found["points, corrected"] = es.point_cloud_laplacian(
-        es.PointCloud(mesh.vertices, 2), t=t, correct="log"
+        es.PointCloud(mesh.vertices, 2), t=t, correct="log", form="literal"
     )
     found["graph of points"] = es.operators.gaussian_laplacian(mesh.vertices, t, 2)
     return found

@@ -40,9 +40,9 @@ from .io.mesh_files import write_mesh as write_mesh
 from .io.shape_files import read_shape as read_shape
 from .matching.match import match_shapes as match_shapes
 from .operators.catalog import build_laplacian as build_laplacian
+from .operators.cloud_kernel import point_cloud_laplacian as point_cloud_laplacian
 from .operators.cotangent import cotangent_laplacian as cotangent_laplacian
 from .operators.gaussian import mesh_laplacian as mesh_laplacian
-from .operators.gaussian import point_cloud_laplacian as point_cloud_laplacian
 from .operators.laplacian import Laplacian as Laplacian
 from .operators.robust import robust_laplacian as robust_laplacian
 from .plot.fields import figure_field as figure_field

@@ -89,10 +89,11 @@ def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
     assert not bent.exists()
     run("deform", finer, "--edits", edits, "--edits-mesh", giraffe, "-o", bent)
     moved = np.linalg.norm(read_mesh(bent).vertices - read_mesh(finer).vertices, axis=1)
-    # The middle of the head moves as one; its rim follows the neck.
-    assert np.median(moved[head]) == pytest.approx(0.05, rel=1e-6)
+    # What is deep in the head moves as one; the rest of it follows the neck.
+    assert np.median(moved[head]) == pytest.approx(0.05, rel=0.02)
+    assert np.isclose(moved[head], 0.05, rtol=1e-6).sum() > len(head) / 4
     new = moved[mesh.vertices.shape[0] :]
-    assert np.isclose(new, 0.05, rtol=1e-6).sum() > len(head)
+    assert np.isclose(new, 0.05, rtol=1e-6).sum() > len(head) / 2
     assert np.median(moved) < 1e-3
     alone = " ".join(
         run(

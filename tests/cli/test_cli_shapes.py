@@ -94,6 +94,13 @@ def test_spectra_by_other_operators(folder):
     np.testing.assert_allclose(points["eigenvalues"], [0, 2, 2, 2], rtol=0.03, atol=1e-9)
     assert points["operator"] == "point-cloud"
     assert points["edge_factor"] == 1.8
+    usual, thesis = (
+        run_json("spectrum", folder / "sphere.xyz", "-k", 4, *options)
+        for options in ((), ("--correct", "none", "--form", "literal"))
+    )
+    np.testing.assert_allclose(usual["eigenvalues"], [0, 2, 2, 2], rtol=0.03, atol=1e-9)
+    assert (thesis["correct"], thesis["form"]) == (None, "literal")
+    assert thesis["eigenvalues"][3] < 0.99 * usual["eigenvalues"][3]  # the bias of the kernel
     tufted = run_json(
         "spectrum", folder / "sphere.xyz", "-k", 4, "--operator", "robust", "--n-neighbors", 20
     )

@@ -3,8 +3,8 @@ import pytest
 from bent_shapes import lump_rig, tube, tube_rig
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.deformation.binding import bind
-from eigenshape.deformation.deform import deform
+from eigenshape.deformation.binding import FREE_DEPTH, bind
+from eigenshape.deformation.deform import bend, deform
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.geometry.mesh import TriangleMesh
@@ -39,8 +39,45 @@ def test_shares_are_one_deep_inside_and_nought_far_away():
     assert (shares[ROW <= 20] < 0.05).all()
     assert (shares[TOP] > 0.5).all()
     assert (shares[~TOP] < 0.5).all()
-    held = np.setdiff1d(np.arange(len(shares)), binding.part.free)
-    np.testing.assert_array_equal(held, np.flatnonzero((shares == 0) | (shares == 1)))
+    # Held is what has a share of 0 or 1, but for what is near the boundary of the region.
+    (distance,) = binding.distances
+    depth = min(distance[TOP].max(), distance[~TOP].max())
+    sure = (shares == 0) | (shares == 1)
+    np.testing.assert_array_equal(binding.held, sure & (distance >= FREE_DEPTH * depth))
+    assert not binding.held[binding.part.free].any()
+
+
+def test_in_each_component_something_of_region_and_rest_is_held():
+    """A region may have only the tip of a component, or nearly all of it."""
+    one, two = icosphere(2), icosphere(2)
+    mesh = disjoint_union(one, TriangleMesh(0.3 * two.vertices + [5.0, 0, 0], two.faces))
+    z = mesh.vertices[:, 2]
+    small = np.arange(mesh.n_vertices) >= one.n_vertices
+    for height in (0.25, -0.25, 0.0):
+        region = np.where(small, z > height, z > 0.2)
+        binding = bind(rig_shape(mesh), [region])
+        (shares,) = binding.shares
+        sure = (shares == 0) | (shares == 1)
+        sides = [region & small, ~region & small, region & ~small, ~region & ~small]
+        for side in sides:
+            assert (binding.held & side).any() == (sure & side).any()
+        assert sum((sure & side).any() for side in sides) >= 3
+
+
+def test_half_of_the_depth_of_a_region_is_free_on_both_sides():
+    binding = bind(tube_rig(), [TOP])
+    (distance,) = binding.distances
+    depth = distance[TOP].max()  # the rest is deeper
+    assert depth < distance[~TOP].max()
+    assert not binding.held[distance < FREE_DEPTH * depth].any()
+    (shares,) = binding.shares
+    far = (distance > depth) & ((shares == 0) | (shares == 1))
+    assert far.any()
+    assert binding.held[far].all()
+    moved = bend(binding, [Rotation([0, 0, 0], [0, 0, 1], 0.5)]).vertices
+    rest = tube_rig().mesh.vertices
+    stays = binding.held & ~TOP
+    np.testing.assert_array_equal(moved[stays], rest[stays])
 
 
 def test_what_is_fixed_stays_and_the_rest_is_free():

@@ -14,8 +14,10 @@ from eigenshape.features.segmentation import FeaturePoints, Segmentation, adjace
 from eigenshape.geometry.facets import facet_components, facet_table
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.subdivision import subdivide
 from eigenshape.geometry.topology import edge_table, face_pairs, submesh
 from eigenshape.geometry.union import disjoint_union
+from eigenshape.operators.anisotropic import curvature_tensors
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere
@@ -196,11 +198,37 @@ def test_a_ragged_boundary_becomes_straight():
     assert smooth.features is ragged.features
 
 
+def network_of(mesh):
+    tensors = curvature_tensors(mesh, boundaries.CONCAVITY, concave=True)
+    return boundaries._build_network(mesh, tensors)
+
+
+def test_a_coarse_cut_that_is_refined_costs_hardly_more(monkeypatch):
+    mesh = subdivide(make_creature("quadruped", n_vertices=3000))
+    parts = find_parts(mesh)
+    raw = segment(parts.tree, n_regions=len(parts.parts.features.vertices))
+    network = network_of(mesh)
+
+    def cost(labels):
+        return network.costs[labels[network.pairs[:, 0]] != labels[network.pairs[:, 1]]].sum()
+
+    exact = smooth_boundaries(mesh, raw).labels
+    monkeypatch.setattr(boundaries, "MOST_FACES", 1000)
+    monkeypatch.setattr(boundaries, "N_CELLS", 800)
+    refined = smooth_boundaries(mesh, raw).labels
+    assert cost(refined) <= 1.03 * cost(exact)
+    assert cost(exact) < 0.5 * cost(raw.labels)
+    assert np.mean(refined != exact) < 0.05
+    # Nothing is free in bands that are as narrow as their cells allow.
+    monkeypatch.setattr(boundaries, "CELLS_AROUND", 1000)
+    np.testing.assert_array_equal(smooth_boundaries(mesh, raw).labels, exact)
+
+
 def test_no_cut_in_the_band_costs_less():
     mesh = dumbbell()
     before = two_halves(mesh, 0.25)
     after = smooth_boundaries(mesh, before).labels
-    network = boundaries._build_network(mesh)
+    network = network_of(mesh)
 
     def cost(labels):
         return network.costs[labels[network.pairs[:, 0]] != labels[network.pairs[:, 1]]].sum()

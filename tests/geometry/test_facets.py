@@ -1,6 +1,9 @@
+import pickle
+
 import numpy as np
 import pytest
 
+from eigenshape.geometry.facet_lists import list_facets
 from eigenshape.geometry.facets import (
     boundary_facets,
     boundary_surface,
@@ -51,8 +54,8 @@ def test_a_facet_lies_opposite_to_its_corner(mesh):
 @pytest.mark.parametrize("mesh", [interval(4), grid(3, 2), box(2, 2, 2)])
 def test_facets_of_huge_meshes_are_sorted_as_rows(mesh, monkeypatch):
     packed = facet_table(mesh)
-    monkeypatch.setattr("eigenshape.geometry.facets.PACKED_BELOW", 0)
-    rows = facet_table(mesh)
+    monkeypatch.setattr("eigenshape.geometry.facet_lists.PACKED_BELOW", 0)
+    rows = list_facets(mesh.simplices, mesh.n_points)
     np.testing.assert_array_equal(rows.facets, packed.facets)
     np.testing.assert_array_equal(rows.simplex_facets, packed.simplex_facets)
     np.testing.assert_array_equal(rows.n_simplices, packed.n_simplices)
@@ -101,3 +104,14 @@ def test_vertices_of_the_boundary_are_its_points_in_order():
     solid = ball(3)
     surface, points = boundary_surface(solid), boundary_vertices(solid)
     np.testing.assert_array_equal(surface.vertices, solid.points[points])
+
+
+@pytest.mark.parametrize("mesh", [icosphere(1), box(1, 1, 1)])
+def test_facets_are_listed_once_for_each_mesh_and_are_read_only(mesh):
+    table = facet_table(mesh)
+    assert facet_table(mesh) is table
+    with pytest.raises(ValueError, match="read-only"):
+        table.n_simplices[0] = 7
+    copy = pickle.loads(pickle.dumps(mesh))
+    assert "facets" not in vars(copy)  # which would make the pickle larger
+    np.testing.assert_array_equal(facet_table(copy).facets, table.facets)

@@ -22,10 +22,11 @@ from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.boundary import dirichlet_laplacian
+from eigenshape.operators.cloud_kernel import point_cloud_laplacian
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
-from eigenshape.operators.gaussian import gaussian_laplacian, mesh_laplacian, point_cloud_laplacian
+from eigenshape.operators.gaussian import gaussian_laplacian, mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.kernel import neighbor_distance
 from eigenshape.operators.laplacian import Laplacian
@@ -243,7 +244,18 @@ TABLE = [
         (cloud,),
         DEFAULT_PROMISES - {"union"},
     ),
-    Row("point cloud", point_cloud_laplacian, (cloud,), DEFAULT_PROMISES | {"nonnegative_weights"}),
+    Row(
+        "point cloud",  # its default width depends on the volume of the whole
+        point_cloud_laplacian,
+        (cloud,),
+        (DEFAULT_PROMISES - {"union"}) | {"nonnegative_weights"},
+    ),
+    Row(
+        "point cloud, thesis",
+        partial(point_cloud_laplacian, edge_factor=2, correct=None, form="literal"),
+        (cloud,),
+        DEFAULT_PROMISES | {"nonnegative_weights"},
+    ),
     Row("connection", connection_laplacian, (surface,), VECTORS),
     Row(
         "connection consistent",

@@ -614,6 +614,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "measure_perturbation": lambda v: es.stability.measure_perturbation(v.ball, v.ball),
     "point_cloud_laplacian": lambda v: es.point_cloud_laplacian(v.cloud),
     "point_map": lambda v: es.spectral.point_map(v.map),
+    "cloud_width": lambda v: es.operators.cloud_width(v.cloud),
     "pointwise_time": lambda v: es.operators.pointwise_time(v.many),
     "poisson_solver": lambda v: es.calculus.poisson_solver(v.laplacian, fixed=[0, 9]),
     "polyharmonic_matrix": lambda v: es.calculus.polyharmonic_matrix(v.laplacian, 3),

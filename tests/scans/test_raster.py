@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from eigenshape.scans import raster as module
 from eigenshape.scans.raster import rasterize
 from eigenshape.shapes.surfaces import icosphere
 
@@ -59,12 +58,38 @@ def test_the_nearer_face_is_seen(order):
     assert set(faces[seen.face[:, 2:]].ravel().tolist()) <= {4, 5, 6, 7}
 
 
-@pytest.mark.parametrize("chunk", [1, 7, 2_000_000])
-def test_of_equal_heights_the_lower_face_is_seen(monkeypatch, chunk):
-    monkeypatch.setattr(module, "CANDIDATES_AT_ONCE", chunk)
+def test_of_equal_heights_the_lower_face_is_seen():
     points = np.concatenate([square(0, 0, 4, 4)] * 3)
     seen = rasterize(points, np.concatenate([QUAD + 8, QUAD, QUAD + 4]), 4, 4)
     assert set(seen.face.ravel().tolist()) == {0, 1}
+
+
+def buffer_of_all_pixels(points, faces, width, height):
+    """Test every pixel against every face, in NumPy."""
+    y, x = np.indices((height, width)) + 0.5
+    depth, face = np.full((height, width), -np.inf), np.full((height, width), -1)
+    for number, (a, b, c) in enumerate(points[faces]):
+        u, v = b - a, c - a
+        area = u[0] * v[1] - u[1] * v[0]
+        if area == 0:
+            continue
+        one = (v[1] * (x - a[0]) - v[0] * (y - a[1])) / area
+        two = (u[0] * (y - a[1]) - u[1] * (x - a[0])) / area
+        there = a[2] + one * u[2] + two * v[2]
+        inside = (one >= 0) & (two >= 0) & (one + two <= 1) & (there > depth)
+        depth[inside], face[inside] = there[inside], number
+    return depth, face
+
+
+@pytest.mark.parametrize(("width", "height", "scale"), [(40, 30, 15.0), (25, 50, 40.0)])
+def test_the_picture_is_that_of_a_search_of_all_pixels(width, height, scale):
+    rng = np.random.default_rng(4)
+    points = rng.random((90, 3)) * scale  # at the larger scale faces end beyond the picture
+    faces = rng.integers(0, 90, (60, 3))
+    seen = rasterize(points, faces, width, height)
+    depth, face = buffer_of_all_pixels(points, faces, width, height)
+    np.testing.assert_array_equal(seen.face, face)
+    np.testing.assert_allclose(seen.depth, depth, rtol=1e-9)
 
 
 def test_a_sphere_has_no_pinholes():

@@ -1,7 +1,7 @@
 """eigenshape spectrum: the lowest eigenvalues of a shape by any operator, with their proof."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -19,7 +19,7 @@ from eigenshape.cli.inputs import (
     UpOption,
     ViewOption,
 )
-from eigenshape.operators.choices import OPERATOR_NAMES, Condition, Correction, Distance, Form, Mass
+from eigenshape.operators.choices import OPERATOR_NAMES, Condition, Distance, Form, Mass
 
 USUAL = 20  # pairs
 ORDERS = {"p2": 2, "p3": 3}
@@ -89,7 +89,10 @@ def spectrum(
         float | None, typer.Option(help="Instead of --t: width of the kernel in mean edge lengths.")
     ] = None,
     correct: Annotated[
-        Correction | None, typer.Option(help="Correct the bias of a kernel operator.")
+        Literal["log", "none"] | None,
+        typer.Option(
+            help="Whether to correct the bias of a kernel operator: by default on points, not on meshes."
+        ),
     ] = None,
     form: Annotated[
         Form | None,
@@ -167,7 +170,9 @@ def spectrum(
         "form": form,
         "distance": distance,
     }
-    options = {name: value for name, value in given.items() if value is not None}
+    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    if correct == "none":
+        options["correct"] = None
     found = steps.load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
     steps.require_drawable(found, eigenfunctions)
     bounded = steps.require_bracketable(found) if brackets else None

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from eigenshape._arrays import finite_values, freeze, whole_number
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
-from eigenshape.features.boundaries import CONCAVITY, smooth_boundaries
+from eigenshape.features.boundaries import CONCAVITY, move_boundaries
 from eigenshape.features.contrast import contrast_at
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.region_tree import PartTree
@@ -147,10 +147,13 @@ def find_parts(
     mesh = as_mesh(mesh)
     (fineness,) = finite_values(level, "level")
     outward = orient_closed_outward(mesh)
-    spectrum = part_spectrum(outward, n_modes=n_modes, progress=progress)
+    require_describable(outward)
+    tensors = curvature_tensors(outward, CONCAVITY, concave=True)
+    spectrum = _solve_parts(outward, tensors, n_modes, progress)
     tree = part_tree(outward, spectrum)
     heat = heat_kernel_signature(spectrum, [SEED_TIME * float(spectrum.mass.sum())])[:, 0]
-    parts = smooth_boundaries(outward, segment(tree, persistence=contrast_at(float(fineness))))
+    rough = segment(tree, persistence=contrast_at(float(fineness)))
+    parts = move_boundaries(outward, rough, tensors)
     return PartDecomposition(outward, spectrum, freeze(heat), tree, parts)
 
 
@@ -203,10 +206,21 @@ def part_spectrum(
     """
     mesh = as_mesh(mesh)
     require_describable(mesh)
+    tensors = curvature_tensors(mesh, CONCAVITY, concave=True)
+    return _solve_parts(mesh, tensors, n_modes, progress)
+
+
+def _solve_parts(
+    mesh: TriangleMesh,
+    tensors: Float[np.ndarray, "f 3 3"],
+    n_modes: int,
+    progress: Progress | None,
+) -> Spectrum:
+    """Return the spectrum of `part_spectrum` by the conductivity tensors of the faces."""
     fragments = fragment_vertices(mesh)
     _, labels = vertex_components(mesh)
     n_components = len(np.unique(np.delete(labels, fragments)))
     wanted = whole_number(n_modes, "n_modes", 2) + n_components
-    laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
+    laplacian = anisotropic_laplacian(mesh, tensors)
     n_pairs = min(wanted, mesh.n_vertices - len(fragments))
     return solve_spectrum(laplacian, n_pairs, fixed=fragments, progress=progress)

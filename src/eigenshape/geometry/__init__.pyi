@@ -13,7 +13,7 @@ from .curvature import gaussian_curvature as gaussian_curvature
 from .curvature import principal_curvatures as principal_curvatures
 from .enclosing_ball import EnclosingBall as EnclosingBall
 from .enclosing_ball import enclosing_ball as enclosing_ball
-from .facets import FacetTable as FacetTable
+from .facet_lists import FacetTable as FacetTable
 from .facets import boundary_surface as boundary_surface
 from .facets import facet_table as facet_table
 from .geodesic import farthest_points as farthest_points

@@ -1,62 +1,16 @@
 """The facets of a mesh, and the components that are connected through facets."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.facet_lists import FacetTable
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
-
-# The corners of a facet are packed into one integer while that stays below this bound: sorting
-# integers is several times as fast as sorting rows.
-PACKED_BELOW = 2**63
-
-
-@dataclass(frozen=True, eq=False)
-class FacetTable:
-    """The facets of a mesh without duplicates, and where each simplex has them.
-
-    The facets of triangles are edges, those of tetrahedra are triangles, those of segments are
-    their end points.
-
-    Attributes
-    ----------
-    facets : (q, m) int
-        Corners of each facet, ascending; the facets are in lexicographic order.
-    simplex_facets : (s, m+1) int
-        Facet of each simplex opposite to its corner 0, 1, ..., m.
-    n_simplices : (q,) int
-        Number of simplices at each facet: 1 on the boundary, 2 inside, more where the mesh is not
-        a manifold.
-
-    Examples
-    --------
-    The facets of a curve are its points:
-
-    >>> import eigenshape as es
-    >>> curve = es.SimplicialMesh([[0.0], [1.0], [2.0]], [[0, 1], [1, 2]])
-    >>> es.geometry.facet_table(curve).n_simplices
-    array([1, 2, 1])
-    """
-
-    facets: Int[np.ndarray, "q m"]
-    simplex_facets: Int[np.ndarray, "s corners"]
-    n_simplices: Int[np.ndarray, " q"]
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
-
-    @property
-    def boundary(self) -> Int[np.ndarray, " b"]:
-        """Indices of the facets that belong to one simplex only, ascending."""
-        return np.flatnonzero(self.n_simplices == 1)
 
 
 def facet_table(mesh: MeshLike) -> FacetTable:
@@ -87,20 +41,7 @@ def facet_table(mesh: MeshLike) -> FacetTable:
     >>> len(table.facets), table.facets[table.n_simplices == 2].tolist()
     (7, [[0, 1, 2]])
     """
-    mesh = as_simplicial(mesh)
-    corners = np.arange(mesh.dim + 1)
-    opposite = np.array([np.delete(corners, corner) for corner in corners])
-    # One row for each corner of a facet, one column for each facet: those opposite to corner 0 of
-    # all simplices first, then those opposite to corner 1, and so on.
-    ends = np.sort(mesh.simplices.T[opposite], axis=1).swapaxes(0, 1).reshape(mesh.dim, -1)
-    if mesh.n_points**mesh.dim < PACKED_BELOW:
-        shape = (mesh.n_points,) * mesh.dim
-        packed = np.ravel_multi_index(tuple(ends), shape)
-        keys, inverse, counts = np.unique(packed, return_inverse=True, return_counts=True)
-        facets = np.stack(np.unravel_index(keys, shape), axis=1)
-    else:
-        facets, inverse, counts = np.unique(ends.T, axis=0, return_inverse=True, return_counts=True)
-    return FacetTable(facets, inverse.reshape(mesh.dim + 1, -1).T, counts)
+    return as_simplicial(mesh).facets
 
 
 def boundary_facets(mesh: Mesh) -> Int[np.ndarray, "b m"]:

@@ -22,9 +22,9 @@ SOURCES_PER_TASK = 256
 # Waves over all vertices for which a task has room at a time.
 WAVES_OF_ROOM = 2
 
-# Where the triangles at each vertex start, their other two corners, and three lengths of each.
+# Where the triangles at each vertex start, their other two corners, and seven lengths of each.
 Fans = tuple[
-    Int[np.ndarray, " n1"], Int[np.ndarray, " k"], Int[np.ndarray, " k"], Float[np.ndarray, "k 3"]
+    Int[np.ndarray, " n1"], Int[np.ndarray, " k"], Int[np.ndarray, " k"], Float[np.ndarray, "k 7"]
 ]
 
 
@@ -333,17 +333,34 @@ def _scratch(fans: Fans, n_sources: int) -> tuple[np.ndarray, ...]:
 
 
 def _fans(mesh: Mesh, corners: Float[np.ndarray, "f 3 d"]) -> Fans:
-    """List the triangles at each vertex: where they start, their other two corners, three lengths.
+    """List the triangles at each vertex: where they start, their other two corners, seven lengths.
 
-    The lengths of a triangle are those from the vertex to each other corner and between these two.
+    The lengths of a triangle are those from the vertex to each other corner and between these two,
+    and the places of both corners (`_place`), which every wave would compute anew.
     """
     turns = [np.roll(np.arange(3), -turn) for turn in range(3)]
     triples = np.concatenate([mesh.simplices[:, turn] for turn in turns])
     a, b, c = corners.transpose(1, 0, 2)
     ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     sides = (ab, ca, bc), (bc, ab, ca), (ca, bc, ab)  # as seen from a, b and c
-    lengths = [np.column_stack(three) for three in sides]
+    lengths = [
+        np.column_stack([one, two, across, *_place(two, one, across), *_place(one, two, across)])
+        for one, two, across in sides
+    ]
     order = np.argsort(triples[:, 0], kind="stable")
     starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
     one, two = (np.ascontiguousarray(triples[order, place]) for place in (1, 2))
     return starts, one, two, np.concatenate(lengths)[order]
+
+
+def _place(
+    edge: Float[np.ndarray, " f"], left: Float[np.ndarray, " f"], right: Float[np.ndarray, " f"]
+) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, " f"]]:
+    """Return where the third corners of triangles are, along an edge and away from it.
+
+    `left` and `right` are the distances of the corner from the first and the other end of the edge.
+    Where an edge has no length, no wave passes through it, and the place is not used.
+    """
+    length = np.where(edge > 0, edge, 1)
+    along = (left * left - right * right + edge * edge) / (2 * length)
+    return along, np.sqrt(np.maximum(left * left - along * along, 0))

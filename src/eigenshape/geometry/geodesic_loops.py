@@ -14,19 +14,17 @@ FRONT = -1  # stands for the source of a vertex that a straight front of several
 
 @njit
 @no_type_check
-def through_edge(near, far, length, left, right):
+def through_edge(near, far, length, corner_x, corner_y):
     """Return the distance of a triangle's third corner from a source beyond the opposite edge.
 
     `near` and `far` are the distances of the edge's ends from the source, which is unfolded into
-    the plane of the triangle. `left` and `right` are the distances of the third corner from the
-    same ends. The distance is infinite if the straight line misses the edge.
+    the plane of the triangle. The third corner is at `corner_x` along the edge, from the near end,
+    and `corner_y` away from it. The distance is infinite if the straight line misses the edge.
     """
     if length == 0.0:  # both ends are one point, and the wave walks around it along the other edges
         return np.inf
     x = (near * near - far * far + length * length) / (2 * length)
     y = np.sqrt(max(near * near - x * x, 0.0))
-    corner_x = (left * left - right * right + length * length) / (2 * length)
-    corner_y = np.sqrt(max(left * left - corner_x * corner_x, 0.0))
     depth = y + corner_y
     if depth == 0.0:
         return np.inf
@@ -38,7 +36,7 @@ def through_edge(near, far, length, left, right):
 
 @njit
 @no_type_check
-def across_edge(near, far, length, left, right):
+def across_edge(near, far, length, corner_x, corner_y):
     """Return the distance of the third corner from a straight front (Kimmel and Sethian 1998).
 
     The arguments are those of `through_edge`. A front is straight if both ends of the edge are
@@ -47,8 +45,6 @@ def across_edge(near, far, length, left, right):
     if length == 0.0:
         return np.inf
     climb = (far - near) / length
-    corner_x = (left * left - right * right + length * length) / (2 * length)
-    corner_y = np.sqrt(max(left * left - corner_x * corner_x, 0.0))
     steep = np.sqrt(max(1.0 - climb * climb, 0.0))
     if steep == 0.0:
         return np.inf
@@ -64,8 +60,9 @@ def spread_wave(fans, radius, sources, scratch, reached, distances):
     """Fill the vertices within `radius` of some sources and their distances; return their number.
 
     `fans` holds `starts`, `first_corner`, `second_corner` and `sides`. Entries starts[v] to
-    starts[v + 1] are the triangles at vertex v: their other two corners, and the lengths from v to
-    each of these and between them.
+    starts[v + 1] are the triangles at vertex v: their other two corners, and seven lengths: from v
+    to each of these, between them, and the place of either as `through_edge` takes it, in
+    coordinates along the edge from v to the other one and away from it.
 
     `scratch` holds, for each vertex: its distance (infinite on entry and on return), whether it is
     settled (False on entry and on return), its source, and a list of the vertices that were
@@ -100,15 +97,21 @@ def spread_wave(fans, radius, sources, scratch, reached, distances):
         for entry in range(starts[vertex], starts[vertex + 1]):
             corner, other = first_corner[entry], second_corner[entry]
             to_corner, to_other = sides[entry, 0], sides[entry, 1]
+            x, y, other_x, other_y = (
+                sides[entry, 3],
+                sides[entry, 4],
+                sides[entry, 5],
+                sides[entry, 6],
+            )
             for _ in range(2):
                 if not settled[corner]:
                     arrival, origin = key + to_corner, sender[vertex]
                     if settled[other]:
-                        far, across = distance[other], sides[entry, 2]
+                        far = distance[other]
                         if origin == sender[other] and origin != FRONT:
-                            flat = through_edge(key, far, to_other, to_corner, across)
+                            flat = through_edge(key, far, to_other, x, y)
                         else:
-                            flat = across_edge(key, far, to_other, to_corner, across)
+                            flat = across_edge(key, far, to_other, x, y)
                             if flat < arrival:
                                 origin = FRONT
                         arrival = min(arrival, flat)
@@ -123,6 +126,7 @@ def spread_wave(fans, radius, sources, scratch, reached, distances):
                 # The second turn is about the other corner.
                 corner, other = other, corner
                 to_corner, to_other = to_other, to_corner
+                x, y, other_x, other_y = other_x, other_y, x, y
     for i in range(n_touched):
         distance[touched[i]] = np.inf
         settled[touched[i]] = False

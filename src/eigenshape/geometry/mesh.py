@@ -1,6 +1,8 @@
 """Triangle meshes: arrays that are checked once and then read-only."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -9,6 +11,7 @@ from eigenshape._arrays import finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
+from eigenshape.geometry.facet_lists import FacetTable, list_facets
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -97,6 +100,15 @@ class TriangleMesh:
     def dim(self) -> int:
         """Dimension of a surface, 2."""
         return 2
+
+    @cached_property
+    def facets(self) -> FacetTable:
+        """The facets of the simplices, as `facet_table` returns them: listed once for each mesh."""
+        return list_facets(self.faces, len(self.points))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The facets would make a pickle three times as large; the next process lists them again.
+        return {name: value for name, value in vars(self).items() if name != "facets"}
 
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"

@@ -4,6 +4,8 @@ from .boundary import dirichlet_laplacian as dirichlet_laplacian
 from .catalog import OPERATORS as OPERATORS
 from .catalog import Operator as Operator
 from .catalog import build_laplacian as build_laplacian
+from .cloud_kernel import cloud_width as cloud_width
+from .cloud_kernel import point_cloud_laplacian as point_cloud_laplacian
 from .cloud_triangles import local_triangles as local_triangles
 from .connection import connection_laplacian as connection_laplacian
 from .connection import tangent_frames as tangent_frames
@@ -16,7 +18,6 @@ from .fem import fem_nodes as fem_nodes
 from .gaussian import functional_laplacian as functional_laplacian
 from .gaussian import gaussian_laplacian as gaussian_laplacian
 from .gaussian import mesh_laplacian as mesh_laplacian
-from .gaussian import point_cloud_laplacian as point_cloud_laplacian
 from .gaussian import pointwise_time as pointwise_time
 from .gaussian import quadrature_laplacian as quadrature_laplacian
 from .graph import edge_graph as edge_graph

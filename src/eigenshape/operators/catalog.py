@@ -13,9 +13,10 @@ from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.operators.cloud_kernel import point_cloud_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_laplacian
-from eigenshape.operators.gaussian import mesh_laplacian, point_cloud_laplacian
+from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.robust import robust_laplacian

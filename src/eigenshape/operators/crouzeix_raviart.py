@@ -11,7 +11,8 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.facets import FacetTable, facet_table
+from eigenshape.geometry.facet_lists import FacetTable
+from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import (
     in_length,

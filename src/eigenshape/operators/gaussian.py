@@ -2,18 +2,15 @@
 
 from dataclasses import replace
 from math import gamma
-from typing import Literal, TypedDict, Unpack
+from typing import Literal
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
-from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.quadrature import Quadrature, mesh_quadrature, uniform_quadrature
 from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
@@ -32,20 +29,11 @@ from eigenshape.operators.kernel import (
     warn_of_narrow,
 )
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.operators.neighbors import neighbor_graph
 
 # t of the pointwise rule over e R on a surface: of 0.1, 0.2, 0.3, 0.5 and 0.8 the best for L f on
 # random points of the sphere. On even and noisy ones 0.2 is better by up to 1.5 times
 # (experiments/ch2_pointwise).
 POINTWISE = 0.3
-
-
-class KernelChoice(TypedDict, total=False):
-    """Further options of a kernel, as in `mesh_laplacian`."""
-
-    correct: Correction | None
-    form: Form
-    cutoff: float
 
 
 def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the method leaves open
@@ -330,72 +318,6 @@ def quadrature_laplacian(
     kernel = choose_kernel(KernelOptions(t=t, correct=correct, form=form, cutoff=cutoff), edge)
     warn_of_narrow(kernel)
     return kernel_laplacian(measure, kernel)
-
-
-def point_cloud_laplacian(
-    cloud: PointCloud,
-    *,
-    t: float | None = None,
-    h: float | None = None,
-    edge_factor: float | None = None,
-    **options: Unpack[KernelChoice],
-) -> Laplacian:
-    """Build the Laplacian of points that sample a manifold, evenly or not.
-
-    This is the operator of `mesh_laplacian`, with the volume around each point taken from its
-    Voronoi cell in the tangent plane (`es.geometry.cloud_quadrature`; after Belkin, Sun, Wang
-    2009).
-
-    Parameters
-    ----------
-    cloud : PointCloud
-    t, h, edge_factor : float, optional
-        As in `mesh_laplacian`; e is the mean distance of a point to its m(m+1) nearest neighbors.
-    **options
-        `correct`, `form` and `cutoff` as in `mesh_laplacian`.
-
-    Returns
-    -------
-    Laplacian
-        W in length^(m-2), B in length^m.
-
-    Raises
-    ------
-    InvalidParameterError
-        If more than one scale is given, one is not positive, or h < e.
-    InvalidShapeError
-        If two points are equal, the neighbors of a point do not span m dimensions, the kernel graph
-        has more components than the graph of nearest neighbors, or the matrix needs more than half
-        of the memory.
-
-    Warns
-    -----
-    UserWarning
-        If h < 1.5 e, or t is so large that fewer than ten eigenvalues can be distinguished.
-
-    See Also
-    --------
-    mesh_laplacian : The same kernel on meshes.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> cloud = es.PointCloud(es.shapes.fibonacci_sphere(1000).vertices, dim=2)
-    >>> laplacian = es.point_cloud_laplacian(cloud, correct="log")
-    >>> es.solve_spectrum(laplacian, 4).eigenvalues.round(1).tolist()
-    [0.0, 2.0, 2.0, 2.0]
-    """
-    require_type(cloud, PointCloud, "cloud")
-    measure = cloud_quadrature(cloud)
-    near = cloud.dim * (cloud.dim + 1)
-    chosen = KernelOptions(t=t, h=h, edge_factor=edge_factor, **options)
-    kernel = choose_kernel(chosen, neighbor_distance(cloud.points, cloud.dim))
-    warn_of_narrow(kernel)
-    warn_of_few(measure, kernel)
-    laplacian = kernel_laplacian(measure, kernel)
-    joined = neighbor_graph(cloud.points, min(near, cloud.n_points - 1))
-    require_whole(laplacian, connected_components(joined, directed=False)[1], kernel)
-    return laplacian
 
 
 def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) -> LinearOperator:

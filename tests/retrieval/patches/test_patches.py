@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import eigenshape as es
+from eigenshape.retrieval.patches import patch_loops
+from eigenshape.retrieval.patches import patches as patches_module
 from eigenshape.retrieval.patches.patch_loops import HEIGHT_BINS, NUMBERS, RING_NUMBERS, TURN_BINS
 from eigenshape.retrieval.patches.patches import RADII, extract_patches, surface_patches
 from eigenshape.scans.partial import viewpoint
@@ -149,3 +151,39 @@ def test_a_closed_shape_is_also_described_as_a_depth_camera_sees_it():
     assert len(extract_patches(part, n_samples=40, n_views=1, n_frames=2)) == 1
     with pytest.raises(es.InvalidParameterError, match="n_frames must be at least 0; it is -1"):
         extract_patches(ball, n_frames=-1)
+
+
+def test_vertices_are_sorted_by_distance_and_equals_by_index():
+    rng = np.random.default_rng(2)
+    cases = [
+        rng.random(700),
+        np.round(rng.random(700), 1),  # many equals
+        np.where(rng.random(700) < 0.5, np.inf, 0.01 * rng.random(700)),  # one bucket
+        np.zeros(5),
+    ]
+    for distances in cases:
+        order = np.empty(len(distances), dtype=np.int64)
+        starts = np.empty(patch_loops.BUCKETS + 1, dtype=np.int64)
+        total = patch_loops.sort_by_distance(distances, 0.6, order, starts)
+        near = np.flatnonzero(distances <= 0.6)
+        expected = near[np.argsort(distances[near], kind="stable")]
+        np.testing.assert_array_equal(order[:total], expected)
+
+
+def test_a_large_surface_is_described_by_a_thin_one(monkeypatch):
+    coarse = es.make_creature("giraffe", n_vertices=2000)
+    fine = es.geometry.subdivide(es.geometry.subdivide(coarse))  # 32,000 vertices
+    assert fine.n_vertices > patches_module.MOST_VERTICES
+    found = es.describe(fine)
+    # Points are vertices of the surface that was given, on all sides of it.
+    points = fine.vertices[found.vertices]
+    box = np.ptp(fine.vertices, axis=0)
+    assert (np.ptp(points, axis=0) > 0.9 * box).all()
+    others = [es.describe(es.make_creature(kind, n_vertices=2000)) for kind in ("bird", "lizard")]
+    own, *rest = es.retrieval.patch_scores(found, [es.describe(coarse), *others])
+    assert own < 0.1
+    assert own < 0.3 * min(rest)
+    monkeypatch.setattr(patches_module, "MOST_VERTICES", fine.n_vertices)
+    whole = es.retrieval.patch_descriptor(extract_patches(fine, n_views=0), found.recipe)
+    thin = es.retrieval.patch_descriptor(extract_patches(coarse, n_views=0), found.recipe)
+    assert es.retrieval.patch_scores(whole, [thin])[0] < 0.1

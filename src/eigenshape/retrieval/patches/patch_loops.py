@@ -13,7 +13,60 @@ HEIGHT_BINS = 6  # bins of the height above the point, in radii, -1 to 1
 RING_NUMBERS = TURN_BINS + HEIGHT_BINS + 2
 NUMBERS = RINGS * RING_NUMBERS
 INNER = 0.35  # share of the radius in which the disc's normal is averaged
+BUCKETS = 512  # of distances, before they are sorted
 LEAST_AREA = 1e-3  # share of a flat disc's area, added before the logarithm
+
+
+@njit
+@no_type_check
+def describe_discs_of(distances, center, surface, radii, scratch, found):
+    """Write the NUMBERS of the discs around one point, a row for each of the ascending radii.
+
+    `surface` holds the points, normals and areas of all vertices. `scratch` holds vertices, as many
+    as there are, BUCKETS + 1 starts, and twice RINGS numbers.
+    """
+    order, starts, kept, straight = scratch
+    n_near = sort_by_distance(distances, radii[-1], order, starts)
+    for row in range(len(radii)):
+        describe_disc(
+            distances, center, order[:n_near], surface, radii[row], kept, straight, found[row]
+        )
+
+
+@njit
+@no_type_check
+def sort_by_distance(distances, reach, order, starts):
+    """Write the vertices within reach by distance, equals by index, and return their number.
+
+    Vertices are put into buckets of equal width first. Then few are out of place, and insertion
+    takes a fifth of the time of a sort of all.
+    """
+    for bucket in range(BUCKETS + 1):
+        starts[bucket] = 0
+    for i in range(len(distances)):
+        if distances[i] <= reach:
+            starts[_bucket(distances[i], reach) + 1] += 1
+    for bucket in range(BUCKETS):
+        starts[bucket + 1] += starts[bucket]
+    total = starts[BUCKETS]
+    for i in range(len(distances)):
+        if distances[i] <= reach:
+            bucket = _bucket(distances[i], reach)
+            order[starts[bucket]] = i
+            starts[bucket] += 1
+    for first in range(1, total):
+        vertex, place = order[first], first
+        while place and distances[order[place - 1]] > distances[vertex]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = vertex
+    return total
+
+
+@njit
+@no_type_check
+def _bucket(distance, reach):
+    return min(int(distance / reach * BUCKETS), BUCKETS - 1)
 
 
 @njit

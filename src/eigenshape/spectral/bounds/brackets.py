@@ -12,7 +12,8 @@ from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.facets import FacetTable, facet_components, facet_table, without_pinches
+from eigenshape.geometry.facet_lists import FacetTable
+from eigenshape.geometry.facets import facet_components, facet_table, without_pinches
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh

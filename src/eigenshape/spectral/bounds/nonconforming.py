@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import ConvergenceError
 from eigenshape._progress import Progress
-from eigenshape.geometry.facets import FacetTable
+from eigenshape.geometry.facet_lists import FacetTable
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.crouzeix_raviart import (

@@ -1,0 +1,72 @@
+"""The facets of simplices without duplicates, and where each simplex has them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+
+from eigenshape._arrays import freeze
+from eigenshape._text import html_repr, short_repr
+
+# The corners of a facet are packed into one integer while that stays below this bound: sorting
+# integers is several times as fast as sorting rows.
+PACKED_BELOW = 2**63
+
+
+@dataclass(frozen=True, eq=False)
+class FacetTable:
+    """The facets of a mesh without duplicates, and where each simplex has them.
+
+    The facets of triangles are edges, those of tetrahedra are triangles, those of segments are
+    their end points.
+
+    Attributes
+    ----------
+    facets : (q, m) int
+        Corners of each facet, ascending; the facets are in lexicographic order.
+    simplex_facets : (s, m+1) int
+        Facet of each simplex opposite to its corner 0, 1, ..., m.
+    n_simplices : (q,) int
+        Number of simplices at each facet: 1 on the boundary, 2 inside, more where the mesh is not
+        a manifold.
+
+    Examples
+    --------
+    The facets of a curve are its points:
+
+    >>> import eigenshape as es
+    >>> curve = es.SimplicialMesh([[0.0], [1.0], [2.0]], [[0, 1], [1, 2]])
+    >>> es.geometry.facet_table(curve).n_simplices
+    array([1, 2, 1])
+    """
+
+    facets: Int[np.ndarray, "q m"]
+    simplex_facets: Int[np.ndarray, "s corners"]
+    n_simplices: Int[np.ndarray, " q"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+    @property
+    def boundary(self) -> Int[np.ndarray, " b"]:
+        """Indices of the facets that belong to one simplex only, ascending."""
+        return np.flatnonzero(self.n_simplices == 1)
+
+
+def list_facets(simplices: Int[np.ndarray, "s corners"], n_points: int) -> FacetTable:
+    """List the facets of simplices whose corners are numbers below `n_points`."""
+    dim = simplices.shape[1] - 1
+    corners = np.arange(dim + 1)
+    opposite = np.array([np.delete(corners, corner) for corner in corners])
+    # One row for each corner of a facet, one column for each facet: those opposite to corner 0 of
+    # all simplices first, then those opposite to corner 1, and so on.
+    ends = np.sort(simplices.T[opposite], axis=1).swapaxes(0, 1).reshape(dim, -1)
+    if n_points**dim < PACKED_BELOW:
+        shape = (n_points,) * dim
+        packed = np.ravel_multi_index(tuple(ends), shape)
+        keys, inverse, counts = np.unique(packed, return_inverse=True, return_counts=True)
+        facets = np.stack(np.unravel_index(keys, shape), axis=1)
+    else:
+        facets, inverse, counts = np.unique(ends.T, axis=0, return_inverse=True, return_counts=True)
+    of_simplices = inverse.reshape(dim + 1, -1).T
+    return FacetTable(freeze(facets), freeze(of_simplices), freeze(counts))
