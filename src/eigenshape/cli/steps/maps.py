@@ -51,7 +51,7 @@ def match_sentence(facts: dict[str, Any]) -> str:
     """Return the facts in words."""
     text = (
         f"{facts['n_vertices']} vertices; {facts['share_sure']:.0%} have a confidence of at least "
-        f"0.5, the mean is {facts['mean_confidence']:.2f}. Score {facts['score']:.2f}."
+        f"0.5, the mean is {facts['mean_confidence']:.2f}."
     )
     if not facts["handed"]:
         text += " Nothing tells outside from inside: left and right may be exchanged."
