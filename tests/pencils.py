@@ -62,3 +62,16 @@ def dense_eigenvalues(laplacian: Laplacian) -> np.ndarray:
         scales = 1 / np.sqrt(mass.diagonal())
         return sl.eigvalsh(scales[:, None] * stiffness * scales)
     return sl.eigh(stiffness, mass.toarray(), eigvals_only=True)
+
+
+def random_symmetric(n: int, density: float, seed: int) -> sp.csc_array:
+    """Return a sparse symmetric matrix, indefinite, whose diagonal is larger than most entries."""
+    rng = np.random.default_rng(seed)
+    half = sp.random_array(
+        (n, n), density=density, rng=rng, data_sampler=lambda size: rng.normal(size=size)
+    )
+    matrix = sp.csc_array(
+        half + half.T + sp.diags_array(rng.normal(size=n) + 3 * np.sign(rng.normal(size=n)))
+    )
+    matrix.sort_indices()
+    return matrix

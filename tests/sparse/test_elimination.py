@@ -5,6 +5,7 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pencils import random_symmetric
 
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import box
@@ -13,18 +14,6 @@ from eigenshape.sparse.elimination import analyze_pattern
 from eigenshape.sparse.front_loops import WIDE
 from eigenshape.sparse.sort_loops import sort_part
 from eigenshape.sparse.symmetric_factor import factorize_symmetric
-
-
-def random_symmetric(n, density, seed):
-    rng = np.random.default_rng(seed)
-    half = sp.random_array(
-        (n, n), density=density, rng=rng, data_sampler=lambda size: rng.normal(size=size)
-    )
-    matrix = sp.csc_array(
-        half + half.T + sp.diags_array(rng.normal(size=n) + 3 * np.sign(rng.normal(size=n)))
-    )
-    matrix.sort_indices()
-    return matrix
 
 
 def solved(matrix, width=3):

@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pencils import random_symmetric
 
 import eigenshape as es
 from eigenshape.sparse.dissection import dissect
@@ -30,14 +31,6 @@ def with_diagonal(matrix):
     found = sp.csc_array(matrix + sp.diags_array(signs * 2 * sums))
     found.sort_indices()
     return found
-
-
-def random_matrix(n, density, seed):
-    rng = np.random.default_rng(seed)
-    half = sp.random_array(
-        (n, n), density=density, rng=rng, data_sampler=lambda size: rng.normal(size=size)
-    )
-    return with_diagonal(half + half.T)
 
 
 MATRICES = {
@@ -71,7 +64,7 @@ def test_digits_are_those_of_one_thread(name):
 @given(st.integers(1, 400), st.floats(0, 0.06), st.integers(0, 10**6))
 def test_tasks_solve_what_they_share(n, density, seed):
     es.set_threads(2)
-    matrix = random_matrix(n, density, seed)
+    matrix = with_diagonal(random_symmetric(n, density, seed))
     elimination = analyze_pattern(matrix)
     tasks = elimination.tasks
     assert sorted(itertools.chain(*(each.tolist() for each in tasks.rounds))) == list(

@@ -1,6 +1,7 @@
 """The facets of simplices without duplicates, and where each simplex has them."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int
@@ -70,3 +71,11 @@ def list_facets(simplices: Int[np.ndarray, "s corners"], n_points: int) -> Facet
         facets, inverse, counts = np.unique(ends.T, axis=0, return_inverse=True, return_counts=True)
     of_simplices = inverse.reshape(dim + 1, -1).T
     return FacetTable(freeze(facets), freeze(of_simplices), freeze(counts))
+
+
+def state_without_facets(mesh: object) -> dict[str, Any]:
+    """Return what a mesh that keeps its facets is pickled by.
+
+    Facets would make a pickle three times as large; the next process lists them again.
+    """
+    return {name: value for name, value in vars(mesh).items() if name != "facets"}

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -11,7 +10,7 @@ from eigenshape._arrays import finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
-from eigenshape.geometry.facet_lists import FacetTable, list_facets
+from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_without_facets
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -106,9 +105,7 @@ class TriangleMesh:
         """The facets of the simplices, as `facet_table` returns them: listed once for each mesh."""
         return list_facets(self.faces, len(self.points))
 
-    def __getstate__(self) -> dict[str, Any]:
-        # The facets would make a pickle three times as large; the next process lists them again.
-        return {name: value for name, value in vars(self).items() if name != "facets"}
+    __getstate__ = state_without_facets
 
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -11,7 +11,7 @@ from eigenshape._arrays import finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
-from eigenshape.geometry.facet_lists import FacetTable, list_facets
+from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_without_facets
 from eigenshape.geometry.mesh import TriangleMesh
 
 
@@ -93,9 +93,7 @@ class SimplicialMesh:
         """The facets of the simplices, as `facet_table` returns them: listed once for each mesh."""
         return list_facets(self.simplices, len(self.points))
 
-    def __getstate__(self) -> dict[str, Any]:
-        # The facets would make a pickle three times as large; the next process lists them again.
-        return {name: value for name, value in vars(self).items() if name != "facets"}
+    __getstate__ = state_without_facets
 
     def __repr__(self) -> str:
         where = f"{self.n_points} points in R^{self.points.shape[1]}"

@@ -59,7 +59,7 @@ class FittedMap:
     fit: Fit
 
 
-def kept_areas(
+def signed_area_ratios(
     part: Surface, whole: Surface, places: Int[np.ndarray, " n"]
 ) -> Float[np.ndarray, " f"]:
     """Return the signed ratio of areas of each face of the part, between -1 and 1."""
@@ -80,7 +80,7 @@ def rate_map(
 ) -> Quality:
     """Rate a map of vertices to vertices, given the differences of patches."""
     areas = face_areas(part.mesh)
-    orientation = float(areas @ kept_areas(part, whole, places) / areas.sum())
+    orientation = float(areas @ signed_area_ratios(part, whole, places) / areas.sum())
     cells = np.bincount(whole.nearest, weights=whole.areas, minlength=len(whole.points))
     covered = cells[np.unique(whole.nearest[places])].sum() / part.area
     coupling = couplings(part, whole, pairs.points, pairs.partners)
@@ -106,7 +106,7 @@ def vertex_evidence(
     fit, pairs = maps[0].fit, maps[0].pairs
     others = [other.fit for other in maps[1 : N_OTHERS + 1]]
     places, n = fit.places, part.mesh.n_vertices
-    local = _vertex_means(part.mesh, kept_areas(part, whole, places))
+    local = _vertex_means(part.mesh, signed_area_ratios(part, whole, places))
     misfits = place_points(part, whole, pairs, np.arange(n))[1]
     edges = edge_table(part.mesh).edges
     ours = np.linalg.norm(np.subtract(*part.mesh.vertices[edges.T]), axis=1)

@@ -13,7 +13,7 @@ from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.smoothing import denoise
-from eigenshape.retrieval.patches.codebook import BASES, default_codebook, standardize
+from eigenshape.retrieval.patches.codebook import BASES, default_codebook, whiten_numbers
 from eigenshape.retrieval.patches.patch_loops import (
     HEIGHT_BINS,
     RING_NUMBERS,
@@ -117,11 +117,7 @@ def turn_over(surface: Surface) -> Surface:
 def whiten_discs(numbers: Float32[np.ndarray, "m r c"]) -> Float32[np.ndarray, "m r d"]:
     """Whiten the numbers at each radius by the codebook that comes with the library."""
     codebook = default_codebook()
-    rows = []
-    for place in range(len(BASES)):
-        at_radius = numbers[:, place].astype(np.float64)
-        scaled = standardize(at_radius, codebook.means[place], codebook.spreads[place])
-        rows.append(scaled @ codebook.axes[place])
+    rows = [whiten_numbers(numbers[:, place], codebook, place) for place in range(len(BASES))]
     return np.stack(rows, axis=1).astype(np.float32)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from itertools import count, pairwise
+from itertools import chain, count, pairwise
 
 import numpy as np
 from jaxtyping import Int
@@ -68,10 +68,11 @@ def dissect(indptr: Indices, indices: Indices) -> Indices:
             break
         named = list(zip(waiting, count(name), strict=False))
         name += len(named)
-        waiting = [part for parts in map_in_threads(dissection.cut_named, named) for part in parts]
+        parts = map_in_threads(lambda each: dissection.cut(*each), named)
+        waiting = list(chain.from_iterable(parts))
     waiting.sort(key=lambda segment: -segment.size)
     names = range(name, name + (n + 1) * len(waiting), n + 1)
-    map_in_threads(dissection.finish_named, list(zip(waiting, names, strict=True)))
+    map_in_threads(lambda each: dissection.finish(*each), zip(waiting, names, strict=True))
     return dissection.nodes
 
 
@@ -95,17 +96,15 @@ class _Dissection:
             )
         )
 
-    def finish_named(self, named: tuple[_Segment, int]) -> None:
+    def finish(self, segment: _Segment, name: int) -> None:
         """Order all points of a segment; names from the given one on are free."""
-        segment, name = named
         waiting = [segment]
         while waiting:
-            waiting += self.cut_named((waiting.pop(), name))
+            waiting += self.cut(waiting.pop(), name)
             name += 1
 
-    def cut_named(self, named: tuple[_Segment, int]) -> list[_Segment]:
+    def cut(self, segment: _Segment, name: int) -> list[_Segment]:
         """Order a small segment, or give a large one its name and cut it; return what is left of it."""
-        segment, name = named
         start, stop, graph = segment.start, segment.stop, self.graph
         if segment.size <= LEAF:
             with self.leaf_memory.lend() as memory:

@@ -120,15 +120,7 @@ add_eight_sums = _summation(8, "fadd", ahead=AHEAD)
 @intrinsic
 def fetch_row(context: Any, rows: Any, at: Any) -> Any:
     """Ask memory for row `at` of `rows`, which may lie beyond the end."""
-    signature = types.void(rows, types.int64)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        rows, at = arguments
-        data = context.make_array(signature.args[0])(context, builder, rows).data
-        _fetch(builder, data, builder.mul(at, ir.Constant(at.type, LANES)))
-        return context.get_dummy_value()
-
-    return signature, generate
+    return _row_action(rows, _fetch)
 
 
 @intrinsic
@@ -146,13 +138,34 @@ def add_row(context: Any, given: Any, start: Any, taken: Any, to: Any) -> Any:
 @intrinsic
 def clear_row(context: Any, rows: Any, at: Any) -> Any:
     """Set row `at` of `rows` to zero."""
-    signature = types.void(rows, types.int64)
+
+    def clear(builder: Any, data: Any, offset: Any) -> None:
+        zeros = ir.Constant(VECTOR, None)
+        builder.store(zeros, _pointer(builder, data, offset), align=8)
+
+    return _row_action(rows, clear)
+
+
+@intrinsic
+def divide_row(context: Any, rows: Any, at: Any, divisor: Any) -> Any:
+    """Divide row `at` of `rows` by a number that is not 0."""
+
+    def divide(builder: Any, data: Any, offset: Any, divisor: Any) -> None:
+        pointer = _pointer(builder, data, offset)
+        row, divisors = builder.load(pointer, align=8), _repeat_scalar(builder, divisor)
+        builder.store(builder.fdiv(row, divisors), pointer, align=8)
+
+    return _row_action(rows, divide, types.float64)
+
+
+def _row_action(rows: Any, act: Any, *kinds: Any) -> Any:
+    """Return the intrinsic that does something to one row, given further numbers of some kinds."""
+    signature = types.void(rows, types.int64, *kinds)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        rows, at = arguments
+        rows, at, *numbers = arguments
         data = context.make_array(signature.args[0])(context, builder, rows).data
-        pointer = _pointer(builder, data, builder.mul(at, ir.Constant(at.type, LANES)))
-        builder.store(ir.Constant(VECTOR, None), pointer, align=8)
+        act(builder, data, builder.mul(at, ir.Constant(at.type, LANES)), *numbers)
         return context.get_dummy_value()
 
     return signature, generate
@@ -174,22 +187,6 @@ def _row_change(given: Any, taken: Any, change: Any) -> Any:
         )
         row, old = (builder.load(pointer, align=8) for pointer in (given, taken))
         builder.store(change(builder, row, old), taken, align=8)
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-@intrinsic
-def divide_row(context: Any, rows: Any, at: Any, divisor: Any) -> Any:
-    """Divide row `at` of `rows` by a number that is not 0."""
-    signature = types.void(rows, types.int64, types.float64)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        rows, at, divisor = arguments
-        data = context.make_array(signature.args[0])(context, builder, rows).data
-        pointer = _pointer(builder, data, builder.mul(at, ir.Constant(at.type, LANES)))
-        quotients = builder.fdiv(builder.load(pointer, align=8), _repeat_scalar(builder, divisor))
-        builder.store(quotients, pointer, align=8)
         return context.get_dummy_value()
 
     return signature, generate

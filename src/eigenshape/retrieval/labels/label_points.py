@@ -83,7 +83,8 @@ def _whitened(patches: Patches, size: int) -> Float[np.ndarray, "m d"]:
     """Return the whitened numbers at each base radius, enlarged by a number of steps."""
     codebook = default_codebook()
     rows = [
-        whiten_numbers(patches, base + size, codebook, place) for place, base in enumerate(BASES)
+        whiten_numbers(patches.numbers[:, base + size], codebook, place)
+        for place, base in enumerate(BASES)
     ]
     return np.concatenate(rows, axis=1).astype(np.float64)
 

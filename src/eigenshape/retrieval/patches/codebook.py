@@ -228,13 +228,11 @@ def encode_patches(shape: Patches, codebook: PatchCodebook) -> Float32[np.ndarra
 
 
 def whiten_numbers(
-    shape: Patches, radius: int, codebook: PatchCodebook, place: int
+    numbers: Float[np.ndarray, "m c"], codebook: PatchCodebook, place: int
 ) -> Float[np.ndarray, "m d"]:
-    """Whiten the numbers at one radius as those of a base radius are."""
-    scaled = standardize(
-        shape.numbers[:, radius].astype(np.float64), codebook.means[place], codebook.spreads[place]
-    )
-    return scaled @ codebook.axes[place]
+    """Whiten the numbers of patches at one radius as those of a base radius are."""
+    wide = numbers.astype(np.float64)
+    return standardize(wide, codebook.means[place], codebook.spreads[place]) @ codebook.axes[place]
 
 
 def _fisher(
@@ -242,7 +240,7 @@ def _fisher(
 ) -> Float[np.ndarray, " v"]:
     shares, centers = codebook.shares[place], codebook.centers[place]
     variances = codebook.variances[place]
-    points = whiten_numbers(shape, radius, codebook, place)
+    points = whiten_numbers(shape.numbers[:, radius], codebook, place)
     joint = log_joint(points, shares, centers, variances)
     belief = np.exp(joint - logsumexp(joint, axis=1, keepdims=True))
     weights = shape.weights[:, radius].astype(np.float64)

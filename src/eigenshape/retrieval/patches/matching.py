@@ -131,7 +131,7 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
     require_type(shape, Patches, "shape")
     require_type(codebook, PatchCodebook, "codebook")
     rows = [
-        whiten_numbers(shape, base + size, codebook, place)
+        whiten_numbers(shape.numbers[:, base + size], codebook, place)
         for place, base in enumerate(BASES)
         for size in range(N_SIZES)
     ]

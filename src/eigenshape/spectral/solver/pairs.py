@@ -107,5 +107,5 @@ def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[
         rows -= step
 
     # In place, since touching new memory costs as much as the products.
-    map_in_threads(correct, share_units(len(vectors), ROWS, -(-len(vectors) // ROWS)))
+    map_in_threads(correct, share_units(len(vectors), ROWS, len(vectors)))
     return vectors
