@@ -179,9 +179,10 @@ def _stacks(counts: Indices, above: Indices, tasks: Tasks) -> Indices:
     An update waits on the stack of its task until its parent is processed, or the last task is.
     """
     task = np.repeat(np.arange(tasks.n), np.diff(tasks.first))
-    change = counts**2
+    triangles = counts * (counts + 1) // 2
+    change = triangles.copy()
     inside = np.flatnonzero((above >= 0) & (task[above] == task))
-    np.subtract.at(change, above[inside], counts[inside] ** 2)
+    np.subtract.at(change, above[inside], triangles[inside])
     sizes = np.cumsum(change)
     before = np.concatenate([[0], sizes])[tasks.first[:-1]]
     largest = np.maximum.reduceat(sizes, tasks.first[:-1]) - before

@@ -39,7 +39,7 @@ def factor_fronts(
 
     `tree` is the elimination, `lower` the matrix by the columns of its lower triangle, `updates`
     memory for updates and the place of each, `room` memory for two fronts and a number for each
-    row. The updates of a task are a stack. Returns its new top, or -1 where a pivot is zero or not
+    row. The updates of a task are a stack of lower triangles, row by row. Returns its new top, or -1 where a pivot is zero or not
     finite.
     """
     first, begins, rows, last_child, older, panel_places = tree
@@ -61,11 +61,12 @@ def factor_fronts(
                 skip = begins[child] + first[child + 1] - first[child]
                 count = begins[child + 1] - skip
                 for i in range(count):
-                    target, given = local[rows[skip + i]] * height, places[child] + i * count
+                    target = local[rows[skip + i]] * height
+                    given = places[child] + i * (i + 1) // 2
                     for j in range(i + 1):
                         front[target + local[rows[skip + j]]] += stack[given + j]
                 if child >= task_begin:
-                    top -= count * count
+                    top -= count * (count + 1) // 2
                 child = older[child]
         if stage == WHOLE:
             if height <= SMALL:
@@ -87,10 +88,10 @@ def factor_fronts(
             count = height - width
             places[s] = top
             for i in range(count):
-                given = (width + i) * height + width
+                given, to = (width + i) * height + width, top + i * (i + 1) // 2
                 for j in range(i + 1):
-                    stack[top + i * count + j] = front[given + j]
-            top += count * count
+                    stack[to + j] = front[given + j]
+            top += count * (count + 1) // 2
     return top
 
 

@@ -27,6 +27,8 @@ SHARED_HEIGHT = 400
 Indices = Int[np.ndarray, " ..."]
 # Two fronts, and a number for each row.
 Room = tuple[Float[np.ndarray, " f"], Float[np.ndarray, " f"], Indices]
+# The stacks of all tasks, and the place of each front in its stack.
+Updates = tuple[Float[np.ndarray, " u"], Indices]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,29 +137,55 @@ class SymmetricFactor:
         return bounds
 
 
-def factorize_symmetric(
-    elimination: Elimination, data: Float[np.ndarray, " e"], spent: SymmetricFactor | None = None
-) -> SymmetricFactor | None:
-    """Factor the matrix with these entries; return None if a pivot is zero or not finite.
+@dataclass(frozen=True, eq=False)
+class FactorMemory:
+    """Memory that is needed while a matrix is factored; factors of one pattern use it in turn.
 
-    The memory of a spent factor, if one is given, is used again.
+    New memory pages cost half as much as a factorization.
     """
+
+    updates: SpareMemory[Updates]
+    rooms: SpareMemory[Room]
+
+
+def factor_memory(elimination: Elimination) -> FactorMemory:
+    """Return memory for factors of a pattern; nothing is allocated before the first."""
     e = elimination
     n, square = len(e.order), e.tallest**2
-    making = _Making(
-        elimination=e,
-        lower=(e.lower_ptr, e.lower_rows, data[e.source]),
-        # New memory pages cost half as much as a factorization.
-        panels=np.empty(e.n_entries) if spent is None else spent.panels,
-        pivots=np.empty(n),
-        updates=(np.empty(e.stacks[-1]), np.empty(len(e.above), dtype=np.int64)),
+    return FactorMemory(
+        updates=SpareMemory(
+            lambda: (np.empty(e.stacks[-1]), np.empty(len(e.above), dtype=np.int64))
+        ),
         rooms=SpareMemory(
             lambda: (np.empty(square), np.empty(square), np.empty(n, dtype=np.int64))
         ),
     )
-    for tasks in e.tasks.rounds:
-        if not all(map_in_threads(making.factor_task, tasks.tolist())):
-            return None
+
+
+def factorize_symmetric(
+    elimination: Elimination,
+    data: Float[np.ndarray, " e"],
+    memory: FactorMemory | None = None,
+    spent: SymmetricFactor | None = None,
+) -> SymmetricFactor | None:
+    """Factor the matrix with these entries; return None if a pivot is zero or not finite.
+
+    The panels of a spent factor, if one is given, are filled anew.
+    """
+    e = elimination
+    memory = memory or factor_memory(e)
+    with memory.updates.lend() as updates:
+        making = _Making(
+            elimination=e,
+            lower=(e.lower_ptr, e.lower_rows, data[e.source]),
+            panels=np.empty(e.n_entries) if spent is None else spent.panels,
+            pivots=np.empty(len(e.order)),
+            updates=updates,
+            rooms=memory.rooms,
+        )
+        for tasks in e.tasks.rounds:
+            if not all(map_in_threads(making.factor_task, tasks.tolist())):
+                return None
     return SymmetricFactor(e, making.panels, making.pivots)
 
 
@@ -169,7 +197,7 @@ class _Making:
     lower: tuple[Indices, Indices, Float[np.ndarray, " l"]]
     panels: Float[np.ndarray, " e"]
     pivots: Float[np.ndarray, " n"]
-    updates: tuple[Float[np.ndarray, " u"], Indices]
+    updates: Updates
     rooms: SpareMemory[Room]
 
     def factor_task(self, task: int) -> bool:

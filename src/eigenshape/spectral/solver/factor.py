@@ -50,7 +50,9 @@ def factorize(
     pattern = pencil.shift_pattern
     data = pattern.stiffness - shift * pattern.mass
     data[pattern.diagonal] -= slack
-    lower = factorize_symmetric(pattern.elimination, data, spent.lower if spent else None)
+    lower = factorize_symmetric(
+        pattern.elimination, data, pattern.memory, spent.lower if spent else None
+    )
     return Factor(shift, int(np.count_nonzero(lower.pivots < 0)), slack, lower) if lower else None
 
 

@@ -21,15 +21,17 @@ def count_beside(
     pairs: Pairs,
     index: int,
     step: float,
-    beside: Factor | None = None,
     *,
+    slack: Float[np.ndarray, " n"] | None = None,
+    spent: Factor | None = None,
     most: bool = True,
 ) -> Factor:
     """Count at `step` from a value, or farther off where rounding would move a value found across σ.
 
     The count is not less than the number of eigenvalues below `shift` of what is returned; with
     `most=False` it is not more. A factor tells how much slack the next one needs for its count to
-    stand above rounding (`rounding`). One that has counted right beside had enough; it is spent.
+    stand above rounding (`usual_slack`): that of a factor at another shift is a good guess for the
+    first. A spent factor gives its memory.
 
     Raises
     ------
@@ -50,8 +52,9 @@ def count_beside(
     def too_much(loss: float, shift: float) -> bool:
         return not 2 * loss < np.abs(pairs.values - shift).min()
 
-    factor, none, sigma = beside, np.zeros(pencil.n), value + step
-    slack = none if beside is None or too_much(uncertainty(beside.slack), sigma) else beside.slack
+    factor, none, sigma = spent, np.zeros(pencil.n), value + step
+    if slack is None or too_much(uncertainty(slack), sigma):
+        slack = none
     for _ in range(COUNT_TRIALS):
         factor = factorize(pencil, sigma, side * slack, factor)
         loss = rounding(factor) if factor else np.full(pencil.n, np.inf)
@@ -70,6 +73,11 @@ def count_beside(
         f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it is "
         f"{np.ldexp(uncertainty(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
     )
+
+
+def usual_slack(pencil: Pencil, factor: Factor) -> Float[np.ndarray, " n"]:
+    """Return the slack that a factor at another shift needs, if its rounding is much as of this one."""
+    return _pad(pencil, rounding(factor))
 
 
 def _pad(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

@@ -12,7 +12,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import map_in_threads
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 from eigenshape.sparse.elimination import Elimination, analyze_pattern
-from eigenshape.sparse.symmetric_factor import factorize_symmetric
+from eigenshape.sparse.symmetric_factor import FactorMemory, factor_memory, factorize_symmetric
 from eigenshape.spectral.solver.residual_loops import add_sums
 
 # Columns that are processed together: enough for fast products, with little memory.
@@ -36,12 +36,15 @@ class ShiftPattern:
         The entries of W and B in this pattern, with zeros.
     diagonal : (n,) int
         The places of the diagonal entries.
+    memory : FactorMemory
+        For the factors of all shifts.
     """
 
     elimination: Elimination
     stiffness: Float[np.ndarray, " e"]
     mass: Float[np.ndarray, " e"]
     diagonal: Int[np.ndarray, " n"]
+    memory: FactorMemory
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,8 +225,13 @@ def _shift_pattern(stiffness: sp.csc_array, mass: sp.csc_array) -> ShiftPattern:
     union.sort_indices()
     keys = _keys(union)
     diagonal = np.searchsorted(keys, np.arange(union.shape[1]) * (union.shape[1] + 1))
+    elimination = analyze_pattern(union)
     return ShiftPattern(
-        analyze_pattern(union), _scatter(stiffness, keys), _scatter(mass, keys), diagonal
+        elimination=elimination,
+        stiffness=_scatter(stiffness, keys),
+        mass=_scatter(mass, keys),
+        diagonal=diagonal,
+        memory=factor_memory(elimination),
     )
 
 

@@ -258,7 +258,7 @@ def _remaining(
     pencil: Pencil, factor: Factor, pairs: Pairs, k: int
 ) -> tuple[Certificate | None, Wanted]:
     """Return the certificate, complete or not, and what the next run has to find."""
-    certificate = prove(pencil, pairs) if len(pairs.values) == k else None
+    certificate = prove(pencil, pairs, factor) if len(pairs.values) == k else None
     missing = certificate.n_missing if certificate else k - len(pairs.values)
     missing = min(max(missing, 0), k)
     ceiling = certificate.shift if certificate else np.inf
