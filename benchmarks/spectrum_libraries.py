@@ -71,6 +71,48 @@ def _arpack(laplacian: es.Laplacian, k: int) -> tuple[np.ndarray, np.ndarray]:
     return spl.eigsh(laplacian.stiffness.tocsc(), k, laplacian.mass.tocsc(), sigma=-0.01)
 
 
+def _with_factor(
+    laplacian: es.Laplacian, k: int, factor: Callable[[sp.csc_array], Callable[..., np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Call ARPACK as `_arpack` does, with solves of W + 0.01 B by another library."""
+    stiffness, mass = laplacian.stiffness.tocsc(), laplacian.mass.tocsc()
+    shifted = sp.csc_array(stiffness + 0.01 * mass)
+    shifted.sort_indices()
+    inverse = spl.LinearOperator(shifted.shape, matvec=factor(shifted), dtype=np.float64)
+    return spl.eigsh(stiffness, k, mass, sigma=-0.01, OPinv=inverse)
+
+
+def _cholespy_solve(laplacian: es.Laplacian, k: int) -> tuple[np.ndarray, np.ndarray]:
+    from cholespy import CholeskySolverD, MatrixType
+
+    def factor(matrix: sp.csc_array) -> Callable[..., np.ndarray]:
+        places = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
+        solver = CholeskySolverD(matrix.shape[0], *places, matrix.data, MatrixType.CSC)
+        found = np.empty(matrix.shape[0])
+
+        def solve(right: np.ndarray) -> np.ndarray:
+            solver.solve(np.ascontiguousarray(right, dtype=np.float64).ravel(), found)
+            return found.copy()
+
+        return solve
+
+    return _with_factor(laplacian, k, factor)
+
+
+def _pardiso_solve(laplacian: es.Laplacian, k: int) -> tuple[np.ndarray, np.ndarray]:
+    from pypardiso import PyPardisoSolver
+
+    def factor(matrix: sp.csc_array) -> Callable[..., np.ndarray]:
+        upper, solver = sp.csr_matrix(sp.triu(matrix)), PyPardisoSolver(mtype=2)
+        upper.sort_indices()
+        solver.set_phase(12)
+        solver._call_pardiso(upper, np.zeros((matrix.shape[0], 1)))
+        solver.set_phase(33)
+        return lambda right: solver._call_pardiso(upper, right.reshape(-1, 1)).ravel()
+
+    return _with_factor(laplacian, k, factor)
+
+
 def _lapy(lump: bool) -> Callable[[Shape], Any]:
     def build(shape: Shape) -> object:
         import lapy
@@ -156,6 +198,22 @@ LIBRARIES = {
     ),
     "scipy ARPACK": Library(
         _our_mesh, _arpack, _our_matrices, "mesh", "scipy", "eigsh(W, k, B, sigma=-0.01)"
+    ),
+    "ARPACK, cholespy": Library(
+        _our_mesh,
+        _cholespy_solve,
+        _our_matrices,
+        "mesh",
+        "cholespy",
+        "eigsh(W, k, B, sigma=-0.01, OPinv=...), factors by CHOLMOD",
+    ),
+    "ARPACK, PARDISO": Library(
+        _our_mesh,
+        _pardiso_solve,
+        _our_matrices,
+        "mesh",
+        "pypardiso",
+        "eigsh(W, k, B, sigma=-0.01, OPinv=...), factors by the MKL",
     ),
     "LaPy": Library(
         _lapy(lump=False),
