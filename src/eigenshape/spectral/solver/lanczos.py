@@ -24,6 +24,8 @@ SHRUNK = 1e-2
 REPEATS = 5
 # A column that projection shortens to this share is rounding: the space is invariant.
 NEGLIGIBLE = 1e-13
+# A space grows by at least this part of itself before it is checked again.
+CHECK_SHARE = 16
 # Pivots of a Gram matrix, relative to lengths: below this one Cholesky has lost too many digits,
 DEPENDENT_PIVOT = 1e-4
 # and above this one none.
@@ -147,6 +149,7 @@ def block_lanczos(
     )
     missing = wanted.below + wanted.above
     check = min(8 * missing // 5 + 8 * block, capacity)  # sooner they have never all converged
+    seen: list[tuple[int, int]] = []
     for size in range(block, capacity + 1, block):
         filled = first + size // LANES
         image = inner.image(space[filled - groups : filled])
@@ -159,12 +162,24 @@ def block_lanczos(
             if not missing:
                 chosen = chosen[np.argsort(ritz.values[chosen], kind="stable")]
                 return ritz.values[chosen], inner.leave(_vectors(krylov, ritz, chosen))
-            check = size + min(max(missing // 2, size // 20, block), max(size // 4, block))
+            seen.append((size, missing))
+            check = size + _until_next_check(seen, block)
         report(size / (size + 0.6 * (wanted.below + wanted.above) + block))
     raise ConvergenceError(
         f"Block Lanczos must converge within {capacity} vectors; {missing} of {wanted.below + wanted.above} "
         f"eigenvalues did not. Repair nearly degenerate elements, or request fewer pairs."
     )
+
+
+def _until_next_check(seen: list[tuple[int, int]], block: int) -> int:
+    """Return how far the space grows before the next check, given its sizes and what was missing at them.
+
+    What is missing falls nearly in proportion. A check costs as much as a few blocks.
+    """
+    size, missing = seen[-1]
+    pace = (seen[-2][1] - missing) / (size - seen[-2][0]) if len(seen) > 1 else 1.0
+    expected = int(missing / max(pace, 0.5))
+    return min(max(expected, size // CHECK_SHARE, block), max(size // 4, block))
 
 
 def _capacity(pencil: Pencil, wanted: Wanted, n_locked: int, block: int) -> int:
