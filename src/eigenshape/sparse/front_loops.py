@@ -39,8 +39,8 @@ def factor_fronts(
 
     `tree` is the elimination, `lower` the matrix by the columns of its lower triangle, `updates`
     memory for updates and the place of each, `room` memory for two fronts and a number for each
-    row. The updates of a task are a stack of lower triangles, row by row. Returns its new top, or -1 where a pivot is zero or not
-    finite.
+    row. The updates of a task are a stack of lower triangles, row by row. Returns its new top, or
+    -1 where a pivot is zero or not finite.
     """
     first, begins, rows, last_child, older, panel_places = tree
     lower_ptr, lower_rows, values = lower

@@ -12,7 +12,7 @@ from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.factor import Factor
-from eigenshape.spectral.solver.inertia import count_beside, usual_slack
+from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.kernel_values import to_pencil, user_certificate
 from eigenshape.spectral.solver.pairs import Pairs, error_bound
 from eigenshape.spectral.solver.pencil import (
@@ -108,7 +108,8 @@ def certify(
 def prove(pencil: Pencil, pairs: Pairs, factor: Factor | None = None) -> Certificate:
     """Count the eigenvalues up to just above the last pair, or up to its cluster if more copies follow.
 
-    A factor at any shift saves one trial: its rounding tells what to expect. The certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
+    A factor at any shift, which is spent, may save a trial: its rounding tells what to expect. The
+    certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
 
     Raises
     ------
@@ -118,8 +119,7 @@ def prove(pencil: Pencil, pairs: Pairs, factor: Factor | None = None) -> Certifi
     k, certificate = len(pairs.values), quality(pencil, pairs)
     if k == pencil.n:
         return certificate
-    slack = usual_slack(pencil, factor) if factor else None
-    above = count_beside(pencil, pairs, k - 1, certificate.resolution, slack=slack)
+    above = count_beside(pencil, pairs, k - 1, certificate.resolution, factor)
     certificate = _with_count(certificate, pairs, above)
     return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate, above)
 
@@ -178,15 +178,12 @@ def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Fac
     # Count the eigenvalues below the cluster. All further pairs are in the cluster, none above it.
     jumps = np.flatnonzero(np.diff(pairs.values) > 2 * above.resolution)
     first = int(jumps[-1]) + 1 if jumps.size else 0
-    # What was enough slack right beside is so here.
-    factor = count_beside(
-        pencil, pairs, first, -above.resolution, slack=beside.slack, spent=beside
-    )
+    factor = count_beside(pencil, pairs, first, -above.resolution, beside)
     if factor.count > first:
         # Slack may have moved copies of the cluster below σ that are not among the pairs: count
         # again from farther below.
         farther = CLUSTER_STEP * (factor.shift - float(pairs.values[first]))
-        factor = count_beside(pencil, pairs, first, farther, slack=factor.slack, spent=factor)
+        factor = count_beside(pencil, pairs, first, farther, factor)
     resolution = float(pairs.values[-1]) - factor.shift
     if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
         raise ConvergenceError(

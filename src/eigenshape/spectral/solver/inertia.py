@@ -21,17 +21,16 @@ def count_beside(
     pairs: Pairs,
     index: int,
     step: float,
+    beside: Factor | None = None,
     *,
-    slack: Float[np.ndarray, " n"] | None = None,
-    spent: Factor | None = None,
     most: bool = True,
 ) -> Factor:
     """Count at `step` from a value, or farther off where rounding would move a value found across σ.
 
     The count is not less than the number of eigenvalues below `shift` of what is returned; with
     `most=False` it is not more. A factor tells how much slack the next one needs for its count to
-    stand above rounding (`usual_slack`): that of a factor at another shift is a good guess for the
-    first. A spent factor gives its memory.
+    stand above rounding (`rounding`). One at another shift, which is spent, tells the first what to
+    expect.
 
     Raises
     ------
@@ -52,8 +51,9 @@ def count_beside(
     def too_much(loss: float, shift: float) -> bool:
         return not 2 * loss < np.abs(pairs.values - shift).min()
 
-    factor, none, sigma = spent, np.zeros(pencil.n), value + step
-    if slack is None or too_much(uncertainty(slack), sigma):
+    factor, none, sigma = beside, np.zeros(pencil.n), value + step
+    slack = _slack_beside(pencil, beside) if beside else none
+    if too_much(uncertainty(slack), sigma):
         slack = none
     for _ in range(COUNT_TRIALS):
         factor = factorize(pencil, sigma, side * slack, factor)
@@ -75,9 +75,9 @@ def count_beside(
     )
 
 
-def usual_slack(pencil: Pencil, factor: Factor) -> Float[np.ndarray, " n"]:
-    """Return the slack that a factor at another shift needs, if its rounding is much as of this one."""
-    return _pad(pencil, rounding(factor))
+def _slack_beside(pencil: Pencil, factor: Factor) -> Float[np.ndarray, " n"]:
+    """Return the slack that was enough for a factor, or would have been."""
+    return factor.slack if factor.slack.any() else _pad(pencil, rounding(factor))
 
 
 def _pad(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

@@ -25,7 +25,12 @@ from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
 from eigenshape.spectral.solver.pairs import Pairs, lowest_pairs, polish
 from eigenshape.spectral.solver.pencil import Pencil
-from eigenshape.spectral.solver.shift import expected_values, factor_below, shift_inside
+from eigenshape.spectral.solver.shift import (
+    expected_values,
+    factor_below,
+    factorize_near,
+    shift_inside,
+)
 from eigenshape.spectral.solver.slices import walk
 
 Start = Callable[[Pencil, int, Callable[[float], None]], tuple[np.ndarray, Factor]]
@@ -198,6 +203,8 @@ def _solve_sparse(
             return pairs, certificate
         if missing == 0 or run == MOST_RUNS:
             break
+        # The count has spent the factor, which saves much memory where nothing is missing.
+        factor = factorize_near(pencil, factor.shift)
         groups, more = min(1 + -(-missing // LANES), MOST_GROUPS), _in_run(report, run)
         _, found = block_lanczos(
             pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more
@@ -257,7 +264,7 @@ def _in_run(report: Progress, run: int) -> Callable[[float], None]:
 def _remaining(
     pencil: Pencil, factor: Factor, pairs: Pairs, k: int
 ) -> tuple[Certificate | None, Wanted]:
-    """Return the certificate, complete or not, and what the next run has to find."""
+    """Return the certificate, complete or not, and what the next run has to find; the factor is spent."""
     certificate = prove(pencil, pairs, factor) if len(pairs.values) == k else None
     missing = certificate.n_missing if certificate else k - len(pairs.values)
     missing = min(max(missing, 0), k)
