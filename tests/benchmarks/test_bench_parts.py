@@ -50,6 +50,16 @@ def test_threads_are_measured_and_give_the_same_digits(run_quick):
     assert "| spectrum |" in text
 
 
+def test_growth_is_measured_and_exponents_are_fitted(run_quick):
+    rows, _, text = run_quick("bench_growth.py")
+    assert {row["series"] for row in rows} == {"points", "pairs", "kernel", "large kernel"}
+    for first, last in ((0, 1), (2, 3)):
+        grown = (rows[last]["n"] * rows[last]["k"]) / (rows[first]["n"] * rows[first]["k"])
+        slope = np.log(rows[last]["cpu"] / rows[first]["cpu"]) / np.log(grown)
+        assert rows[last]["exponent"] == pytest.approx(slope)
+    assert "| points | 1,000 | 10 | 7 |" in text
+
+
 def test_the_operations_of_a_factor_are_counted_by_columns():
     sys.path.insert(0, str(BENCHMARKS))
     try:
