@@ -61,7 +61,7 @@ class PartDecomposition:
     >>> import eigenshape as es
     >>> found = es.find_parts(es.make_creature("biped", n_vertices=1200))
     >>> len(found.parts.features.vertices), found.heat.shape
-    (7, (1200,))
+    (8, (1200,))
     """
 
     mesh: TriangleMesh
