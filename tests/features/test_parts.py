@@ -6,7 +6,7 @@ import pytest
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.features import boundaries
 from eigenshape.features.boundaries import smooth_boundaries
-from eigenshape.features.contrast import contrast_at
+from eigenshape.features.contrast import FINE_CONTRAST, contrast_at
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.part_merging import SEED_TIME, part_tree
 from eigenshape.features.parts import find_parts, part_spectrum
@@ -134,13 +134,39 @@ def test_a_human_has_a_head_four_limbs_and_a_torso(human):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("kind", "count"), [("biped", 7), ("quadruped", 6)])
-def test_as_many_parts_are_the_same_ones_in_another_pose(kind, count):
-    found = [find_parts(make_creature(kind, pose, n_vertices=2000)) for pose in (0, 3)]
-    one, two = (
-        smooth_boundaries(each.mesh, segment(each.tree, n_regions=count)).labels for each in found
-    )
-    assert disagreement(one, two) < 0.05
+@pytest.mark.parametrize("kind", ["biped", "quadruped"])
+def test_the_parts_are_the_same_ones_in_another_pose(kind):
+    one, two = (find_parts(make_creature(kind, pose, n_vertices=2000)).parts for pose in (0, 3))
+    assert len(one.features.vertices) == len(two.features.vertices) == 8
+    assert disagreement(one.labels, two.labels) < 0.06
+
+
+def fish_body(tail_is_thin):
+    """Return a long ball, one half of which is flat or not."""
+    ball = icosphere(4)
+    x, y, z = ball.vertices.T
+    thickness = np.where(tail_is_thin & (x > 0), 1 - 0.9 * np.minimum(x / 0.4, 1), 1.0)
+    return TriangleMesh(np.column_stack([2.5 * x, y, z * thickness]), ball.faces)
+
+
+def test_a_difference_in_thickness_separates_parts():
+    plain, flat = (find_parts(fish_body(thin)).tree.persistence[1] for thin in (False, True))
+    assert flat > plain
+
+
+def test_persistence_falls_below_the_fine_cut_as_in_the_tree_of_diffusion(human):
+    finer = part_tree(human.mesh, human.spectrum)
+    low = finer.persistence < FINE_CONTRAST
+    np.testing.assert_array_equal(human.tree.persistence[low], finer.persistence[low])
+    np.testing.assert_array_equal(human.tree.maxima[low], finer.maxima[low])
+    assert (human.tree.persistence[~low] >= FINE_CONTRAST).all()
+
+
+def test_levels_beyond_the_fine_cut_have_smooth_boundaries(human):
+    found = find_parts(human.mesh, level=2)
+    raw = segment(human.tree, persistence=contrast_at(2.0))
+    assert len(found.parts.features.vertices) == len(raw.features.vertices)
+    assert cut_length(human.mesh, found.parts.labels) < cut_length(human.mesh, raw.labels)
 
 
 def disagreement(one, two):

@@ -105,12 +105,12 @@ def segment(
     steps.require_label_path(output)
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("parts") as progress:
-        tree, usual = steps.find_tree(surface, method, progress)
+        tree, usual, smooth_parts = steps.find_tree(surface, method, progress)
     rule = {"n_regions": n_parts, "persistence": persistence, "largest_gap": largest_gap}
     chosen = n_parts is not None or persistence is not None or largest_gap
     parts = es.segment(tree, **(rule if chosen else usual))
     if smooth if smooth is not None else method == PARTS:
-        parts = steps.smooth_parts(surface, parts)
+        parts = smooth_parts(parts)
     rows = steps.segment_rows(surface, tree, parts)
     if as_json:
         print_json(

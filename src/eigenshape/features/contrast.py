@@ -1,9 +1,11 @@
 """The default cut of part trees, in a light module: the command line reads it for its help."""
 
-# Least persistence of a part: the share of a temperature difference to its parent that is left
-# after diffusion. A larger value finds fewer parts. The best of 0.1 to 0.4 on the tuning half of
-# experiments/ch5_parts.
+# Least persistence of a part. A larger value finds fewer parts. `part_contrast.LOG_CONTRAST` was
+# chosen for this value on the tuning half of experiments/ch5_parts.
 PART_CONTRAST = 0.3
+# Least persistence of `part_tree` of the parts whose boundaries, creases and thickness are
+# measured. They are few enough to be measured, and hardly a part that people see is lost.
+FINE_CONTRAST = 0.15
 
 
 def contrast_at(level: float) -> float:

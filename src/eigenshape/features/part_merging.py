@@ -1,6 +1,6 @@
 """Part tree of a surface: its parts, merged in the order in which diffusion equalizes them."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from heapq import heapify, heappop, heappush
 
 import numpy as np
@@ -19,6 +19,8 @@ from eigenshape.geometry.topology import vertex_components
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.spectrum import Spectrum
 
+# The region that ends, the region that absorbs it, and the persistence of the former.
+Merge = tuple[int, int, float]
 # Heat time of the seeds, as a share of the area. Heat at so early a time has a maximum at every tip
 # and bump. The best of 0.001, 0.003 and 0.01 on the tuning half of experiments/ch5_parts.
 SEED_TIME = 1e-3
@@ -91,8 +93,21 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
     n_components, _ = vertex_components(mesh)
     seeds = segment(merge_tree(mesh, heat), n_regions=N_SEEDS + n_components - 1)
     coordinates = spectrum.eigenvectors * np.exp(-share * area * spectrum.eigenvalues)
-    merges = _merge_cheapest(_measure_regions(mesh, seeds, coordinates), seeds.features.values)
+    areas, means = region_means(mesh, seeds.labels, coordinates)
+    merges = _merge_by_heat(areas, means, adjacent_parts(mesh, seeds.labels), seeds.features.values)
+    return tree_of_merges(seeds, merges)
 
+
+def tree_of_merges(seeds: Segmentation, merges: list[Merge]) -> PartTree:
+    """Build the tree in which regions merge.
+
+    Parameters
+    ----------
+    seeds : Segmentation
+        The regions.
+    merges : list of (region that ends, region that absorbs it, persistence)
+        In the order of the merges, with rising persistence.
+    """
     count = len(seeds.features.vertices)
     parent, persistence = np.full(count, -1), np.full(count, np.inf)
     for ends, remains, price in merges:
@@ -112,75 +127,92 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Regions:
-    """Area and mean coordinates of regions, for a surface of area 1, and the adjacent pairs."""
-
-    areas: Float[np.ndarray, " r"]
-    means: Float[np.ndarray, "r k"]
-    adjacent: Int[np.ndarray, "p 2"]
-
-
-def _measure_regions(
-    mesh: TriangleMesh, seeds: Segmentation, coordinates: Float[np.ndarray, "n k"]
-) -> _Regions:
-    count, areas = len(seeds.features.vertices), face_areas(mesh)
+def region_means(
+    mesh: TriangleMesh, labels: Int[np.ndarray, " f"], values: Float[np.ndarray, "n k"]
+) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, "r k"]]:
+    """Return areas of regions and means of functions over them, for a surface scaled to area 1."""
+    count, areas = int(labels.max()) + 1, face_areas(mesh)
     weights = areas / areas.sum()
-    region_areas = np.bincount(seeds.labels, weights=weights, minlength=count)
+    region_areas = np.bincount(labels, weights=weights, minlength=count)
     # The integral of a linear function over a face is a third of its area times the sum of the
     # corner values.
     corners = np.repeat(weights / 3, 3)
-    corner_labels = np.repeat(seeds.labels, 3)
+    corner_labels = np.repeat(labels, 3)
     sums = [
         np.bincount(corner_labels, weights=corners * column[mesh.faces.ravel()], minlength=count)
-        for column in coordinates.T
+        for column in values.T
     ]
-    means = np.column_stack(sums) * areas.sum() ** 0.5 / region_areas[:, None]
-    return _Regions(region_areas, means, adjacent_parts(mesh, seeds.labels))
+    return region_areas, np.column_stack(sums) * areas.sum() ** 0.5 / region_areas[:, None]
 
 
-def _merge_cheapest(
-    regions: _Regions, heights: Float[np.ndarray, " r"]
-) -> list[tuple[int, int, float]]:
-    """Merge the cheapest pair until none is left.
+def _merge_by_heat(
+    areas: Float[np.ndarray, " r"],
+    means: Float[np.ndarray, "r k"],
+    adjacent: Int[np.ndarray, "p 2"],
+    heights: Float[np.ndarray, " r"],
+) -> list[Merge]:
+    """Merge regions by the price of `part_tree`; areas and means change in place."""
+
+    def price(one: int, two: int) -> float:
+        weight = areas[one] * areas[two] / (areas[one] + areas[two])
+        return float(weight * np.square(means[one] - means[two]).sum())
+
+    def join(remains: int, ends: int) -> None:
+        total = areas[remains] + areas[ends]
+        means[remains] = (areas[remains] * means[remains] + areas[ends] * means[ends]) / total
+        areas[remains] = total
+
+    return merge_cheapest(adjacent, heights, price, join)
+
+
+def merge_cheapest(
+    adjacent: Int[np.ndarray, "p 2"],
+    heights: Float[np.ndarray, " r"],
+    price: Callable[[int, int], float],
+    join: Callable[[int, int], None],
+    least: float = 0.0,
+) -> list[Merge]:
+    """Merge the cheapest pair of adjacent regions until none is left.
+
+    Parameters
+    ----------
+    adjacent : (p, 2) int
+    heights : (r,) float
+        Of two regions, the one with the lower maximum ends.
+    price : callable
+        Price of merging two regions.
+    join : callable
+        Called as ``join(remains, ends)`` at each merge, to update what `price` reads.
+    least : float
+        Lower bound of the prices that are returned.
 
     Returns
     -------
     list of (region that ends, region that absorbs it, price)
-        In the order of the merges. Of two regions, the one with the lower maximum ends.
+        In the order of the merges. A merge may make the next one cheaper, so that the running
+        maximum is returned: it keeps persistence in the order of the merges.
     """
-    areas, means = regions.areas.copy(), regions.means.copy()
-    neighbors: list[set[int]] = [set() for _ in areas]
-    for one, two in regions.adjacent.tolist():
+    neighbors: list[set[int]] = [set() for _ in heights]
+    for one, two in adjacent.tolist():
         neighbors[one].add(two)
         neighbors[two].add(one)
     # How often each region has grown. A price in the heap is void if either region has grown since.
-    age = np.zeros(len(areas), dtype=np.int64)
-
-    def price_pair(one: int, two: int) -> tuple[float, int, int, int, int]:
-        weight = areas[one] * areas[two] / (areas[one] + areas[two])
-        price = float(weight * np.square(means[one] - means[two]).sum())
-        return price, one, two, int(age[one]), int(age[two])
-
-    heap = [price_pair(one, two) for one, two in regions.adjacent.tolist()]
+    age = [0] * len(heights)
+    heap = [(price(one, two), one, two, 0, 0) for one, two in adjacent.tolist()]
     heapify(heap)
-    merges, highest = [], 0.0
+    merges, highest = [], least
     while heap:
-        price, one, two, age_one, age_two = heappop(heap)
+        cost, one, two, age_one, age_two = heappop(heap)
         if (age[one], age[two]) != (age_one, age_two):
             continue
         remains, ends = (one, two) if (heights[one], -one) > (heights[two], -two) else (two, one)
-        # A merge may make the next one cheaper; the running maximum keeps persistence in the order
-        # of the merges.
-        highest = max(highest, price)
+        highest = max(highest, cost)
         merges.append((ends, remains, highest))
-        total = areas[remains] + areas[ends]
-        means[remains] = (areas[remains] * means[remains] + areas[ends] * means[ends]) / total
-        areas[remains] = total
+        join(remains, ends)
         age[remains] += 1
         age[ends] = -1
         neighbors[remains] = (neighbors[remains] | neighbors[ends]) - {remains, ends}
         for other in sorted(neighbors[remains]):
             neighbors[other] = (neighbors[other] - {ends}) | {remains}
-            heappush(heap, price_pair(remains, other))
+            heappush(heap, (price(remains, other), remains, other, age[remains], age[other]))
     return merges

@@ -48,7 +48,6 @@ from .regions import parse_rotation as parse_rotation
 from .regions import parse_translation as parse_translation
 from .segments import find_tree as find_tree
 from .segments import segment_rows as segment_rows
-from .segments import smooth_parts as smooth_parts
 from .sheets import CAPTION as CAPTION
 from .sheets import ColoredQuery as ColoredQuery
 from .sheets import color_query as color_query

@@ -9,7 +9,6 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape.cli.inputs import REGIONS
-from eigenshape.cli.steps.segments import smooth_parts
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import (
     BoxRegion,
@@ -18,9 +17,7 @@ from eigenshape.deformation.region import (
     region_boundary,
     region_mask,
 )
-from eigenshape.features.contrast import PART_CONTRAST
 from eigenshape.features.parts import find_parts
-from eigenshape.features.segmentation import segment
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -63,8 +60,7 @@ def _box(conditions: list[re.Match[str]], mesh: TriangleMesh) -> BoxRegion:
 
 
 def _part(mesh: TriangleMesh, number: int, progress: Progress) -> Region:
-    parts = segment(find_parts(mesh, progress=progress).tree, persistence=PART_CONTRAST)
-    labels = smooth_parts(mesh, parts).labels
+    labels = find_parts(mesh, progress=progress).parts.labels
     whole_number(number, "A part", 0, int(labels.max()))
     return np.unique(mesh.faces[labels == number])
 

@@ -1,5 +1,7 @@
 """The parts of a mesh by each method of `segment`."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from eigenshape.cli.steps.heat import count_fragments
 from eigenshape.cli.steps.parts import part_rows
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.contrast import PART_CONTRAST
-from eigenshape.features.parts import find_parts
+from eigenshape.features.parts import find_parts, smooth_cut
 from eigenshape.features.segmentation import Segmentation, Tree, merge_targets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_closed_outward
@@ -20,13 +22,19 @@ from eigenshape.retrieval.heat.recipe import PRESETS
 
 def find_tree(
     surface: TriangleMesh, method: str, progress: Progress
-) -> tuple[Tree, dict[str, Any]]:
-    """Return the tree of a method, and its default cut. Fragments are not counted as parts."""
+) -> tuple[Tree, dict[str, Any], Callable[[Segmentation], Segmentation]]:
+    """Return the tree of a method, its default cut, and the function that smooths boundaries.
+
+    Fragments are not counted as parts. Boundaries follow creases whichever way the faces of a
+    closed mesh are turned.
+    """
     if method == PARTS:
-        return find_parts(surface, progress=progress).tree, {"persistence": PART_CONTRAST}
+        found = find_parts(surface, progress=progress)
+        return found.tree, {"persistence": PART_CONTRAST}, partial(smooth_cut, found)
     shape = find_heat_features(surface, PRESETS[method], progress=progress)
     n_fragments = count_fragments(shape)
-    return shape.tree, {"n_regions": PRESETS[method].n_features + n_fragments}
+    default = {"n_regions": PRESETS[method].n_features + n_fragments}
+    return shape.tree, default, partial(smooth_boundaries, orient_closed_outward(surface))
 
 
 def segment_rows(surface: TriangleMesh, tree: Tree, parts: Segmentation) -> list[dict[str, Any]]:
@@ -41,8 +49,3 @@ def segment_rows(surface: TriangleMesh, tree: Tree, parts: Segmentation) -> list
         }
         for number, row in enumerate(part_rows(surface, parts))
     ]
-
-
-def smooth_parts(surface: TriangleMesh, parts: Segmentation) -> Segmentation:
-    """Move the boundaries of parts to short cuts along creases, whichever way the faces are turned."""
-    return smooth_boundaries(orient_closed_outward(surface), parts)
