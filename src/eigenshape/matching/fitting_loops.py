@@ -6,7 +6,7 @@ import numpy as np
 
 from eigenshape._compile import njit
 
-MOST_TURNS = 30  # of one frame in one round; it ends after about five
+MOST_TURNS = 30  # of one frame in one round; it ends at the first small turn
 SMALLEST_TURN = 1e-4  # radians; the next round starts from there
 
 

@@ -32,7 +32,7 @@ N_LOW_MODES = 60
 # Mean weight of discs from which maps are not grown again. Scans of the tuning half have 0.34 to 0.46,
 # and cuts and parts with holes, which gain nothing from it, at least 0.58.
 MOSTLY_WHOLE = 0.5
-MOST_SMOOTHINGS = 2  # the third one gains less than 1 %
+MOST_SMOOTHINGS = 2  # it ends earlier if a bend is no better
 
 
 def first_support(part: Surface, whole: Surface, *, turned: bool) -> float:
