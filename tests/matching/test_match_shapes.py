@@ -181,6 +181,17 @@ def test_a_part_that_is_larger_than_the_whole_is_refused(target):
         match_shapes(moved(creature(0), 2.0), target)
 
 
+def test_a_part_whose_noise_adds_to_its_area_is_not_refused(target):
+    """The area counts without the noise."""
+    area = es.geometry.surface_area
+    clean = moved(creature(0), float(np.sqrt(1.4 * area(target.mesh) / area(creature(0)))))
+    edge = es.geometry.edge_lengths(clean).mean()
+    noise = 0.25 * edge * np.random.default_rng(0).standard_normal(clean.vertices.shape)
+    noisy = es.TriangleMesh(clean.vertices + noise, clean.faces)
+    assert area(noisy) > 1.5 * area(target.mesh)
+    assert match_shapes(noisy, target).n_vertices == noisy.n_vertices
+
+
 def test_pieces_that_are_all_tiny_are_refused(target, cut):
     dots = 1e-3 * es.icosphere(0).vertices
     faces = es.icosphere(0).faces

@@ -14,12 +14,13 @@ from jaxtyping import Float, Int
 from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial import cKDTree
 
+from eigenshape.matching.fitting_loops import add_pulls, add_tensions, turn_frames
 from eigenshape.matching.match_loops import nearest_rows
 from eigenshape.matching.surface import Surface
 
 N_LINKS = 6  # nearest points that a frame stays alike to
 N_CARRIERS = 4  # frames that carry a vertex
-MOST_SAMPLES = 1000  # vertices that are drawn to the whole; all are carried
+MOST_SAMPLES = 600  # vertices that are drawn to the whole; all are carried
 # How much neighboring frames resist, beside a pull of 1 in all: ever less, so that large moves come
 # first. Three times more or less changed no error by more than 0.2.
 STIFFNESS = (1.0, 0.3, 0.1, 0.05, 0.03, 0.02, 0.02, 0.02, 0.02, 0.02)
@@ -38,7 +39,8 @@ class FitPlan:
     """What fits of one part on one whole share: samples, frames and the whole as a tree.
 
     Row s of `shares` (samples × frames) says how far each frame carries a sample; `carriers` and
-    `portions` say the same of every vertex. Edges go from frame `one` to `two`, both ways.
+    `portions` say the same of every vertex. Edges go from frame `one` to `two`, both ways. `arms` are
+    from frames to the samples that they carry, and `links` along edges, both before bending.
     """
 
     part: Surface
@@ -51,7 +53,8 @@ class FitPlan:
     shares: sp.csr_array
     one: Int[np.ndarray, " e"]
     two: Int[np.ndarray, " e"]
-    gather: sp.csr_array
+    arms: Float[np.ndarray, "s c 3"]
+    links: Float[np.ndarray, "e 3"]
     graph: Float[np.ndarray, "m m"]
 
 
@@ -87,8 +90,9 @@ def plan_fit(part: Surface, whole: Surface) -> FitPlan:
     starts, ends = np.repeat(np.arange(m), near.shape[1]), near.ravel()
     one, two = np.concatenate([starts, ends]), np.concatenate([ends, starts])
     ones = np.full(len(one), 2 / len(one))  # each edge is there both ways
-    links = sp.coo_array((ones, (one, two)), shape=(m, m)).toarray()
+    weights = sp.coo_array((ones, (one, two)), shape=(m, m)).toarray()
     areas = part.areas[samples]
+    vertices, frames = part.mesh.vertices, part.mesh.vertices[part.points]
     return FitPlan(
         part,
         whole,
@@ -100,8 +104,9 @@ def plan_fit(part: Surface, whole: Surface) -> FitPlan:
         sp.coo_array(entries, shape=(len(samples), m)).tocsr(),
         one,
         two,
-        sp.coo_array((ones, (one, np.arange(len(one)))), shape=(m, len(one))).tocsr(),
-        np.diag(links.sum(axis=1)) - links,
+        vertices[samples][:, None] - frames[carriers[samples]],
+        frames[two] - frames[one],
+        np.diag(weights.sum(axis=1)) - weights,
     )
 
 
@@ -137,20 +142,12 @@ def _lay_down(plan: FitPlan, targets: Float[np.ndarray, "s 3"]) -> _Pose:
     points = plan.part.mesh.vertices[plan.samples]
     pull = plan.pull
     middle, target = pull @ points, pull @ targets
-    turn = _rotations((((targets - target) * pull[:, None]).T @ (points - middle))[None])[0][0]
+    left, _, right = np.linalg.svd(((targets - target) * pull[:, None]).T @ (points - middle))
+    left[:, 2] *= np.sign(np.linalg.det(left @ right))
+    turn = left @ right
     frames = plan.part.mesh.vertices[plan.part.points]
     turns = np.repeat(turn[None], len(frames), axis=0)
     return _Pose(turns, target + (frames - middle) @ turn.T)
-
-
-def _rotations(
-    products: Float[np.ndarray, "m 3 3"],
-) -> tuple[Float[np.ndarray, "m 3 3"], Float[np.ndarray, " m"]]:
-    """Return the rotation nearest to each matrix, and its inner product with it."""
-    left, values, right = np.linalg.svd(products)
-    side = np.sign(np.linalg.det(left @ right))
-    left[:, :, 2] *= side[:, None]
-    return left @ right, values[:, 0] + values[:, 1] + side * values[:, 2]
 
 
 def _bend(
@@ -165,21 +162,16 @@ def _bend(
     pulled = sp.csr_array(plan.shares * pull[:, None])
     matrix = (pulled.T @ plan.shares).toarray() + stiffness * plan.graph
     matrix[np.diag_indices_from(matrix)] += 1e-9 / len(matrix)  # of frames that nothing pulls
-    factor = cho_factor(matrix)
-    frames = plan.part.mesh.vertices[plan.part.points]
-    arms = frames[plan.two] - frames[plan.one]
-    squares = plan.gather @ (arms**2).sum(axis=1)
-    turns, places = pose.turns, pose.places
+    factor = cho_factor(matrix, check_finite=False)
+    carriers, portions = plan.carriers[plan.samples], plan.portions[plan.samples]
+    weight = stiffness * 2 / len(plan.one)  # as in `graph`
+    turns, places = pose.turns.copy(), pose.places
     for _ in range(rounds):
-        carried = _offsets(plan, turns, plan.samples)
-        between = 0.5 * (turns[plan.one] + turns[plan.two])
-        turned = np.einsum("eij,ej->ei", between, arms)
-        right = pulled.T @ (targets - carried) - stiffness * (plan.gather @ turned)
-        places = cho_solve(factor, right)
-        moved = places[plan.two] - places[plan.one]
-        products = plan.gather @ (moved[:, :, None] * arms[:, None, :]).reshape(-1, 9)
-        turns, sums = _rotations(products.reshape(-1, 3, 3))
-        turns = turns * np.clip(sums / np.maximum(squares, TINY), *SIZES)[:, None, None]
+        right = np.zeros_like(places)
+        add_pulls(turns, carriers, portions, plan.arms, pull, targets, right)
+        add_tensions(turns, plan.one, plan.two, plan.links, weight, right)
+        places = cho_solve(factor, right, check_finite=False)
+        turn_frames(places, plan.one, plan.two, plan.links, *SIZES, turns)
     return _Pose(turns, places)
 
 
@@ -221,8 +213,6 @@ def _nearest_targets(
 
 def _strain(plan: FitPlan, pose: _Pose) -> float:
     """Return how far edges are from what their frames make of them, as a share of squares."""
-    frames = plan.part.mesh.vertices[plan.part.points]
-    arms = frames[plan.two] - frames[plan.one]
     moved = pose.places[plan.two] - pose.places[plan.one]
-    wrong = np.einsum("eij,ej->ei", pose.turns[plan.one], arms) - moved
-    return float((wrong**2).sum() / max(float((arms**2).sum()), TINY))
+    wrong = np.einsum("eij,ej->ei", pose.turns[plan.one], plan.links) - moved
+    return float((wrong**2).sum() / max(float((plan.links**2).sum()), TINY))

@@ -22,12 +22,14 @@ from eigenshape.matching.evidence import (
     rate_map,
     vertex_evidence,
 )
-from eigenshape.matching.growth import first_support, fitted_maps
+from eigenshape.matching.fitting import plan_fit
+from eigenshape.matching.growth import first_support, fitted_maps, improve_maps
 from eigenshape.matching.pairs import Pairs, patch_differences
 from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.matching.spectral_refinement import modes_of_part, refine_places
 from eigenshape.matching.surface import Surface, describe_surface, turn_over
 from eigenshape.matching.target import MatchTarget, as_target, require_matchable
+from eigenshape.operators.smoothing import denoise
 
 N_PART = 300  # points of the part
 N_STARTS = 3  # sets of pairs of each of three slacks, from which a map is grown (`grow_starts`)
@@ -70,7 +72,10 @@ def match_shapes(
     4. The part is bent onto the whole by each of these maps: first to where the map places its
        points, then to the nearest points that face the same way (non-rigid registration). The map
        after which the smallest gaps are left with the least strain is taken.
-    5. Eigenfunctions of both shapes make the map smooth.
+    5. The part is bent again from that map, made smooth by 60 eigenfunctions of both shapes. If
+       rims cut off most discs of the part, as those of a scan, it is also compared with the piece of
+       the whole that the map covers, and maps are grown from there.
+    6. Eigenfunctions of both shapes make the best map smooth.
 
     Parameters
     ----------
@@ -150,8 +155,10 @@ def _require_scale(scale: object) -> float:
 
 
 def _require_smaller(mesh: TriangleMesh, target: MatchTarget, factor: float) -> None:
-    share = factor**2 * surface_area(mesh) / surface_area(target.mesh)
-    if share > MOST_AREA:
+    limit = MOST_AREA * surface_area(target.mesh) / factor**2
+    # Noise of a quarter of an edge adds a fifth to the area, which must not refuse a whole.
+    if surface_area(mesh) > limit and surface_area(denoise(mesh)) > limit:
+        share = surface_area(mesh) * MOST_AREA / limit
         raise InvalidParameterError(
             f"A part must not have more than {MOST_AREA} times the area of the whole; it has "
             f'{share:.3g} times. Exchange the two shapes, or pass scale="unknown".'
@@ -170,7 +177,7 @@ def _find_scale(mesh: TriangleMesh, target: MatchTarget) -> float:
     for factor in factors.tolist():
         surface = describe_surface(largest, target.unit / factor, N_PART)
         differences = patch_differences(surface, target.surface)
-        maps = fitted_maps(surface, target.surface, differences, 1)
+        maps = fitted_maps(plan_fit(surface, target.surface), differences, 1)
         score = 0.0
         if maps:
             one = maps[0]
@@ -264,12 +271,14 @@ def _match_piece(mesh: TriangleMesh, target: MatchTarget, factor: float) -> _Pie
     if handed and turned > upright and outward_vote(part.mesh) < CLEAR_VOTE:
         part = turn_over(part)
     differences = patch_differences(part, whole)
-    maps = fitted_maps(part, whole, differences, N_STARTS)
+    plan = plan_fit(part, whole)
+    maps = fitted_maps(plan, differences, N_STARTS)
     if maps:
+        modes = modes_of_part(part.mesh, target.modes)
+        maps = improve_maps(plan, differences, maps, modes, target.modes)
         best = maps[0]
         quality = rate_map(part, whole, differences, best.pairs, best.fit.places)
         evidence = vertex_evidence(part, whole, differences, maps, quality)
-        modes = modes_of_part(part.mesh, target.modes)
         faces, weights = refine_places(modes, target.modes, whole.mesh, best.fit.places)
         return _Piece(faces, weights, confidence(evidence), evidence, quality, handed)
     # Too few points agree for a map: take the most similar patch of each, and trust none.

@@ -54,23 +54,31 @@ def refine_places(
     Rodolà and others 2017 for parts): first to a vertex, in the last round to a point of a face.
     """
     for wanted in N_MODES:
-        k = min(wanted, len(whole.eigenvalues))
-        low = part.eigenvalues < MARGIN * whole.eigenvalues[k - 1]
-        low[0] = True
-        ours, theirs = part.functions[:, low], np.ascontiguousarray(whole.functions[:, :k])
-        matrix = (ours * part.areas[:, None]).T @ theirs[places]
-        smooth = ours @ matrix
-        # Half the digits are enough to find the nearest vertex, and take half the time.
-        points, columns = smooth.astype(np.float32), theirs.T.astype(np.float32)
-        halves = (columns**2).sum(axis=0) / 2
-        places = np.concatenate(
-            [
-                (halves - points[first : first + ROWS_AT_ONCE] @ columns).argmin(axis=1)
-                for first in range(0, len(points), ROWS_AT_ONCE)
-            ]
-        )
-        if k == len(whole.eigenvalues):
+        places, smooth = smooth_places(part, whole, places, wanted)
+        if wanted >= len(whole.eigenvalues):
             break
+    theirs = np.ascontiguousarray(whole.functions[:, : smooth.shape[1]])
     order = np.argsort(mesh.faces.ravel(), kind="stable")
     starts = np.searchsorted(mesh.faces.ravel()[order], np.arange(mesh.n_vertices + 1))
     return nearest_face_points(smooth, theirs, mesh.faces, starts, order // 3, places)
+
+
+def smooth_places(
+    part: Modes, whole: Modes, places: Int[np.ndarray, " n"], wanted: int
+) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n k"]]:
+    """Return the vertices of a map that so many modes make smooth, and the smooth modes there."""
+    k = min(wanted, len(whole.eigenvalues))
+    low = part.eigenvalues < MARGIN * whole.eigenvalues[k - 1]
+    low[0] = True
+    ours, theirs = part.functions[:, low], whole.functions[:, :k]
+    matrix = (ours * part.areas[:, None]).T @ theirs[places]
+    smooth = ours @ matrix
+    # Half the digits are enough to find the nearest vertex, and take half the time.
+    points = smooth.astype(np.float32)
+    columns = np.ascontiguousarray(theirs.T, dtype=np.float32)
+    halves = (columns**2).sum(axis=0) / 2
+    found = [
+        (halves - points[first : first + ROWS_AT_ONCE] @ columns).argmin(axis=1)
+        for first in range(0, len(points), ROWS_AT_ONCE)
+    ]
+    return np.concatenate(found), smooth
