@@ -3,6 +3,7 @@ import pytest
 from bent_shapes import bumpy, lump, lump_rig, tube, tube_rig
 
 from eigenshape._errors import InvalidParameterError
+from eigenshape.deformation import graded_bend
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend, deform, require_mode
 from eigenshape.deformation.details import (
@@ -20,6 +21,7 @@ from eigenshape.geometry.crossings import self_intersections
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.surfaces import torus
@@ -323,6 +325,18 @@ def test_what_no_pull_keeps_apart_is_said(halves):
     ) as told:
         bent = bend(binding, [turn], mode="uncrossed")
     assert f" {len(self_intersections(bent))} pairs cross" in str(told[0].message)
+
+
+def test_no_pull_is_tried_if_all_pairs_cross_with_an_infinite_one_too(bar, monkeypatch):
+    """The end of a bar is moved through a plate: faces of both are held."""
+    plate = TriangleMesh(np.array([[-3, -3, 6.6], [4, -3, 6.6], [0.5, 6, 6.6]]), [[0, 1, 2]])
+    both = disjoint_union(bar.mesh, plate)
+    upper = both.vertices[:, 2] >= 3
+    upper[bar.mesh.n_vertices :] = False
+    binding = bind(rig_shape(both), [upper], n_modes=20)
+    monkeypatch.setattr(graded_bend, "pull_binding", None)  # a call would raise an error
+    with pytest.warns(UserWarning, match="Faces cross at every strength"):
+        bend(binding, [Translation([0, 0, 1])], mode="uncrossed")
 
 
 def test_where_no_faces_cross_nothing_is_stiffer():

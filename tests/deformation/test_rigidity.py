@@ -245,7 +245,7 @@ def test_many_rounds_end_where_plain_alternation_does(monkeypatch):
 
 def test_nothing_free_is_nothing_to_relax():
     rig = lump_rig()
-    part = free_part(rig.edges, np.ones(642, dtype=bool), np.zeros(642))
+    part = free_part(rig.edges, np.ones(642, dtype=bool))
     assert part.factor is None
     start = RNG.standard_normal((642, 3))
     assert (
@@ -262,7 +262,7 @@ def test_each_component_must_be_held():
     with pytest.raises(
         InvalidParameterError, match=r"the component of vertex 12 has none \(2 such\)"
     ):
-        free_part(edges, held, np.zeros(36))
+        free_part(edges, held)
 
 
 def test_equations_that_are_not_definite_are_refused():

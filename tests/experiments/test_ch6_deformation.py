@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch6_deformation"
-FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
+EXPECTED = json.loads((FOLDER / "expected.json").read_text())
+FULL, OTHER = EXPECTED["full"], EXPECTED["other scenes"]
 
 
 def test_the_readme_shows_the_expected_figures():
@@ -25,6 +26,21 @@ def test_the_readme_shows_the_expected_figures():
             for m in methods
         ]
         assert f"| {scene} | " + " | ".join(cells) + " |" in text
+
+
+def test_the_readme_shows_the_other_scenes_and_what_it_claims_of_them():
+    text = (FOLDER / "README.md").read_text()
+    for scene, row in OTHER.items():
+        errors, ratios = list(row.values())[:4], list(row.values())[4:]
+        cells = [f"{value:.4f}" for value in errors] + [f"{value:.2f}" for value in ratios]
+        assert f"| {scene} | " + " | ".join(cells) + " |" in text
+    assert max(row["over ARAP, same held"] for row in OTHER.values()) < 1.015
+
+
+@pytest.mark.long
+def test_the_other_scenes_are_as_rigid_as_their_peer(quick_form):
+    found = quick_form("ch6_deformation/other_scenes.py")
+    assert all(row["over ARAP, same held"] <= 1.05 for row in found.values())
 
 
 @pytest.mark.long

@@ -14,7 +14,12 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.deformation.region import Region, region_mask, require_boundary
 from eigenshape.deformation.rig import EigenRig
-from eigenshape.deformation.rigidity import FreePart, free_part, require_fixed_vertices
+from eigenshape.deformation.rigidity import (
+    FreePart,
+    free_part,
+    pulled_part,
+    require_fixed_vertices,
+)
 from eigenshape.geometry.geodesic import geodesic_distance_to_set
 
 # (least extent of a region over that of the rest, number of modes): the rule of thesis 6.3.2.
@@ -186,10 +191,8 @@ def pull_binding(binding: Binding, strength: float) -> Binding:
     The pull on a vertex is `strength` times its share of the area. At a strength of some hundreds
     no limb can fold away; folds of single edges take a strength of about the number of vertices.
     """
-    rig, placed = binding.rig, np.ones(binding.rig.mesh.n_vertices, dtype=bool)
-    placed[binding.part.free] = False
-    pull = strength * rig.areas / rig.areas.sum()
-    return replace(binding, part=free_part(rig.edges, placed, pull))
+    areas = binding.rig.areas
+    return replace(binding, part=pulled_part(binding.part, strength * areas / areas.sum()))
 
 
 def _placed_beyond_rims(

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -104,10 +104,8 @@ def edge_weights(mesh: TriangleMesh, stiffness: sp.csr_array) -> EdgeWeights:
     )
 
 
-def free_part(
-    edges: EdgeWeights, fixed: Bool[np.ndarray, " n"], pull: Float[np.ndarray, " n"] | None = None
-) -> FreePart:
-    """Factor the equations of the free vertices, with an optional pull to their start.
+def free_part(edges: EdgeWeights, fixed: Bool[np.ndarray, " n"]) -> FreePart:
+    """Factor the equations of the free vertices, without a pull to their start.
 
     Raises
     ------
@@ -120,10 +118,17 @@ def free_part(
     free = np.flatnonzero(~fixed)
     rows = edges.matrix[free]
     fitted = np.unique(np.concatenate([free, rows.indices])).astype(np.int64)
-    strength = np.zeros(len(free)) if pull is None else pull[free]
-    square = (rows[:, free] + sp.diags_array(strength)).tocsr()
-    factor = factor_equations(square) if len(free) else None
-    return FreePart(free, fitted, rows, strength, factor)
+    factor = factor_equations(rows[:, free]) if len(free) else None
+    return FreePart(free, fitted, rows, np.zeros(len(free)), factor)
+
+
+def pulled_part(part: FreePart, pull: Float[np.ndarray, " n"]) -> FreePart:
+    """Return the same free vertices, pulled to their start; the order of elimination stays."""
+    if part.factor is None:
+        return part
+    strength = pull[part.free]
+    square = (part.rows[:, part.free] + sp.diags_array(strength)).tocsr()
+    return replace(part, pull=strength, factor=factor_equations(square, part.factor))
 
 
 def require_fixed_vertices(edges: EdgeWeights, fixed: Bool[np.ndarray, " n"]) -> None:
@@ -143,15 +148,17 @@ def require_fixed_vertices(edges: EdgeWeights, fixed: Bool[np.ndarray, " n"]) ->
         )
 
 
-def factor_equations(square: sp.csr_array) -> SymmetricFactor:
-    """Factor the equations of the free vertices.
+def factor_equations(
+    square: sp.csr_array, similar: SymmetricFactor | None = None
+) -> SymmetricFactor:
+    """Factor the equations of the free vertices, in the order of a factor of the same pattern.
 
     Raises
     ------
     InvalidShapeError
         If they are not positive definite.
     """
-    factor = factor_matrix(square)
+    factor = factor_matrix(square, similar)
     if factor is None or not (factor.pivots > 0).all():
         raise InvalidShapeError(
             "Every triangle must have angles well above zero to be bent; the equations of the "

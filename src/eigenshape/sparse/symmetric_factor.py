@@ -253,9 +253,15 @@ class _Making:
         return True
 
 
-def factor_matrix(matrix: sp.sparray) -> SymmetricFactor | None:
-    """Factor one symmetric matrix; return None if a pivot is zero or not finite."""
+def factor_matrix(
+    matrix: sp.sparray, similar: SymmetricFactor | None = None
+) -> SymmetricFactor | None:
+    """Factor one symmetric matrix; return None if a pivot is zero or not finite.
+
+    The order of elimination is that of a factor of a matrix with the same pattern, if one is given.
+    """
     columns = sp.csc_array(matrix)
     columns.sort_indices()
     with one_blas_thread():
-        return factorize_symmetric(analyze_pattern(columns), columns.data)
+        elimination = analyze_pattern(columns) if similar is None else similar.elimination
+        return factorize_symmetric(elimination, columns.data)

@@ -19,6 +19,7 @@ from eigenshape.spectral.multilevel.residuals import (
 from eigenshape.spectral.multilevel.vcycle import Tower, correct, multiply, smooth
 
 WIDTH = 32  # columns that are corrected together
+GRAM_COLUMNS = 96  # columns of a symmetric product that are computed together
 SMOOTHING_STEPS = (8, 30)  # fewest and most smoothing steps
 FIRST_STEPS = 2.0  # first smoothing steps, as a multiple of the root of the spread
 DEPENDENT_COLUMNS = {
@@ -290,23 +291,34 @@ def _combination(
 
 
 def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Return SᵀMS and SᵀAS, except the block of the columns before the fresh ones."""
+    """Return SᵀMS and SᵀAS, except the block of the columns before the fresh ones.
+
+    MS and AS are computed in double precision. The products with S are in the precision of the
+    columns and are summed in double precision: single precision takes half the time.
+    """
     size, m = fresh.stop, space.columns.shape[1]
-    of = space.columns if fresh.start == 0 else space.added[:, : size - m]
+    whole, precision = fresh.start == 0, space.columns.dtype
+    of = space.columns if whole else space.added[:, : size - m]
 
     def sum_rows(chunks: list[slice]) -> np.ndarray:
         grams = np.zeros((2, size, of.shape[1]))
         for rows, image, weighed in images(tower, of, chunks):
-            for block, start in ((space.columns, 0), (space.added, m)):
-                if start < size:
-                    part = block[rows, : size - start].astype(np.float64)
-                    grams[0, start : start + part.shape[1]] += part.T @ weighed
-                    grams[1, start : start + part.shape[1]] += part.T @ image
+            found = [part.astype(precision, copy=False) for part in (weighed, image)]
+            for gram, part in zip(grams, found, strict=True):
+                if whole:  # the rest follows from symmetry
+                    for start in range(0, size, GRAM_COLUMNS):
+                        end = min(start + GRAM_COLUMNS, size)
+                        gram[:end, start:end] += of[rows, :end].T @ part[:, start:end]
+                else:
+                    gram[:m] += space.columns[rows].T @ part
+                    gram[m:] += of[rows].T @ part
         return grams
 
     squares = np.zeros((2, size, size))
     squares[:, :, fresh] = sum(map_groups(tower, sum_rows))
     for square in squares:
+        if whole:
+            square[:] = np.triu(square) + np.triu(square, 1).T
         square[fresh, : fresh.start] = square[: fresh.start, fresh].T
         square[fresh, fresh] = (square[fresh, fresh] + square[fresh, fresh].T) / 2
     return squares[0], squares[1]
