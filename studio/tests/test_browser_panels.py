@@ -223,16 +223,15 @@ def test_parts_equal_those_of_segment(page, mesh):
     wait_until_still(page)
     found = es.find_parts(mesh)
     assert find(page, "n-parts-value").inner_text() == str(len(found.parts.features.vertices))
-    finest = label_vertices(mesh, found.tree.basins)
-    for count in (1, 4, 9, len(found.tree.maxima)):
+    n_fine = len(found.fine.features.vertices)
+    for count in (1, 4, n_fine - 1, n_fine):
         move_slider(page, "n-parts", count)
-        cut = es.segment(found.tree, n_regions=count)
-        assert_parts(page, cut, found.tree, finest)
+        assert_parts(page, es.segment(found.tree, n_regions=count), found)
     for step in (300, 700):
         move_slider(page, "persistence", step)
         level = 1.02 * found.tree.persistence[1] * (step / 1000) ** 2
-        cut = es.segment(found.tree, persistence=level)
-        assert_parts(page, cut, found.tree, finest)
+        cut = es.segment(found.tree, n_regions=n_above(found, level))
+        assert_parts(page, cut, found)
         assert find(page, "n-parts").input_value() == str(len(cut.features.vertices))
 
     move_slider(page, "n-parts", 5)
@@ -242,11 +241,19 @@ def test_parts_equal_those_of_segment(page, mesh):
     check_clicks_on_parts(page, found)
 
 
-def assert_parts(page, cut, tree, finest):
-    """Check the part of each vertex: that of its finest region."""
-    part_of_region = np.full(len(tree.maxima), -1)
-    part_of_region[tree.basins] = cut.labels
-    assert np.array_equal(vertex_labels(page), part_of_region[finest])
+def n_above(found, level):
+    """Return how many fine parts have this persistence or more."""
+    n_fine = len(found.fine.features.vertices)
+    return int(np.count_nonzero(found.tree.persistence[:n_fine] >= level))
+
+
+def assert_parts(page, cut, found):
+    """Check the part of each vertex: that of the fine part around it."""
+    n_fine = len(found.fine.features.vertices)
+    part_of_fine = np.full(n_fine, -1)
+    part_of_fine[es.segment(found.tree, n_regions=n_fine).labels] = cut.labels
+    fine = label_vertices(found.mesh, found.fine.labels)
+    assert np.array_equal(vertex_labels(page), part_of_fine[fine])
 
 
 def check_picture_of_parts(page, mesh):
@@ -393,5 +400,5 @@ def test_report_opens_from_a_file_without_a_server(browser, folder, mesh):
         move_slider(page, "n-parts", 4)
         found = es.find_parts(mesh)
         cut = es.segment(found.tree, n_regions=4)
-        assert_parts(page, cut, found.tree, label_vertices(mesh, found.tree.basins))
+        assert_parts(page, cut, found)
         assert picture(page)[..., 3].any()

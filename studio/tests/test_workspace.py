@@ -278,12 +278,17 @@ def test_parts_cut_in_the_browser_are_those_of_segment():
     assert state["n_regions"] == len(found.parts.features.vertices)
     labels, cuts = page.array("parts/labels"), page.array("parts/cuts")
     assert labels.shape == (800,)
-    # A row for each number of parts; the last one keeps all the finest regions.
-    n_finest = len(found.tree.maxima)
-    np.testing.assert_array_equal(cuts[-1], np.arange(n_finest))
-    for row, n_regions in zip(cuts[::-1], range(n_finest, 0, -1), strict=False):
+    # A row for each number of parts; the last one keeps all the fine parts, whose boundaries are
+    # smooth: a part of the tree is cut along them.
+    n_fine = len(found.fine.features.vertices)
+    assert state["levels"] == found.tree.persistence[:n_fine].tolist()
+    np.testing.assert_array_equal(cuts[-1], np.arange(n_fine))
+    rough = es.segment(found.tree, n_regions=n_fine).labels
+    for row, n_regions in zip(cuts[::-1], range(n_fine, 0, -1), strict=False):
         cut = es.segment(found.tree, n_regions=n_regions)
-        np.testing.assert_array_equal(row[found.tree.basins], cut.labels)
+        np.testing.assert_array_equal(row[rough], cut.labels)
+    default = cuts[state["n_regions"] - n_fine - 1]
+    np.testing.assert_array_equal(default[found.fine.labels], found.parts.labels)
     assert "labels and cuts" in page.error("array", name="parts/merges")["message"]
     births, deaths, persistence, vertices = page.array("diagram").T
     assert (births >= deaths).all()

@@ -92,16 +92,15 @@ class _Parts:
     """What is measured of parts, for a surface of area 1.
 
     areas, means: as of `region_means`; n_balls, logs: number of inscribed balls, and the sum of the
-    logarithms of their radii; lengths, turns: length of each boundary, and the integral of the angle
-    by which the surface turns across it.
+    logarithms of their radii; borders: for each part its neighbors, with the length of the boundary
+    and the integral of the angle by which the surface turns across it.
     """
 
     areas: Float[np.ndarray, " r"]
     means: Float[np.ndarray, "r k"]
     n_balls: Float[np.ndarray, " r"]
     logs: Float[np.ndarray, " r"]
-    lengths: Float[np.ndarray, "r r"]
-    turns: Float[np.ndarray, "r r"]
+    borders: list[dict[int, Float[np.ndarray, " 2"]]]
     adjacent: Int[np.ndarray, "p 2"]
 
 
@@ -125,20 +124,18 @@ def _measure(mesh: TriangleMesh, parts: Segmentation, spectrum: Spectrum) -> _Pa
     n_balls = np.bincount(labels[sample], weights=weights, minlength=count)
     log_radii = weights * np.log(radii / side)
     logs = np.bincount(labels[sample], weights=log_radii, minlength=count)
-    lengths, turns = _measure_boundaries(unit, labels, tree, normals, side)
-    adjacent = adjacent_parts(mesh, labels)
-    return _Parts(areas, means, n_balls, logs, lengths, turns, adjacent)
+    borders = _measure_borders(unit, labels, tree, normals, side)
+    return _Parts(areas, means, n_balls, logs, borders, adjacent_parts(mesh, labels))
 
 
-def _measure_boundaries(
+def _measure_borders(
     mesh: TriangleMesh,
     labels: Int[np.ndarray, " f"],
     tree: KDTree,
     normals: Float[np.ndarray, "f 3"],
     side: float,
-) -> tuple[Float[np.ndarray, "r r"], Float[np.ndarray, "r r"]]:
-    """Return length and integrated turn of the boundary between each two parts."""
-    count = int(labels.max()) + 1
+) -> list[dict[int, Float[np.ndarray, " 2"]]]:
+    """Return the neighbors of each part, with length and integrated turn of the boundary."""
     table = edge_table(mesh)
     pairs, edges = face_pairs(table)
     crossing = labels[pairs[:, 0]] != labels[pairs[:, 1]]
@@ -160,23 +157,28 @@ def _measure_boundaries(
     spread = np.einsum("pi,pi->p", normals[after] - normals[before], across)
     turns *= -np.sign(spread)
 
-    boundaries = np.zeros((2, count, count))
-    one, two = labels[pairs].T
-    for matrix, values in zip(boundaries, (lengths, lengths * turns), strict=True):
-        np.add.at(matrix, (one, two), values)
-        np.add.at(matrix, (two, one), values)
-    return boundaries[0], boundaries[1]
+    count = int(labels.max()) + 1
+    low, high = np.sort(labels[pairs], axis=1).T
+    keys, border = np.unique(low * count + high, return_inverse=True)
+    sums = [np.bincount(border, weights=values) for values in (lengths, lengths * turns)]
+    borders: list[dict[int, Float[np.ndarray, " 2"]]] = [{} for _ in range(count)]
+    for key, both in zip(keys.tolist(), np.column_stack(sums), strict=True):
+        one, two = divmod(key, count)
+        borders[one][two] = borders[two][one] = both
+    return borders
 
 
 def _merge_by_contrast(parts: _Parts, fine: Segmentation) -> list[Merge]:
     """Merge parts by the odds of `weigh_parts`, as persistences; what was measured changes in place."""
     areas, means, n_balls, logs = parts.areas, parts.means, parts.n_balls, parts.logs
+    borders = parts.borders
     scale = PART_CONTRAST / (1 - PART_CONTRAST) * np.exp(-LOG_CONTRAST)
 
     def contrast(one: int, two: int) -> float:
         share = areas[one] * areas[two] / (areas[one] + areas[two])
         gap = np.square(means[one] - means[two]).sum()
-        evidence = TURN_WEIGHT * parts.turns[one, two] / parts.lengths[one, two]
+        length, turned = borders[one][two]
+        evidence = TURN_WEIGHT * turned / length if length > 0 else 0.0
         if n_balls[one] > 0 and n_balls[two] > 0:
             difference = abs(logs[one] / n_balls[one] - logs[two] / n_balls[two])
             evidence += THICKNESS_WEIGHT * min(difference, MOST_DIFFERENCE)
@@ -189,8 +191,10 @@ def _merge_by_contrast(parts: _Parts, fine: Segmentation) -> list[Merge]:
         areas[remains] = total
         for sums in (n_balls, logs):
             sums[remains] += sums[ends]
-        for sums in (parts.lengths, parts.turns):
-            sums[remains] += sums[ends]
-            sums[:, remains] += sums[:, ends]
+        for other, both in borders[ends].items():
+            del borders[other][ends]
+            if other != remains:
+                borders[remains][other] = borders[remains].get(other, 0) + both
+                borders[other][remains] = borders[remains][other]
 
     return merge_cheapest(parts.adjacent, fine.features.values, contrast, join, FINE_CONTRAST)

@@ -121,10 +121,11 @@ class Analysis:
     def parts_facts(self) -> dict[str, Any]:
         """Return how far the parts are, and how persistent each is."""
         found = None if self.parts is None else self.parts.result
+        n_fine = 0 if found is None else len(found.fine.features.vertices)
         return {
             **(NO_JOB if self.parts is None else self.parts.facts()),
             "n_regions": 0 if found is None else len(found.parts.features.vertices),
-            "levels": [] if found is None else found.tree.persistence.tolist(),
+            "levels": [] if found is None else found.tree.persistence[:n_fine].tolist(),
         }
 
     def _assess_health(self, _progress: Progress) -> dict[str, Any]:
@@ -255,16 +256,17 @@ def vertex_labels(mesh: es.TriangleMesh, labels: np.ndarray) -> np.ndarray:
     return np.asarray(around.tocsr().argmax(axis=1)).ravel().astype(np.int32)
 
 
-def cut_rows(tree: es.features.PartTree) -> np.ndarray:
-    """Return the part of each finest region for every number of parts, one row each, fewest first.
+def cut_rows(found: es.features.PartDecomposition) -> np.ndarray:
+    """Return the part of each fine part for every number of parts, one row each, fewest first.
 
-    A row equals `es.segment` with that number of regions. Regions are sorted by falling
-    persistence, so the last region that is left is always the next to merge with its parent.
+    Parts are sorted by falling persistence, so the last one that is left is always the next to
+    merge with its parent. Their boundaries are smooth in every cut.
     """
-    part = np.arange(len(tree.parent), dtype=np.int32)
+    parent = found.tree.parent[: len(found.fine.features.vertices)]
+    part = np.arange(len(parent), dtype=np.int32)
     rows = [part.copy()]
-    for last in range(len(part) - 1, np.count_nonzero(tree.parent < 0) - 1, -1):
-        part[part == last] = part[tree.parent[last]]
+    for last in range(len(part) - 1, np.count_nonzero(parent < 0) - 1, -1):
+        part[part == last] = part[parent[last]]
         rows.append(part.copy())
     return np.stack(rows[::-1])
 

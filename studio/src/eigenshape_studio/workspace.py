@@ -277,9 +277,9 @@ class Workspace:
     def _parts_array(self, tail: str) -> np.ndarray:
         found = self._require_parts()
         if tail == "labels":
-            return vertex_labels(found.mesh, found.tree.basins)
+            return vertex_labels(found.mesh, found.fine.labels)
         if tail == "cuts":
-            return cut_rows(found.tree)
+            return cut_rows(found)
         raise RequestError(f"Of parts there are labels and cuts; {tail[:80]!r} was requested.")
 
     def _values_array(self, tail: str) -> np.ndarray:

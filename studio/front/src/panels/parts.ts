@@ -19,10 +19,10 @@ export class PartsPanel extends ColoringPanel {
   readonly title = "Parts";
   private readonly form = new Form(markup);
   private plot: uPlot | null = null;
-  private finest = new Int32Array(); // region of each vertex
+  private finest = new Int32Array(); // fine part of each vertex
   private labels = new Int32Array(); // part of each vertex, by the present cut
   private cuts = new Int32Array();
-  private levels: number[] = []; // persistence of each finest region, falling
+  private levels: number[] = []; // persistence of each fine part, falling
   private diagram = new Float64Array(); // birth, death, persistence, vertex in turn
   private areas = new Float32Array();
   private nParts = 0;
@@ -74,7 +74,8 @@ export class PartsPanel extends ColoringPanel {
     this.form.setRange("n-parts", fewest, this.levels.length);
     this.form.setRange("maximum", 0, this.diagram.length / 4 - 1);
     this.plotDiagram();
-    this.cut(settings.get(`parts of ${state.name}`, state.parts.n_regions));
+    const count = settings.get(`parts of ${state.name}`, state.parts.n_regions);
+    this.cut(Math.min(count, this.levels.length));
   }
 
   /** Return the persistence of a step; steps are finer below, where most levels are. */
@@ -87,7 +88,7 @@ export class PartsPanel extends ColoringPanel {
     this.cut(this.levels.filter((level) => level >= persistence).length, persistence);
   }
 
-  /** Unite the finest regions to a number of parts, and show them; both sliders say the same. */
+  /** Unite fine parts to a number of parts, and show them; both sliders say the same. */
   private cut(count: number, persistence = this.levels[count - 1]!): void {
     const { form, levels } = this;
     this.nParts = count;
