@@ -84,7 +84,7 @@ def _residuals(of: Any, vectors: np.ndarray) -> Work:
     return 2.0 * (vectors.nbytes + chunks * 12 * of.stiffness.nnz), 0.0  # quotients first
 
 
-def _proof(_pencil: object, of: Any) -> Work:
+def _proof(_pencil: object, of: Any, *_: object) -> Work:
     return float(of.vectors.nbytes), 2.0 * len(of.vectors) * of.vectors.shape[1] ** 2  # ΦᵀBΦ
 
 

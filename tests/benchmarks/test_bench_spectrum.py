@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -83,10 +84,18 @@ def test_the_script_runs_and_its_json_has_what_it_should(tmp_path):
     assert again.read_text() == page.read_text()
 
 
+def is_installed(library):
+    """Return whether a library is here; the two that only benchmarks use need not be."""
+    optional = library.package in ("cholespy", "pypardiso")
+    return not optional or find_spec(library.package) is not None
+
+
 def test_every_library_solves_the_pencil_that_it_says(modules):
     shape = shape_of(es.shapes.torus(24, 16))
     shape["vertices"] *= [1.0, 1.1, 0.9]  # no symmetry left: nothing to be missed
-    for name, library in modules["libraries"].LIBRARIES.items():
+    libraries = modules["libraries"].LIBRARIES
+    for name in [name for name in libraries if is_installed(libraries[name])]:
+        library = libraries[name]
         found, (values, vectors), matrices = modules["worker"].measured(library, shape, 10)
         expected = modules["worker"].reference(matrices, 10)
         np.testing.assert_allclose(values, expected, atol=1e-6 * expected[-1], err_msg=name)
