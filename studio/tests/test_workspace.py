@@ -281,7 +281,7 @@ def test_parts_cut_in_the_browser_are_those_of_segment():
     # A row for each number of parts; the last one keeps all the fine parts, whose boundaries are
     # smooth: a part of the tree is cut along them.
     n_fine = len(found.fine.features.vertices)
-    assert state["levels"] == found.tree.persistence[:n_fine].tolist()
+    assert state["levels"] == [None, *found.tree.persistence[1:n_fine].tolist()]  # null: no end
     np.testing.assert_array_equal(cuts[-1], np.arange(n_fine))
     rough = es.segment(found.tree, n_regions=n_fine).labels
     for row, n_regions in zip(cuts[::-1], range(n_fine, 0, -1), strict=False):
