@@ -162,9 +162,7 @@ def compared(scene: OtherScene) -> dict[str, float]:
 
 def cells(row: dict[str, float]) -> list[str]:
     """Return the texts of one row: ratios with two digits, errors with four."""
-    ratios = [" over " in f" {key}" for key in COLUMNS]
-    pairs = zip(COLUMNS, ratios, strict=True)
-    return [f"{row[key]:.2f}" if ratio else f"{row[key]:.4f}" for key, ratio in pairs]
+    return [f"{row[key]:.{2 if 'over' in key else 4}f}" for key in COLUMNS]
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ from eigenshape.deformation.rig import EigenRig
 from eigenshape.deformation.rigidity import (
     FreePart,
     free_part,
-    pulled_part,
+    pull_part,
     require_fixed_vertices,
 )
 from eigenshape.geometry.geodesic import geodesic_distance_to_set
@@ -192,7 +192,7 @@ def pull_binding(binding: Binding, strength: float) -> Binding:
     no limb can fold away; folds of single edges take a strength of about the number of vertices.
     """
     areas = binding.rig.areas
-    return replace(binding, part=pulled_part(binding.part, strength * areas / areas.sum()))
+    return replace(binding, part=pull_part(binding.part, strength * areas / areas.sum()))
 
 
 def _placed_beyond_rims(

@@ -122,7 +122,7 @@ def free_part(edges: EdgeWeights, fixed: Bool[np.ndarray, " n"]) -> FreePart:
     return FreePart(free, fitted, rows, np.zeros(len(free)), factor)
 
 
-def pulled_part(part: FreePart, pull: Float[np.ndarray, " n"]) -> FreePart:
+def pull_part(part: FreePart, pull: Float[np.ndarray, " n"]) -> FreePart:
     """Return the same free vertices, pulled to their start; the order of elimination stays."""
     if part.factor is None:
         return part

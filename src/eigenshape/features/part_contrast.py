@@ -91,14 +91,15 @@ def _merges_below_cut(tree: PartTree) -> list[Merge]:
 class _Parts:
     """What is measured of parts, for a surface of area 1.
 
-    areas, means: as of `region_means`; n_balls, logs: number of inscribed balls, and the sum of the
-    logarithms of their radii; borders: for each part its neighbors, with the length of the boundary
-    and the integral of the angle by which the surface turns across it.
+    areas, means: as of `region_means`; sampled, logs: area of the faces at which balls are
+    inscribed, and the integral of the logarithms of their radii over it; borders: for each part its
+    neighbors, with the length of the boundary and the integral of the angle by which the surface
+    turns across it.
     """
 
     areas: Float[np.ndarray, " r"]
     means: Float[np.ndarray, "r k"]
-    n_balls: Float[np.ndarray, " r"]
+    sampled: Float[np.ndarray, " r"]
     logs: Float[np.ndarray, " r"]
     borders: list[dict[int, Float[np.ndarray, " 2"]]]
     adjacent: Int[np.ndarray, "p 2"]
@@ -121,11 +122,11 @@ def _measure(mesh: TriangleMesh, parts: Segmentation, spectrum: Spectrum) -> _Pa
     sample = np.arange(0, mesh.n_faces, max(1, mesh.n_faces // N_BALLS))
     radii = inscribed_radii(tree, normals, sample, LARGEST_BALL * side)
     weights = face_area[sample] / side**2
-    n_balls = np.bincount(labels[sample], weights=weights, minlength=count)
+    sampled = np.bincount(labels[sample], weights=weights, minlength=count)
     log_radii = weights * np.log(radii / side)
     logs = np.bincount(labels[sample], weights=log_radii, minlength=count)
     borders = _measure_borders(unit, labels, tree, normals, side)
-    return _Parts(areas, means, n_balls, logs, borders, adjacent_parts(mesh, labels))
+    return _Parts(areas, means, sampled, logs, borders, adjacent_parts(mesh, labels))
 
 
 def _measure_borders(
@@ -170,7 +171,7 @@ def _measure_borders(
 
 def _merge_by_contrast(parts: _Parts, fine: Segmentation) -> list[Merge]:
     """Merge parts by the odds of `weigh_parts`, as persistences; what was measured changes in place."""
-    areas, means, n_balls, logs = parts.areas, parts.means, parts.n_balls, parts.logs
+    areas, means, sampled, logs = parts.areas, parts.means, parts.sampled, parts.logs
     borders = parts.borders
     scale = PART_CONTRAST / (1 - PART_CONTRAST) * np.exp(-LOG_CONTRAST)
 
@@ -179,8 +180,8 @@ def _merge_by_contrast(parts: _Parts, fine: Segmentation) -> list[Merge]:
         gap = np.square(means[one] - means[two]).sum()
         length, turned = borders[one][two]
         evidence = TURN_WEIGHT * turned / length if length > 0 else 0.0
-        if n_balls[one] > 0 and n_balls[two] > 0:
-            difference = abs(logs[one] / n_balls[one] - logs[two] / n_balls[two])
+        if sampled[one] > 0 and sampled[two] > 0:
+            difference = abs(logs[one] / sampled[one] - logs[two] / sampled[two])
             evidence += THICKNESS_WEIGHT * min(difference, MOST_DIFFERENCE)
         odds = scale * share**AREA_POWER * gap * np.exp(evidence)
         return float(odds / (1 + odds))
@@ -189,7 +190,7 @@ def _merge_by_contrast(parts: _Parts, fine: Segmentation) -> list[Merge]:
         total = areas[remains] + areas[ends]
         means[remains] = (areas[remains] * means[remains] + areas[ends] * means[ends]) / total
         areas[remains] = total
-        for sums in (n_balls, logs):
+        for sums in (sampled, logs):
             sums[remains] += sums[ends]
         for other, both in borders[ends].items():
             del borders[other][ends]

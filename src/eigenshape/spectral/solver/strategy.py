@@ -203,8 +203,9 @@ def _solve_sparse(
             return pairs, certificate
         if missing == 0 or run == MOST_RUNS:
             break
-        # The count has spent the factor, which saves much memory where nothing is missing.
-        factor = factorize_near(pencil, factor.shift)
+        if certificate is not None:
+            # The count has spent the factor, which saves much memory where nothing is missing.
+            factor = factorize_near(pencil, factor.shift)
         groups, more = min(1 + -(-missing // LANES), MOST_GROUPS), _in_run(report, run)
         _, found = block_lanczos(
             pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more
@@ -264,7 +265,7 @@ def _in_run(report: Progress, run: int) -> Callable[[float], None]:
 def _remaining(
     pencil: Pencil, factor: Factor, pairs: Pairs, k: int
 ) -> tuple[Certificate | None, Wanted]:
-    """Return the certificate, complete or not, and what the next run has to find; the factor is spent."""
+    """Return the certificate, complete or not, and what the next run has to find; a count spends the factor."""
     certificate = prove(pencil, pairs, factor) if len(pairs.values) == k else None
     missing = certificate.n_missing if certificate else k - len(pairs.values)
     missing = min(max(missing, 0), k)
