@@ -10,6 +10,7 @@ from eigenshape.features.contrast import FINE_CONTRAST, PART_CONTRAST
 from eigenshape.features.part_merging import (
     PART_TIME,
     Merge,
+    heat_coordinates,
     merge_cheapest,
     region_means,
     tree_of_merges,
@@ -107,9 +108,7 @@ class _Parts:
 
 def _measure(mesh: TriangleMesh, parts: Segmentation, spectrum: Spectrum) -> _Parts:
     labels, count = parts.labels, len(parts.features.vertices)
-    area = float(spectrum.mass.sum())
-    coordinates = spectrum.eigenvectors * np.exp(-PART_TIME * area * spectrum.eigenvalues)
-    areas, means = region_means(mesh, labels, coordinates)
+    areas, means = region_means(mesh, labels, heat_coordinates(spectrum, PART_TIME))
 
     points, _ = scale_to_unit(mesh)
     unit = TriangleMesh(points, mesh.faces)

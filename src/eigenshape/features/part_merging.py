@@ -92,10 +92,15 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
     heat = heat_kernel_signature(spectrum, [SEED_TIME * area])[:, 0]
     n_components, _ = vertex_components(mesh)
     seeds = segment(merge_tree(mesh, heat), n_regions=N_SEEDS + n_components - 1)
-    coordinates = spectrum.eigenvectors * np.exp(-share * area * spectrum.eigenvalues)
-    areas, means = region_means(mesh, seeds.labels, coordinates)
+    areas, means = region_means(mesh, seeds.labels, heat_coordinates(spectrum, share))
     merges = _merge_by_heat(areas, means, adjacent_parts(mesh, seeds.labels), seeds.features.values)
     return tree_of_merges(seeds, merges)
+
+
+def heat_coordinates(spectrum: Spectrum, share: float) -> Float[np.ndarray, "n k"]:
+    """Return e^{-tλ} φ at each vertex, with the time t as a share of the area."""
+    area = float(spectrum.mass.sum())
+    return np.asarray(spectrum.eigenvectors * np.exp(-share * area * spectrum.eigenvalues))
 
 
 def tree_of_merges(seeds: Segmentation, merges: list[Merge]) -> PartTree:
