@@ -8,10 +8,12 @@ from typing import no_type_check
 from eigenshape._compile import njit
 from eigenshape.sparse.dense_loops import eliminate_blocked, eliminate_plain
 from eigenshape.sparse.lane_loops import (
+    LANES,
     add_row,
     clear_row,
     copy_row,
     divide_row,
+    fetch_row,
     subtract_four_sums,
     subtract_sum,
     write_four_negative_sums,
@@ -22,6 +24,7 @@ WIDE = 64  # columns in a panel of L: 32 of its rows are 16 KiB, half of the fir
 SMALL = 40  # rows of a front up to which plain loops are faster (measured)
 WHOLE, GATHER, KEEP = 0, 1, 2  # stages of `factor_fronts`
 NEAR = 32  # rows of a panel that fit into the first-level cache
+SOON = 64  # cache lines of the next panel that are asked for ahead (measured)
 
 
 @njit
@@ -137,10 +140,10 @@ def solve_lower(tree, tasks, panels, right, lanes, gathered, begin, end):
 
 @njit
 @no_type_check
-def solve_upper(tree, rows, fronts, panels, pivots, lanes, solution, gathered, near, begin, end):
+def solve_upper(tree, rows, fronts, panels, pivots, lanes, solution, gathered, begin, end):
     """Fill rows of `solution` with L⁻ᵀ D⁻¹ times the result of `solve_lower` in `lanes`.
 
-    The rows of tasks begin to end - 1, in the order of the matrix. `gathered` and `near` are
+    The rows of tasks begin to end - 1, in the order of the matrix. `gathered` is
     scratch.
     """
     order, first, begins, places = tree
@@ -150,6 +153,10 @@ def solve_upper(tree, rows, fronts, panels, pivots, lanes, solution, gathered, n
         for s in range(fronts[task + 1] - 1, fronts[task] - 1, -1):
             height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
             stop = places[s + 1]
+            # Memory is read backward, which processors do not foresee.
+            soon = places[max(s - 1, 0)] // LANES
+            for line in range(soon, min(soon + SOON, stop // LANES)):
+                fetch_row(panels, line)
             for block in range((width - 1) // WIDE * WIDE, -1, -WIDE):
                 columns, mine = min(WIDE, width - block), first[s] + block
                 rest = height - block - columns
@@ -160,18 +167,23 @@ def solve_upper(tree, rows, fronts, panels, pivots, lanes, solution, gathered, n
                 four = columns // 4 * 4
                 for low in range(0, rest, NEAR):
                     count, corner = min(NEAR, rest - low), below + low * columns
-                    for i in range(count * columns):
-                        near[i] = panels[corner + i]
                     for j in range(0, four, 4):
                         subtract_four_sums(
-                            near, j, columns, 1, gathered, low, count, lanes, mine + j
+                            panels, corner + j, columns, 1, gathered, low, count, lanes, mine + j
                         )
                     for j in range(four, columns):
-                        subtract_sum(near, j, columns, 0, gathered, low, count, lanes, mine + j)
-                for j in range(columns - 2, -1, -1):
-                    count, given = columns - 1 - j, mine + j + 1
-                    place = at + (j + 1) * columns + j
-                    subtract_sum(panels, place, columns, 0, lanes, given, count, lanes, mine + j)
+                        subtract_sum(
+                            panels, corner + j, columns, 0, gathered, low, count, lanes, mine + j
+                        )
+                # Row by row, so that rows above do not wait for one another.
+                for i in range(columns - 1, 0, -1):
+                    row, four = at + i * columns, i // 4 * 4
+                    for j in range(0, four, 4):
+                        subtract_four_sums(
+                            panels, row + j, 0, 1, lanes, mine + i, 1, lanes, mine + j
+                        )
+                    for j in range(four, i):
+                        subtract_sum(panels, row + j, 0, 0, lanes, mine + i, 1, lanes, mine + j)
                 stop = at
         for i in range(first[fronts[task]], first[fronts[task + 1]]):
             copy_row(lanes, i, solution, order[i])

@@ -33,10 +33,10 @@ Updates = tuple[Float[np.ndarray, " u"], Indices]
 
 @dataclass(frozen=True, eq=False)
 class Scratch:
-    """Memory for solves: the rows of all tasks, and for each thread rows and a panel of a front."""
+    """Memory for solves: the rows of all tasks, and for each thread those of a front."""
 
     lanes: Float[np.ndarray, "m 8"]
-    rooms: SpareMemory[tuple[Float[np.ndarray, "t 8"], Float[np.ndarray, " p"]]]
+    rooms: SpareMemory[Float[np.ndarray, "t 8"]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +83,7 @@ class SymmetricFactor:
         holds no scratch memory.
         """
         tallest, n_rows = self.elimination.tallest, int(self.elimination.tasks.own_rows[-1])
-        rooms = SpareMemory(
-            lambda: (np.empty((tallest, LANES)), np.empty(fronts.NEAR * fronts.WIDE))
-        )
+        rooms = SpareMemory(lambda: np.empty((tallest, LANES)))
         return Scratch(np.empty((n_rows, LANES)), rooms)
 
     def solve_lanes(
@@ -99,13 +97,13 @@ class SymmetricFactor:
         tree, tasks = (e.order, e.first, e.begins, e.places), e.tasks
 
         def solve_lower(*task: int) -> None:
-            with scratch.rooms.lend() as (gathered, _):
+            with scratch.rooms.lend() as gathered:
                 given = tree, tasks.arrays, self.panels, right, lanes, gathered
                 fronts.solve_lower(*given, *task)
 
         def solve_upper(*task: int) -> None:
-            with scratch.rooms.lend() as room:
-                given = tree, e.rows, tasks.first, self.panels, self.pivots, lanes, out, *room
+            with scratch.rooms.lend() as gathered:
+                given = tree, e.rows, tasks.first, self.panels, self.pivots, lanes, out, gathered
                 fronts.solve_upper(*given, *task)
 
         if tasks.n == 1 or free_threads() == 1:

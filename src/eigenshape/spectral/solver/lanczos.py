@@ -24,6 +24,11 @@ SHRUNK = 1e-2
 REPEATS = 5
 # A column that projection shortens to this share is rounding: the space is invariant.
 NEGLIGIBLE = 1e-13
+# A projection on older blocks is skipped if the one before took at most this share of a block away:
+# eigenvectors are corrected to first order, and what is left is its square.
+MOST_LOST = 1e-6
+# Distance of two θ, relative to them, below which one eigenvector is not corrected by the other.
+CLUSTERED = 1e-6
 # A space grows by at least this part of itself before it is checked again.
 CHECK_SHARE = 16
 # Pivots of a Gram matrix, relative to lengths: below this one Cholesky has lost too many digits,
@@ -96,12 +101,19 @@ class Wanted:
 class Krylov:
     """A space V, the operator projected on it, and the block that continues it.
 
-    (W - σB)⁻¹B V = V T + fresh C Eᵀ, with E the last columns of the identity.
+    (W - σB)⁻¹B V = V (T + R) + fresh C Eᵀ, with T symmetric and block tridiagonal, and E the last
+    columns of the identity. R is what projections on older blocks took away, the rounding of the
+    recurrence: `projected` holds the upper triangle of T + R, and R lies above the blocks of T.
     """
 
     space: Slots
     projected: Float[np.ndarray, "m m"]
     coupling: Float[np.ndarray, "b b"]
+
+    def rounding(self) -> Float[np.ndarray, "m m"]:
+        """Return R."""
+        rows = np.arange(len(self.projected)) // len(self.coupling)
+        return np.where(rows - rows[:, None] > 1, self.projected, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,13 +135,15 @@ def block_lanczos(
     groups: int = 1,
     report: Callable[[float], None],
 ) -> tuple[Float[np.ndarray, " j"], Float[np.ndarray, "n j"]]:
-    """Return eigenvalues around the shift, ascending, and B-orthonormal eigenvectors, orthogonal to `locked`.
+    """Return eigenvalues around the shift, ascending, and eigenvectors, orthogonal to `locked`.
 
+    They are B-orthonormal to more than half of the digits, and `lowest_pairs` makes them so to all.
     The columns of `locked` are B-orthonormal. Unrestarted block Lanczos on (W - σB)⁻¹B in the
-    inner product of B (Grimes, Lewis and Simon 1994), in blocks of `groups` times eight columns,
-    every block orthogonalized against all before it. It stops when what the space has seen of
-    `wanted` has converged; copies of an eigenvalue beyond the width of the block may be missing,
-    which an inertia count tells afterwards.
+    inner product of B (Grimes, Lewis and Simon 1994), in blocks of `groups` times eight columns.
+    Every second block is orthogonalized against all before it, the others against two (Simon 1984),
+    and what that leaves in the recurrence is taken out of the eigenvectors. It stops when what the
+    space has seen of `wanted` has converged; copies of an eigenvalue beyond the width of the block
+    may be missing, which an inertia count tells afterwards.
 
     Raises
     ------
@@ -150,11 +164,13 @@ def block_lanczos(
     missing = wanted.below + wanted.above
     check = min(8 * missing // 5 + 8 * block, capacity)  # sooner they have never all converged
     seen: list[tuple[int, int]] = []
+    skip = False
     for size in range(block, capacity + 1, block):
         filled = first + size // LANES
         image = inner.image(space[filled - groups : filled])
-        along, coupling = _orthonormalize(inner, space[: filled + groups], image, rng)
+        along, coupling = _orthonormalize(inner, space[: filled + groups], image, rng, skip=skip)
         projected[:size, size - block : size] = along[first * LANES :]
+        skip = not skip and _stays_orthogonal(along, coupling)
         if size >= check:
             krylov = Krylov(space[first : filled + groups], projected[:size, :size], coupling)
             ritz = _ritz(krylov, factor.shift)
@@ -188,21 +204,33 @@ def _capacity(pencil: Pencil, wanted: Wanted, n_locked: int, block: int) -> int:
     return max(min(available, most) // block, 1) * block
 
 
+def _stays_orthogonal(along: Float[np.ndarray, "m b"], upper: Float[np.ndarray, "b b"]) -> bool:
+    """Return whether a block came out nearly orthogonal to those before the last two."""
+    older = np.abs(along[: -2 * len(upper)])
+    return bool((older <= MOST_LOST * np.diag(upper).min()).all())
+
+
 def _orthonormalize(
-    inner: Operator, space: Slots, columns: Block, rng: np.random.Generator
+    inner: Operator,
+    space: Slots,
+    columns: Block,
+    rng: np.random.Generator,
+    *,
+    skip: bool = False,
 ) -> tuple[Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
     """Split columns = known along + fresh upper, with [known, fresh] = space orthonormal; return along and upper.
 
     The last slots of `space` are filled with what is fresh; the columns are used up. The recent
-    blocks, which take most of a Lanczos image away, are projected out first, then all of them.
+    blocks, which take most of a Lanczos image away, are projected out first, then all of them, or
+    the recent ones again where the others are to be skipped and no column became short.
     """
     groups, block = len(columns), len(columns) * LANES
     known, fresh = space[:-groups], space[-groups:]
+    recent = known[-2 * groups :]
     along = np.zeros((len(known) * LANES, block))
     lengths = np.sqrt(np.einsum("gij,gij->gj", columns, inner.weigh(columns))).ravel()
-    recent = max(len(known) - 2 * groups, 0)
-    along[recent * LANES :] += _project(inner, known[recent:], columns)
-    along += _project(inner, known, columns)
+    for near in (recent, recent if skip else known):
+        along[(len(known) - len(near)) * LANES :] += _project(inner, near, columns)
     upper, short = _gram_schmidt(inner, columns, fresh, lengths, rng)
     for _ in range(REPEATS):
         if not short:
@@ -341,6 +369,20 @@ def _choose(ritz: Ritz, wanted: Wanted) -> tuple[Int[np.ndarray, " j"], int]:
 def _vectors(krylov: Krylov, ritz: Ritz, chosen: Int[np.ndarray, " j"]) -> Float[np.ndarray, "n j"]:
     # One step of the operator takes the residual out of a Ritz vector y: A y / θ = y + fresh C s /
     # θ, known already.
-    weights = ritz.coefficients[:, chosen]
+    weights = _corrected(krylov, ritz, chosen)
     step = krylov.coupling @ weights[-len(krylov.coupling) :] / ritz.thetas[chosen]
     return combine_columns(krylov.space, np.concatenate([weights, step]))
+
+
+def _corrected(
+    krylov: Krylov, ritz: Ritz, chosen: Int[np.ndarray, " j"]
+) -> Float[np.ndarray, "m j"]:
+    """Return coefficients of eigenvectors of T + R, to first order in R.
+
+    Those of `ritz` are of T + R + Rᵀ, so s loses Σ_i s_i (s_iᵀ Rᵀ s) / (θ - θ_i).
+    """
+    weights, thetas = ritz.coefficients[:, chosen], ritz.thetas[chosen]
+    parts = ritz.coefficients.T @ (krylov.rounding().T @ weights)
+    gaps = thetas - ritz.thetas[:, None]
+    parts[np.abs(gaps) <= CLUSTERED * np.abs(thetas)] = 0.0
+    return weights - ritz.coefficients @ np.divide(parts, gaps, out=parts, where=parts != 0)

@@ -92,17 +92,18 @@ def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[
         raise ConvergenceError(
             f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}."
         )
-    gram = np.zeros((k, k))
+    gram = np.zeros((k, k), np.float32)  # a correction needs few digits
     for columns, start, each in zip(chunks, starts, offs, strict=True):
         gram[start : columns.stop, columns] = each
         gram[columns, start : columns.start] = each[: columns.start - start].T
 
     def correct(share: tuple[int, int]) -> None:
         rows = vectors[slice(*share)]
-        step = np.empty_like(rows)
+        short = rows.astype(np.float32)
+        step = np.empty_like(short)
         for columns in chunks:
             near = slice(max(columns.start - LEANING_COLUMNS, 0), columns.stop + LEANING_COLUMNS)
-            np.matmul(rows[:, near], gram[near, columns], out=step[:, columns])
+            np.matmul(short[:, near], gram[near, columns], out=step[:, columns])
         step *= 0.5
         rows -= step
 
