@@ -39,15 +39,32 @@ def test_what_lies_behind_a_jump_is_not_joined():
 
 
 @pytest.mark.parametrize("nothing", [np.nan, 0.0], ids=["not finite", "origin"])
-def test_pixels_that_measured_nothing_are_holes(nothing):
-    depth = np.full((7, 7), 2.0)
-    depth[3, 3] = nothing
+def test_pixels_that_measured_nothing_are_no_vertices_and_many_are_a_hole(nothing):
+    depth = np.full((12, 12), 2.0)
+    depth[2, 2] = depth[2, 9:11] = nothing
+    depth[6:9, 6:9] = nothing
     made = triangulate_frame(frame(depth))
-    assert 24 not in made.source_vertices
-    assert made.mesh.n_vertices == 48
-    assert len(es.geometry.boundary_loops(made.mesh)) == 2
+    assert made.mesh.n_vertices == 144 - 1 - 2 - 9
+    assert len(es.geometry.boundary_loops(made.mesh)) == 2  # the rim, and that of the nine pixels
     points = frame(depth).reshape(-1, 3)
     assert np.array_equal(made.mesh.vertices, points[made.source_vertices])
+
+
+def test_any_pixels_of_a_wall_are_joined_once_and_face_the_camera():
+    depth = np.where(np.random.default_rng(0).random((40, 60)) < 0.2, np.nan, 2.0)
+    depth[0], depth[-1], depth[:, 0], depth[:, -1] = 2.0, 2.0, 2.0, 2.0
+    made = triangulate_frame(frame(depth))
+    assert es.geometry.surface_area(made.mesh) == pytest.approx(39 * 59 * (2 / 50) ** 2)
+    assert (es.geometry.face_normals(made.mesh)[:, 2] < 0).all()
+    assert len(es.geometry.boundary_loops(made.mesh)) == 1
+
+
+def test_a_slope_is_one_surface_though_pixels_are_lost():
+    depth = np.tile(2.0 + np.arange(12) * 4 * 2.0 / 50, (12, 1))  # four widths of a pixel a step
+    depth[5, 5] = np.nan
+    made = triangulate_frame(frame(depth))
+    assert es.geometry.vertex_components(made.mesh)[0] == 1
+    assert len(es.geometry.boundary_loops(made.mesh)) == 1
 
 
 @pytest.mark.parametrize("scale", [1e-100, 1e100])

@@ -162,10 +162,11 @@ def _move_boundary(
 ) -> None:
     """Move the boundary between two parts; `labels` changes in place."""
     # Restrict the network to the faces of the two parts.
-    faces = np.flatnonzero(np.isin(labels, parts))
+    is_either = (labels == parts[0]) | (labels == parts[1])
+    faces = np.flatnonzero(is_either)
     local = np.full(len(labels), -1)
     local[faces] = np.arange(len(faces))
-    inside = (local[network.pairs] >= 0).all(axis=1)
+    inside = is_either[network.pairs[:, 0]] & is_either[network.pairs[:, 1]]
     pairs, side = local[network.pairs[inside]], labels[faces] == parts[0]
     crossing = side[pairs[:, 0]] != side[pairs[:, 1]]
     if not crossing.any():  # an earlier cut has separated them

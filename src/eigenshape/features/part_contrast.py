@@ -40,6 +40,9 @@ LOG_CONTRAST = 0.09
 TURN_REACH = 0.02
 # Balls that measure thickness, about. A part of 1 % of the area has 20.
 N_BALLS = 2000
+# Points in a leaf of the tree that finds those in balls. Many points are nearly as far from the
+# center of a ball as the nearest: among 390,000, leaves of 10 took four times as long.
+LEAF_SIZE = 128
 # Largest ball, as a share of √area. A sphere's is 0.28.
 LARGEST_BALL = 0.5
 
@@ -115,7 +118,7 @@ def _measure(mesh: TriangleMesh, parts: Segmentation, spectrum: Spectrum) -> _Pa
     face_area = face_areas(unit)
     side = float(face_area.sum()) ** 0.5
     normals = face_normals(unit)
-    tree = KDTree(points[mesh.faces].mean(axis=1))
+    tree = KDTree(points[mesh.faces].mean(axis=1), leafsize=LEAF_SIZE)
 
     # Weighted by area, because faces differ in size.
     sample = np.arange(0, mesh.n_faces, max(1, mesh.n_faces // N_BALLS))

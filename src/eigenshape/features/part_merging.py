@@ -4,6 +4,7 @@ from collections.abc import Callable
 from heapq import heapify, heappop, heappush
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
@@ -141,13 +142,9 @@ def region_means(
     region_areas = np.bincount(labels, weights=weights, minlength=count)
     # The integral of a linear function over a face is a third of its area times the sum of the
     # corner values.
-    corners = np.repeat(weights / 3, 3)
-    corner_labels = np.repeat(labels, 3)
-    sums = [
-        np.bincount(corner_labels, weights=corners * column[mesh.faces.ravel()], minlength=count)
-        for column in values.T
-    ]
-    return region_areas, np.column_stack(sums) * areas.sum() ** 0.5 / region_areas[:, None]
+    corners = np.repeat(weights / 3, 3), (np.repeat(labels, 3), mesh.faces.ravel())
+    integrals = sp.coo_array(corners, shape=(count, mesh.n_vertices)).tocsr()
+    return region_areas, integrals @ values * areas.sum() ** 0.5 / region_areas[:, None]
 
 
 def _merge_by_heat(

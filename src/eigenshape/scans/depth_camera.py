@@ -167,8 +167,9 @@ def simulate_scan(
     A pinhole camera measures one depth at the middle of each pixel. The noise is that of a
     structured-light camera: its standard deviation grows with the square of the depth, and with the
     slant θ by (θ / (π/2 - θ))² (Nguyen, Izadi and Lovell, "Modeling Kinect sensor noise", 2012,
-    equation 3, at 1.5 m). Neighboring pixels form triangles if their depths differ by at most four
-    widths of a pixel.
+    equation 3, at 1.5 m). Pixels at most three columns and rows apart form triangles if their
+    depths differ by at most eight widths of a pixel for each column or row, so that single lost
+    pixels leave no holes.
 
     Examples
     --------

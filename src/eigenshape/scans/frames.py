@@ -1,7 +1,8 @@
 """Make a surface of a frame of a depth camera, along the grid of its pixels."""
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
+from scipy.spatial import Delaunay
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import area_vectors
@@ -10,13 +11,23 @@ from eigenshape.geometry.repair_report import RepairedMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import submesh
 
-# Neighboring pixels are connected if their depths differ by at most this many times the width of a
-# pixel at that depth. A larger value connects limbs with what lies behind them.
-LARGEST_JUMP = 4.0
+# Measured pixels are connected if their depths differ by at most this many times their distance in
+# the picture, in pixels: surfaces are connected up to a slant of 83 degrees.
+LARGEST_JUMP = 8.0
+# Largest distance, in columns or rows, of pixels that are connected across pixels that measured
+# nothing. A surface that turns away loses many of its pixels.
+LARGEST_GAP = 3
+# Distance in pixels from the picture to the corners that bound the triangulation of gaps. They lie
+# outside every circle through three pixels at most LARGEST_GAP apart, whose radius is below 40.
+FAR = 100.0
 
 
 def pixel_faces(depth: Float[np.ndarray, "h w"], focal: float) -> Int[np.ndarray, "f 3"]:
-    """Make two triangles of each square of pixels, along the diagonal with the smaller jump.
+    """Connect the measured pixels of a picture where they see one surface.
+
+    Each square of four measured pixels gives two triangles, along the diagonal with the smaller
+    jump. Elsewhere the triangles are those of Delaunay in the plane of the picture, if no side of
+    them is longer than 3 columns or rows, so that single lost pixels leave no holes.
 
     Parameters
     ----------
@@ -30,26 +41,68 @@ def pixel_faces(depth: Float[np.ndarray, "h w"], focal: float) -> Int[np.ndarray
     (f, 3) int
         Pixels, numbered row by row. Triangles across a jump in depth are left out.
     """
-    corner = np.arange(depth.size).reshape(depth.shape)
-    a, b, c, d = (
-        part.ravel()
-        for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1])
-    )
+    measured = np.isfinite(depth)
+    is_full = measured[:-1, :-1] & measured[:-1, 1:] & measured[1:, 1:] & measured[1:, :-1]
+    faces = np.concatenate([_square_faces(depth, is_full), _gap_faces(measured, is_full)])
+
+    # A face may be as deep as its extent in the picture allows.
+    places = np.stack(np.divmod(faces, depth.shape[1]), axis=2)
+    extents = np.ptp(places, axis=1).max(axis=1)
+    depths = depth.ravel()[faces]
+    widths = depths.mean(axis=1) / focal
+    return faces[np.ptp(depths, axis=1) <= LARGEST_JUMP * extents * widths]
+
+
+def _square_faces(
+    depth: Float[np.ndarray, "h w"], is_full: Bool[np.ndarray, "_ _"]
+) -> Int[np.ndarray, "f 3"]:
+    """Return two triangles of each full square, along the diagonal with the smaller jump."""
+    a = np.flatnonzero(np.pad(is_full, ((0, 1), (0, 1))))
+    b, c, d = a + 1, a + depth.shape[1] + 1, a + depth.shape[1]
     flat = depth.ravel()
-    with np.errstate(invalid="ignore"):
-        along = ~(np.abs(flat[a] - flat[c]) > np.abs(flat[b] - flat[d]))
+    along = np.abs(flat[a] - flat[c]) <= np.abs(flat[b] - flat[d])
     one = np.where(along[:, None], np.column_stack([a, b, c]), np.column_stack([a, b, d]))
     two = np.where(along[:, None], np.column_stack([a, c, d]), np.column_stack([b, c, d]))
-    faces = np.concatenate([one, two])
-    faces = faces[np.isfinite(flat[faces]).all(axis=1)]
-    depths = flat[faces]
-    return faces[np.ptp(depths, axis=1) <= LARGEST_JUMP * depths.mean(axis=1) / focal]
+    return np.concatenate([one, two])
+
+
+def _gap_faces(
+    measured: Bool[np.ndarray, "h w"], is_full: Bool[np.ndarray, "_ _"]
+) -> Int[np.ndarray, "f 3"]:
+    """Return the small Delaunay triangles of the measured pixels that lie in no full square."""
+    # The corners of these triangles belong to a square that is not full, and full squares are
+    # cells of the Delaunay triangulation. So it needs only those pixels; what it has within full
+    # squares is left out.
+    beside = np.zeros_like(measured)
+    for rows in (slice(None, -1), slice(1, None)):
+        for columns in (slice(None, -1), slice(1, None)):
+            beside[rows, columns] |= ~is_full
+    pixels = np.argwhere(measured & beside)
+    n_rows, n_columns = measured.shape
+    bottom, right = n_rows + FAR, n_columns + FAR
+    bounds = [[-FAR, -FAR], [-FAR, right], [bottom, -FAR], [bottom, right]]
+    triangles = Delaunay(np.concatenate([pixels, bounds])).simplices
+    triangles = triangles[(triangles < len(pixels)).all(axis=1)]
+
+    places = pixels[triangles]
+    rows, columns = (places.sum(axis=1) // 3).T  # the square in which the middle lies
+    outside = ~is_full[np.minimum(rows, n_rows - 2), np.minimum(columns, n_columns - 2)]
+    small = np.ptp(places, axis=1).max(axis=1) <= LARGEST_GAP
+    triangles, places = triangles[outside & small], places[outside & small]
+
+    # Faces turn as the squares do: from the columns to the rows.
+    first, second = (places[:, 1] - places[:, 0]).T, (places[:, 2] - places[:, 0]).T
+    turn = first[1] * second[0] - first[0] * second[1]
+    triangles = np.where(turn[:, None] < 0, triangles[:, ::-1], triangles)[turn != 0]
+    numbers = pixels[:, 0] * n_columns + pixels[:, 1]
+    return np.asarray(numbers[triangles])
 
 
 def triangulate_frame(points: Float[np.ndarray, "h w 3"]) -> RepairedMesh[TriangleMesh]:
-    """Connect neighboring pixels of a frame whose camera was at the origin.
+    """Connect the pixels of a frame whose camera was at the origin, across small gaps too.
 
-    The width of a pixel is measured: the median angle between the rays of neighboring pixels.
+    Each vertex is a measured point. The width of a pixel is measured: the median angle between the
+    rays of neighboring pixels.
 
     Parameters
     ----------
