@@ -18,12 +18,12 @@ from frame import rounded
 from outputs import give_out, output_file
 from real_shapes import DATA, labeled_shapes, require_data
 
-N_PAIRS, FIRST_SEED = 6, 800  # of each set
+N_PAIRS, FIRST_SEED = 4, 800  # of each set
 SCALES = 0.5, 2.0  # the part is given in a unit between these
 # Classes of which no shape was looked at before, and how many of the first shapes of each are
 # matched, each to the next one.
 CLASSES = ("ant", "armadillo", "hand", "human", "teddy")
-N_OF_CLASS = 3
+N_OF_CLASS = 2
 SHARE = 0.6  # of the vertices of an individual that a plane keeps
 
 
