@@ -3,20 +3,20 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape.matching.pairs import FEWEST_PAIRS, Pairs, couplings
+from eigenshape.matching.pairs import Pairs, couplings
 from eigenshape.matching.surface import Surface
 
-N_FAR = 14  # points of the part that are assigned; 20 take half as long again and gain 0.3
+N_FAR = 14  # points of the part that are assigned; 20 take half as long again and gain 0.3 to 0.8
 N_PLACES = 100  # cells of the whole; each far point goes to the most similar point of one of them
-# Distances of far points change with the pose by up to 18 %; a slack of 0.3 is no better.
+# Distances of far points change with the pose by up to 18 %; slacks of 0.3 and 0.4 are as good.
 FAR_SLACK = 0.4
 # What the logarithm of a difference of patches counts beside the support by one other pair, and the
-# least difference, in medians of those of the most similar points. Twice as much is worse by 2 to 5.
+# least difference, in medians of those of the most similar points. Twice as much is worse by 1.
 UNLIKE, LEAST_COST = 0.5, 0.2
 # Assignments are kept that are among the best N_ALIKE of those that take the first two points to
 # the same two of N_REGIONS regions of the whole, so that all permutations of limbs stay in the
-# search; without regions one to five assignments of one kind are left, and errors are three times
-# as large.
+# search; without regions one to five different assignments are left, and their errors are two to
+# three times as large.
 N_REGIONS, N_ALIKE = 30, 4
 WIDTH = 1000  # partial assignments that are extended at a time
 N_ASSIGNMENTS = 30
@@ -31,9 +31,10 @@ def assign_far_points(
 
     The search extends partial assignments by one point at a time and keeps the best ones (beam
     search). An assignment is worth what its pairs support each other, by distances and directions
-    along the surface (`couplings`), less what their patches differ.
+    along the surface (`couplings`), less what their patches differ. A part with too few points has
+    no assignment.
     """
-    if len(part.points) < FEWEST_PAIRS:
+    if len(part.points) < N_FAR:
         return []
     far = _far_points(part)
     # In each cell of the whole, each far point has one candidate: the most similar point.
@@ -81,7 +82,7 @@ def _far_points(part: Surface) -> Int[np.ndarray, " f"]:
     """Return points of a part that are far from each other and, if possible, from its rim."""
     inside = part.weights.min(axis=1).astype(np.float64)
     found = [int((inside * part.between.mean(axis=1)).argmax())]
-    while len(found) < min(N_FAR, len(part.points)):
+    while len(found) < N_FAR:
         found.append(int((inside * part.between[found].min(axis=0)).argmax()))
     return np.array(found)
 
