@@ -19,7 +19,7 @@ UNLIKE, LEAST_COST = 0.5, 0.2
 # three times as large.
 N_REGIONS, N_ALIKE = 30, 4
 WIDTH = 1000  # partial assignments that are extended at a time
-N_ASSIGNMENTS = 30
+N_ASSIGNMENTS = 30  # that are bent roughly, which takes half a second
 # Two assignments differ if they take more than this share of the points farther apart than APART.
 DIFFERENT, APART = 0.2, 0.12
 
