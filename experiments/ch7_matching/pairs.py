@@ -10,6 +10,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from real_shapes import DATA
+from surgery import bridge
 
 # Chosen before any result was looked at: constants were tuned on horses, cats and wolves, and lions
 # and the rigid pairs report.
@@ -27,11 +28,20 @@ RIGID = {
     "human": ["tosca_david0", "tosca_michael3", "tosca_victoria10"],
 }
 SETS = ("cuts", "holes", "scans", "noise", "wholes")
+FURTHER_SETS = ("pieces", "bridges")
 N_VERTICES = 5000  # of the whole, and of the other shape before it is cut
 N_TRUE = 400  # vertices of a part at which errors are measured
 JITTER = 0.15  # of the mean edge: vertices are moved along the surface before they are thinned out
+# A pose of an animal that is its own mirror image in the plane x = 0. No other animal of the sets
+# has one.
+SYMMETRIC = {"lion": "sumner_lion-reference"}
 NOISE = 0.25  # of the mean edge, in each coordinate
 MOST_HOLES = 20
+OFF_SURFACE = 0.03  # roots of the area: vertices of a part that lie farther off have no true place
+SLAB = 0.42, 0.58  # the share of the vertices below each of two parallel planes
+# Ends of a bridge: at most so far through space, at least so far along the surface, and the radius of
+# the tube, in roots of the area
+BRIDGE_ACROSS, BRIDGE_ALONG, BRIDGE_RADIUS = 0.25, 0.6, 0.03
 # Radii of holes, in roots of the area of the whole
 HOLE_RADII = 0.02, 0.07
 
@@ -42,7 +52,8 @@ class Pair:
 
     `vertices` are vertices of the part, `points` their true places on the whole, and `distances`
     the geodesic distances of the nearest vertices of the whole to all others, all in the unit of
-    the whole.
+    the whole. `mirrored` and `mirrored_distances` are the same for the mirror images of these places
+    on the whole, if the animal has a symmetric pose.
     """
 
     name: str
@@ -51,6 +62,8 @@ class Pair:
     vertices: np.ndarray
     points: np.ndarray
     distances: np.ndarray
+    mirrored: np.ndarray | None = None
+    mirrored_distances: np.ndarray | None = None
 
 
 def read_shape(name: str) -> es.TriangleMesh:
@@ -77,7 +90,9 @@ def remesh(mesh: es.TriangleMesh, n_vertices: int, rng: np.random.Generator) -> 
 
 
 def cut(mesh: es.TriangleMesh, kind: str, rng: np.random.Generator) -> es.TriangleMesh:
-    """Return the part of a set: its largest piece."""
+    """Return the part of a set: its largest piece, or all of them if they are the matter."""
+    if kind == "pieces":
+        return without_slab(mesh, rng)
     if kind == "cuts":
         planes = es.scans.random_planes(mesh, rng, share=rng.uniform(0.3, 0.7))
         part = es.scans.cut_by_planes(mesh, planes).mesh
@@ -85,6 +100,8 @@ def cut(mesh: es.TriangleMesh, kind: str, rng: np.random.Generator) -> es.Triang
         part = es.partial_scan(mesh, rng).mesh
     elif kind == "holes":
         part = with_holes(mesh, rng)
+    elif kind == "bridges":
+        part = with_bridge(mesh, rng)
     elif kind == "noise":
         part = cut(mesh, str(rng.choice(["cuts", "holes", "scans"])), rng)
         edge = es.geometry.edge_lengths(part).mean()
@@ -107,26 +124,68 @@ def with_holes(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMe
     return es.geometry.drop_unreferenced(rest).mesh
 
 
+def without_slab(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMesh:
+    """Remove what lies between two parallel planes, so that pieces are left on both sides."""
+    direction = rng.standard_normal(3)
+    heights = mesh.vertices @ direction
+    low, high = np.quantile(heights, SLAB)
+    gone = (heights > low) & (heights < high)
+    rest = es.TriangleMesh(mesh.vertices, mesh.faces[~gone[mesh.faces].any(axis=1)])
+    return es.geometry.drop_unreferenced(rest).mesh
+
+
+def with_bridge(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMesh:
+    """Join two places that are near in space and far along the surface by a tube."""
+    unit = np.sqrt(es.geometry.surface_area(mesh))
+    for vertex in rng.permutation(mesh.n_vertices):
+        along = es.geometry.geodesic_distances(mesh, [vertex])[0]
+        across = np.linalg.norm(mesh.vertices - mesh.vertices[vertex], axis=1)
+        far = np.flatnonzero((across < BRIDGE_ACROSS * unit) & (along > BRIDGE_ALONG * unit))
+        if len(far):
+            try:
+                return bridge(mesh, int(vertex), int(rng.choice(far)), BRIDGE_RADIUS * unit).two
+            except es.InvalidParameterError:
+                continue  # no disc around one of the two; another vertex may have one
+    raise ValueError("no two places of the shape are near in space and far along it")
+
+
 def make_pair(animal: str, poses: tuple[str, str], kind: str, seed: int) -> Pair:
     """Return a part of the first pose and the second pose as a whole."""
     rng = np.random.default_rng(seed)
     first, second = (read_shape(pose) for pose in poses)
     whole = remesh(second, N_VERTICES, np.random.default_rng(1))
     part = cut(remesh(first, N_VERTICES, np.random.default_rng(2)), kind, rng)
-    clean = es.geometry.closest_points(first, part.vertices)
-    corners = second.vertices[second.faces[clean.simplices]]
-    points = np.einsum("pc,pcd->pd", clean.weights, corners)
-    chosen = np.sort(rng.choice(part.n_vertices, min(N_TRUE, part.n_vertices), replace=False))
-    points = points[chosen]
-    foot = es.geometry.closest_points(whole, points)
-    nearest = whole.faces[foot.simplices, foot.weights.argmax(axis=1)]
-    distances = es.geometry.geodesic_distances(whole, nearest).astype(np.float32)
+    foot = es.geometry.closest_points(first, part.vertices)
+    # Tubes of bridges lie on no place of the animal.
+    unit = np.sqrt(es.geometry.surface_area(first))
+    off = np.linalg.norm(foot.points - part.vertices, axis=1)
+    known = np.flatnonzero(off < OFF_SURFACE * unit)
+    chosen = np.sort(rng.choice(known, min(N_TRUE, len(known)), replace=False))
+    corners, weights = first.faces[foot.simplices[chosen]], foot.weights[chosen]
+    points = np.einsum("pc,pcd->pd", weights, second.vertices[corners])
+    mirrored = mirrored_distances = None
+    if animal in SYMMETRIC:
+        rest = read_shape(SYMMETRIC[animal])
+        images = np.einsum("pc,pcd->pd", weights, rest.vertices[corners]) * [-1, 1, 1]
+        image = es.geometry.closest_points(rest, images)
+        mirrored = np.einsum(
+            "pc,pcd->pd", image.weights, second.vertices[rest.faces[image.simplices]]
+        )
+        mirrored_distances = distances_from(whole, mirrored)
+    distances = distances_from(whole, points)
     # The part is turned, so that nothing is learned from how it lies in space.
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     part = es.TriangleMesh(part.vertices @ turn.T, part.faces)
     name = f"{kind} {seed}: {poses[0]} on {poses[1]}"
-    return Pair(name, part, whole, chosen, points, distances)
+    return Pair(name, part, whole, chosen, points, distances, mirrored, mirrored_distances)
+
+
+def distances_from(whole: es.TriangleMesh, points: np.ndarray) -> np.ndarray:
+    """Return geodesic distances of all vertices from those nearest to some points."""
+    foot = es.geometry.closest_points(whole, points)
+    nearest = whole.faces[foot.simplices, foot.weights.argmax(axis=1)]
+    return es.geometry.geodesic_distances(whole, nearest).astype(np.float32)
 
 
 def draw_pairs(half: dict[str, list[str]], kind: str, count: int, *, first_seed: int) -> list:
@@ -134,7 +193,7 @@ def draw_pairs(half: dict[str, list[str]], kind: str, count: int, *, first_seed:
     found = []
     for number in range(count):
         seed = first_seed + number
-        rng = np.random.default_rng([seed, SETS.index(kind)])
+        rng = np.random.default_rng([seed, [*SETS, *FURTHER_SETS].index(kind)])
         animal = sorted(half)[number % len(half)]
         poses = half[animal]
         one, two = (
@@ -144,14 +203,18 @@ def draw_pairs(half: dict[str, list[str]], kind: str, count: int, *, first_seed:
     return found
 
 
-def errors(pair: Pair, image: np.ndarray) -> np.ndarray:
+def errors(pair: Pair, image: np.ndarray, *, mirrored: bool = False) -> np.ndarray:
     """Return geodesic errors of the images of `pair.vertices`, in hundredths of √area.
 
-    Near the truth the distance in space is measured, because vertices of the whole are apart.
+    Near the truth the distance in space is measured, because vertices of the whole are apart. If
+    `mirrored`, the mirror images of the true places are the truth.
     """
+    points, distances = (
+        (pair.mirrored, pair.mirrored_distances) if mirrored else (pair.points, pair.distances)
+    )
     unit = np.sqrt(es.geometry.surface_area(pair.whole))
     foot = es.geometry.closest_points(pair.whole, image[pair.vertices])
     nearest = pair.whole.faces[foot.simplices, foot.weights.argmax(axis=1)]
-    along = pair.distances[np.arange(len(nearest)), nearest] / unit
-    across = np.linalg.norm(image[pair.vertices] - pair.points, axis=1) / unit
+    along = distances[np.arange(len(nearest)), nearest] / unit
+    across = np.linalg.norm(image[pair.vertices] - points, axis=1) / unit
     return 100 * np.where(along < 0.05, across, np.maximum(along, across))

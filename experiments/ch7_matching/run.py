@@ -28,6 +28,7 @@ N_QUICK = 1
 SEEDS = {"lion": 500, "rigid": 700, "tuning": 100}  # of the first pair of each group
 N_TUNING = 3
 OURS, TODAY = "match_shapes", "nearest pair of match_patches"
+MIRRORED = "mirrored"  # errors if each true place were its mirror image
 WRONG = 20.0  # hundredths of √area: a map with a larger mean error has failed
 BINS = np.linspace(0, 1, 11)
 
@@ -69,8 +70,11 @@ def measure(pair: Pair, targets: dict[str, tuple]) -> dict[str, np.ndarray]:
     begin = time.process_time()
     match = es.match_shapes(pair.part, target)
     done = time.process_time()
+    image = match.pull(pair.whole.vertices)
+    mirrored = {} if pair.mirrored is None else {MIRRORED: errors(pair, image, mirrored=True)}
     return {
-        OURS: errors(pair, match.pull(pair.whole.vertices)),
+        OURS: errors(pair, image),
+        **mirrored,
         TODAY: errors(pair, copied_pairs(pair, points)),
         "confidence": match.confidence[pair.vertices],
         "evidence": match.evidence[pair.vertices],
@@ -89,16 +93,23 @@ def kept(folder: Path, wanted: tuple, targets: dict) -> dict[str, np.ndarray]:
 
 
 def summary(rows: list[dict[str, np.ndarray]], way: str) -> dict[str, float]:
-    """Return mean and median error, shares under 5 and 10, and the share of failed maps."""
+    """Return mean and median error, shares under 5 and 10, and the share of failed maps.
+
+    Of symmetric animals, also the mean if each part may be placed on its mirror image.
+    """
     every = np.concatenate([row[way] for row in rows])
     means = np.array([row[way].mean() for row in rows])
-    return {
+    found = {
         "mean": float(means.mean()),
         "median": float(np.median(every)),
         "under 5": float((every < 5).mean()),
         "under 10": float((every < 10).mean()),
         "over 20": float((means > WRONG).mean()),
     }
+    if way == OURS and MIRRORED in rows[0]:
+        mirrored = np.array([row[MIRRORED].mean() for row in rows])
+        found["mean of the better mirror image"] = float(np.minimum(means, mirrored).mean())
+    return found
 
 
 def calibration(rows: list[dict[str, np.ndarray]]) -> list[list[float]]:

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch7_matching"
-FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
+EXPECTED = json.loads((FOLDER / "expected.json").read_text())
+FULL, FURTHER = EXPECTED["full"], EXPECTED["further"]
 
 
 def test_the_readme_shows_the_expected_figures():
@@ -16,7 +17,15 @@ def test_the_readme_shows_the_expected_figures():
             today = FULL[group]["nearest pair of match_patches"][kind]["mean"]
             numbers = f"{row['mean']:.1f} | {row['median']:.1f} | {row['under 5']:.2f}"
             line = f"| {group} | {kind} | {numbers} | {row['over 20']:.2f} | {today:.1f} |"
+            better = row.get("mean of the better mirror image")
+            line += " – |" if better is None else f" {better:.1f} |"
             assert line in text, line
+    for kind, row in FURTHER["lion"].items():
+        numbers = f"{row['mean']:.1f} | {row['median']:.1f} | {row['under 5']:.2f}"
+        assert f"| {kind} | {numbers} | {row['over 20']:.2f} |" in text, kind
+    for cls, row in FURTHER["individuals"].items():
+        line = f"| {cls} | {row['wholes']:.2f} | {row['cuts']:.2f} | {row['usual']:.2f} |"
+        assert line in text, line
 
 
 @pytest.mark.long
@@ -24,3 +33,10 @@ def test_the_readme_shows_the_expected_figures():
 def test_two_parts_of_lions_are_placed(quick_form):
     found = quick_form("ch7_matching/run.py")
     assert max(found["mean error"].values()) < 10
+
+
+@pytest.mark.long
+@pytest.mark.data
+def test_a_hand_is_placed_on_another_one(quick_form):
+    row = quick_form("ch7_matching/further.py")["individuals"]["hand"]
+    assert row["wholes"] > row["usual"] + 0.1

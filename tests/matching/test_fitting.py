@@ -7,11 +7,11 @@ import pytest
 
 import eigenshape as es
 from eigenshape.matching.fitting import fit_part, plan_fit
-from eigenshape.matching.growth import fitted_maps, improve_maps
-from eigenshape.matching.pairs import cover_differences, patch_differences
+from eigenshape.matching.growth import find_maps, fitted_maps
+from eigenshape.matching.pairs import patch_differences
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, smooth_places
 from eigenshape.matching.surface import UNIT, describe_surface
-from eigenshape.matching.views import N_VIEWS, describe_cover, describe_views
+from eigenshape.matching.views import N_VIEWS, describe_views
 
 N_VERTICES = 600
 N_POINTS = 150
@@ -112,36 +112,24 @@ def test_low_modes_make_a_map_smooth(surfaces):
     assert after.mean() < 0.7 * before.mean()
 
 
-def test_what_a_scan_covers_is_described_and_the_rest_counts_more(surfaces):
-    pose, whole = surfaces
-    scan = es.partial_scan(pose.mesh, [0.3, 0.2, 1])
-    part = describe_surface(scan.mesh, 1.0, N_POINTS)
-    cover = describe_cover(whole, scan.source_vertices)
-    covered = np.isin(np.arange(N_POINTS), cover.points)
-    assert covered[np.isin(whole.points, scan.source_vertices)].all()
-    assert not covered.all()
-    assert cover.weights.min() < 1  # it has a rim
-    before = patch_differences(part, whole)
-    after = cover_differences(part, before, cover)
-    assert (after[:, ~covered] > before[:, ~covered]).all()
-    assert not np.allclose(after[:, covered], before[:, covered])
-
-
-def test_a_map_to_a_place_without_points_covers_nothing(surfaces):
-    whole = describe_surface(surfaces[1].mesh, 1.0, 4)
-    farthest = whole.distances.min(axis=0).argmax(keepdims=True)
-    assert describe_cover(whole, farthest) is None
-
-
-def test_further_maps_fit_no_worse_and_are_sorted(surfaces):
+def test_more_starts_fit_no_worse_and_are_sorted(surfaces):
     pose, whole = surfaces
     scan = es.partial_scan(pose.mesh, [0.3, 0.2, 1])
     part = describe_surface(scan.mesh, 1.0, N_POINTS)
     differences = patch_differences(part, whole)
     plan, modes = plan_fit(part, whole), lowest_modes(whole.mesh)
-    maps = fitted_maps(plan, differences, 1)
-    more = improve_maps(plan, differences, maps, modes_of_part(part.mesh, modes), modes)
+    maps = fitted_maps(plan, differences)
+    more = find_maps(plan, differences, modes_of_part(part.mesh, modes), modes)
     misfits = [one.fit.misfit for one in more]
     assert len(more) > len(maps)
     assert misfits == sorted(misfits)
     assert misfits[0] <= maps[0].fit.misfit
+
+
+def test_a_fit_with_few_frames_carries_the_same_vertices(surfaces):
+    part, whole = surfaces
+    plan = plan_fit(part, whole, 40, 100)
+    fit = fit_part(plan, part.points[:40])
+    assert len(fit.places) == N_VERTICES
+    gaps = whole.mesh.vertices[fit.places] - whole.mesh.vertices
+    assert np.linalg.norm(gaps, axis=1).mean() < 0.03

@@ -38,19 +38,19 @@ TINY = np.finfo(float).tiny
 class FitPlan:
     """What fits of one part on one whole share: samples, frames and the whole as a tree.
 
-    Row s of `shares` (samples × frames) says how far each frame carries a sample; `carriers` and
-    `portions` say the same of every vertex. Edges go from frame `one` to `two`, both ways. `arms` are
+    `frames` are vertices of the part, its first points. Row v of `carriers` holds the frames that
+    carry vertex v, and `portions` how far. Edges go from frame `one` to `two`, both ways. `arms` are
     from frames to the samples that they carry, and `links` along edges, both before bending.
     """
 
     part: Surface
     whole: Surface
     tree: cKDTree
+    frames: Int[np.ndarray, " m"]
     samples: Int[np.ndarray, " s"]
     pull: Float[np.ndarray, " s"]
     carriers: Int[np.ndarray, "n c"]
     portions: Float[np.ndarray, "n c"]
-    shares: sp.csr_array
     one: Int[np.ndarray, " e"]
     two: Int[np.ndarray, " e"]
     arms: Float[np.ndarray, "s c 3"]
@@ -79,51 +79,55 @@ class _Pose:
     places: Float[np.ndarray, "m 3"]
 
 
-def plan_fit(part: Surface, whole: Surface) -> FitPlan:
-    """Prepare to bend a part onto a whole."""
-    n, m = part.mesh.n_vertices, len(part.points)
-    samples = np.unique(np.linspace(0, n - 1, min(n, MOST_SAMPLES)).astype(np.int64))
-    carriers, portions = _carriers(part)
-    rows = np.repeat(np.arange(len(samples)), carriers.shape[1])
-    entries = portions[samples].ravel(), (rows, carriers[samples].ravel())
-    near = np.argsort(part.between, axis=1, kind="stable")[:, 1 : N_LINKS + 1]
+def plan_fit(
+    part: Surface, whole: Surface, n_frames: int | None = None, n_samples: int = MOST_SAMPLES
+) -> FitPlan:
+    """Prepare to bend a part onto a whole, with a frame at each of its points, or the first ones."""
+    frames = part.points[:n_frames]
+    n, m = part.mesh.n_vertices, len(frames)
+    samples = np.unique(np.linspace(0, n - 1, min(n, n_samples)).astype(np.int64))
+    carriers, portions = _carriers(part.distances[:m])
+    near = np.argsort(part.between[:m, :m], axis=1, kind="stable")[:, 1 : N_LINKS + 1]
     starts, ends = np.repeat(np.arange(m), near.shape[1]), near.ravel()
     one, two = np.concatenate([starts, ends]), np.concatenate([ends, starts])
     ones = np.full(len(one), 2 / len(one))  # each edge is there both ways
     weights = sp.coo_array((ones, (one, two)), shape=(m, m)).toarray()
     areas = part.areas[samples]
-    vertices, frames = part.mesh.vertices, part.mesh.vertices[part.points]
+    vertices, centers = part.mesh.vertices, part.mesh.vertices[frames]
     return FitPlan(
         part,
         whole,
         cKDTree(np.hstack([whole.mesh.vertices, FACING * whole.normals])),
+        frames,
         samples,
         areas / areas.sum(),
         carriers,
         portions,
-        sp.coo_array(entries, shape=(len(samples), m)).tocsr(),
         one,
         two,
-        vertices[samples][:, None] - frames[carriers[samples]],
-        frames[two] - frames[one],
+        vertices[samples][:, None] - centers[carriers[samples]],
+        centers[two] - centers[one],
         np.diag(weights.sum(axis=1)) - weights,
     )
 
 
-def _carriers(part: Surface) -> tuple[Int[np.ndarray, "n c"], Float[np.ndarray, "n c"]]:
+def _carriers(
+    distances: Float[np.ndarray, "m n"],
+) -> tuple[Int[np.ndarray, "n c"], Float[np.ndarray, "n c"]]:
     """Return the nearest frames of each vertex, and how far each carries it."""
-    count = min(N_CARRIERS, len(part.points) - 1)
-    found = nearest_rows(part.distances, count + 1)
-    lengths = np.take_along_axis(part.distances.T, found, axis=1).astype(np.float64)
+    count = min(N_CARRIERS, len(distances) - 1)
+    found = nearest_rows(distances, count + 1)
+    lengths = np.take_along_axis(distances.T, found, axis=1).astype(np.float64)
     # A frame lets go of a vertex that is as far from it as from the next frame.
     portions = np.maximum(1 - lengths[:, :-1] / np.maximum(lengths[:, -1:], TINY), 1e-4) ** 2
     return found[:, :-1], portions / portions.sum(axis=1, keepdims=True)
 
 
 def fit_part(plan: FitPlan, ends: Int[np.ndarray, " m"]) -> Fit:
-    """Bend a part, given the vertices of the whole where its points lie by a map."""
+    """Bend a part, given the vertices of the whole where its frames lie by a map."""
     # Each sample goes where the frames that carry it go.
-    targets = plan.shares @ plan.whole.mesh.vertices[ends]
+    carriers, portions = plan.carriers[plan.samples], plan.portions[plan.samples]
+    targets = np.einsum("sc,scd->sd", portions, plan.whole.mesh.vertices[ends[carriers]])
     pose = _lay_down(plan, targets)
     pull = plan.pull
     for step, stiffness in enumerate(STIFFNESS):
@@ -145,7 +149,7 @@ def _lay_down(plan: FitPlan, targets: Float[np.ndarray, "s 3"]) -> _Pose:
     left, _, right = np.linalg.svd(((targets - target) * pull[:, None]).T @ (points - middle))
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     turn = left @ right
-    frames = plan.part.mesh.vertices[plan.part.points]
+    frames = plan.part.mesh.vertices[plan.frames]
     turns = np.repeat(turn[None], len(frames), axis=0)
     return _Pose(turns, target + (frames - middle) @ turn.T)
 
@@ -159,11 +163,14 @@ def _bend(
     rounds: int,
 ) -> _Pose:
     """Move frames so that samples come nearer to their targets, and turn frames to follow."""
-    pulled = sp.csr_array(plan.shares * pull[:, None])
-    matrix = (pulled.T @ plan.shares).toarray() + stiffness * plan.graph
+    carriers, portions = plan.carriers[plan.samples], plan.portions[plan.samples]
+    m = len(plan.frames)
+    places_in_matrix = carriers[:, :, None] * m + carriers[:, None, :]
+    entries = (pull[:, None] * portions)[:, :, None] * portions[:, None, :]
+    pulled = np.bincount(places_in_matrix.ravel(), weights=entries.ravel(), minlength=m * m)
+    matrix = pulled.reshape(m, m) + stiffness * plan.graph
     matrix[np.diag_indices_from(matrix)] += 1e-9 / len(matrix)  # of frames that nothing pulls
     factor = cho_factor(matrix, check_finite=False)
-    carriers, portions = plan.carriers[plan.samples], plan.portions[plan.samples]
     weight = stiffness * 2 / len(plan.one)  # as in `graph`
     turns, places = pose.turns.copy(), pose.places
     for _ in range(rounds):
@@ -180,7 +187,7 @@ def _offsets(
 ) -> Float[np.ndarray, "v 3"]:
     """Return mean offsets of vertices from the frames that carry them, as the frames turn."""
     mesh, carriers = plan.part.mesh, plan.carriers[vertices]
-    arms = mesh.vertices[vertices][:, None] - mesh.vertices[plan.part.points[carriers]]
+    arms = mesh.vertices[vertices][:, None] - mesh.vertices[plan.frames[carriers]]
     turned = np.einsum("vcij,vcj->vci", turns[carriers], arms)
     return np.einsum("vc,vci->vi", plan.portions[vertices], turned)
 

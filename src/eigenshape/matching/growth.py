@@ -4,16 +4,15 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._threads import map_in_threads
+from eigenshape.matching.assignment import assign_far_points
 from eigenshape.matching.evidence import FittedMap
-from eigenshape.matching.fitting import FARTHEST, FitPlan, fit_part
+from eigenshape.matching.fitting import FARTHEST, Fit, FitPlan, fit_part, plan_fit
 from eigenshape.matching.pairs import (
     FEWEST_PAIRS,
     FIRST_ROUNDS,
-    NEXT_SLACKS,
     START_SLACKS,
     Pairs,
     couplings,
-    cover_differences,
     descriptor_costs,
     first_candidates,
     grow_pairs,
@@ -24,14 +23,13 @@ from eigenshape.matching.pairs import (
 )
 from eigenshape.matching.spectral_refinement import Modes, smooth_places
 from eigenshape.matching.surface import Surface, turn_over
-from eigenshape.matching.views import describe_cover
 
-N_NEXT_STARTS = 2  # of each slack, in the second round
+# Of rough bends, the best ones are grown; of grown maps, the best few once more
+N_GROWN, N_GROWN_AGAIN = 9, 4
+# Frames and samples of a rough bend
+N_ROUGH_FRAMES, N_ROUGH_SAMPLES = 100, 200
 # Modes that make a map smooth before the part is bent again: 30 and 100 lower the misfit less.
 N_LOW_MODES = 60
-# Mean weight of discs from which maps are not grown again. Scans of the tuning half have 0.34 to 0.46,
-# and cuts and parts with holes, which gain nothing from it, at least 0.58.
-MOSTLY_WHOLE = 0.5
 MOST_SMOOTHINGS = 2  # it ends earlier if a bend is no better
 
 
@@ -47,45 +45,28 @@ def first_support(part: Surface, whole: Surface, *, turned: bool) -> float:
     return float(np.abs(coupling[np.ix_(chosen, chosen)].sum(axis=1)).sum())
 
 
-def grow_starts(
-    part: Surface,
-    whole: Surface,
-    costs: Float[np.ndarray, "m k"],
-    n_starts: int,
-    slacks: tuple[float, ...] = START_SLACKS,
-) -> list[Pairs]:
-    """Return sets of pairs, grown from the best candidates by several slacks, given costs.
-
-    There are up to `n_starts` of each slack; each excludes the pairs of those before.
-    """
+def grow_starts(part: Surface, whole: Surface, costs: Float[np.ndarray, "m k"]) -> list[Pairs]:
+    """Return sets of pairs, grown from the best candidates by several slacks, given costs."""
     points, partners = first_candidates(costs)
     found = []
-    for slack in slacks:
+    for slack in START_SLACKS:
         coupling = couplings(part, whole, points, partners, slack)
-        for _ in range(n_starts):
-            support = supports(coupling, points, FIRST_ROUNDS)
-            pairs, chosen = select_pairs(coupling, points, partners, support)
-            if len(pairs.points) < FEWEST_PAIRS:
-                break
-            # Pairs that were chosen together support each other no more in the next start.
-            coupling[np.ix_(chosen, chosen)] = 0
-            pairs = grow_pairs(part, whole, costs, pairs)
-            if len(pairs.points) >= FEWEST_PAIRS:
-                found.append(pairs)
-    return found
+        support = supports(coupling, points, FIRST_ROUNDS)
+        pairs, _ = select_pairs(coupling, points, partners, support)
+        if len(pairs.points) >= FEWEST_PAIRS:
+            found.append(grow_pairs(part, whole, costs, pairs))
+    return [pairs for pairs in found if len(pairs.points) >= FEWEST_PAIRS]
 
 
-def fitted_maps(
-    plan: FitPlan, differences: Float[np.ndarray, "m k"], n_starts: int
-) -> list[FittedMap]:
-    """Return maps of a part that is bent onto the whole, from several starts, the best fit first."""
-    starts = grow_starts(plan.part, plan.whole, descriptor_costs(differences), n_starts)
+def fitted_maps(plan: FitPlan, differences: Float[np.ndarray, "m k"]) -> list[FittedMap]:
+    """Return maps of a part that is bent onto the whole from few starts, the best fit first."""
+    starts = grow_starts(plan.part, plan.whole, descriptor_costs(differences))
     return _best_first(_fit_pairs(plan, starts))
 
 
 def _fit_pairs(plan: FitPlan, starts: list[Pairs]) -> list[FittedMap]:
     def fit(pairs: Pairs) -> FittedMap:
-        ends = place_points(plan.part, plan.whole, pairs, plan.part.points)[0]
+        ends = place_points(plan.part, plan.whole, pairs, plan.frames)[0]
         return FittedMap(pairs, fit_part(plan, ends))
 
     return map_in_threads(fit, starts)
@@ -95,37 +76,46 @@ def _best_first(maps: list[FittedMap]) -> list[FittedMap]:
     return sorted(maps, key=lambda one: one.fit.misfit)
 
 
-def improve_maps(
-    plan: FitPlan,
-    differences: Float[np.ndarray, "m k"],
-    maps: list[FittedMap],
-    ours: Modes,
-    theirs: Modes,
+def find_maps(
+    plan: FitPlan, differences: Float[np.ndarray, "m k"], ours: Modes, theirs: Modes
 ) -> list[FittedMap]:
-    """Return more maps, made from the best ones, the best fit first.
+    """Return maps of a part from many starts, the best fit first.
 
-    A fit from the true places leaves 0.4 of the misfit of the best of nine starts on scans, and 0.6
-    on cuts, so that what is missing are starts. The best map is made smooth by low modes, from
-    which the part is bent again. If rims cut off most of the discs, as those of scans, the piece of
-    the whole that the map covers is described next, whose discs end where those of the part end,
-    and maps are grown from the most similar points on it and from the map itself.
+    A fit from the true places leaves about half of the misfit of the best of nine sets of
+    pairs, so that starts are what is missing. Far points are therefore assigned in many more ways,
+    the part is bent roughly by each, and maps are grown from where the best of these bends place
+    it, then once more from the best maps. The best map is made smooth by low modes at last, from
+    which the part is bent again.
     """
     part, whole = plan.part, plan.whole
-    maps = _smooth_best(plan, maps, ours, theirs)
-    best = maps[0].fit
-    thin = part.weights.mean() < MOSTLY_WHOLE
-    cover = describe_cover(whole, best.places) if thin else None
-    if cover is None:
-        return maps
-    costs = descriptor_costs(cover_differences(part, differences, cover))
-    starts = grow_starts(part, whole, costs, N_NEXT_STARTS, NEXT_SLACKS)
-    # Points with a small gap are better supported.
-    support = np.maximum(1 - best.gaps[part.points] / FARTHEST, 1e-3)
-    partners = whole.nearest[best.places[part.points]]
-    kept = grow_pairs(part, whole, costs, Pairs(np.arange(len(partners)), partners, support))
-    if len(kept.points) >= FEWEST_PAIRS:
-        starts.append(kept)
-    return _smooth_best(plan, _best_first([*maps, *_fit_pairs(plan, starts)]), ours, theirs)
+    costs = descriptor_costs(differences)
+    rough = plan_fit(part, whole, N_ROUGH_FRAMES, N_ROUGH_SAMPLES)
+
+    def fit_roughly(pairs: Pairs) -> Fit:
+        return fit_part(rough, place_points(part, whole, pairs, rough.frames)[0])
+
+    fits = map_in_threads(fit_roughly, assign_far_points(part, whole, costs))
+    fits = sorted(fits, key=lambda fit: fit.misfit)[:N_GROWN]
+    starts = grow_starts(part, whole, costs) + _grow_again(plan, costs, fits)
+    maps = _best_first(_fit_pairs(plan, starts))
+    again = _grow_again(plan, costs, [one.fit for one in maps[:N_GROWN_AGAIN]])
+    maps = _best_first([*maps, *_fit_pairs(plan, again)])
+    return _smooth_best(plan, maps, ours, theirs) if maps else []
+
+
+def _grow_again(plan: FitPlan, costs: Float[np.ndarray, "m k"], fits: list[Fit]) -> list[Pairs]:
+    """Return sets of pairs that grow from where fits place the points of a part."""
+    points = plan.part.points
+
+    def grow(fit: Fit) -> Pairs:
+        # Points with a small gap are better supported.
+        support = np.maximum(1 - fit.gaps[points] / FARTHEST, 1e-3)
+        partners = plan.whole.nearest[fit.places[points]]
+        return grow_pairs(
+            plan.part, plan.whole, costs, Pairs(np.arange(len(points)), partners, support)
+        )
+
+    return [found for found in map_in_threads(grow, fits) if len(found.points) >= FEWEST_PAIRS]
 
 
 def _smooth_best(
@@ -137,7 +127,7 @@ def _smooth_best(
     """
     for _ in range(MOST_SMOOTHINGS):
         places, _ = smooth_places(ours, theirs, maps[0].fit.places, N_LOW_MODES)
-        fit = fit_part(plan, places[plan.part.points])
+        fit = fit_part(plan, places[plan.frames])
         if fit.misfit >= maps[0].fit.misfit:
             break
         maps = [FittedMap(maps[0].pairs, fit), *maps[1:]]

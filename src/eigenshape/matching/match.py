@@ -23,7 +23,7 @@ from eigenshape.matching.evidence import (
     vertex_evidence,
 )
 from eigenshape.matching.fitting import plan_fit
-from eigenshape.matching.growth import first_support, fitted_maps, improve_maps
+from eigenshape.matching.growth import find_maps, first_support, fitted_maps
 from eigenshape.matching.pairs import Pairs, patch_differences
 from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.matching.spectral_refinement import modes_of_part, refine_places
@@ -32,7 +32,6 @@ from eigenshape.matching.target import MatchTarget, as_target, require_matchable
 from eigenshape.operators.smoothing import denoise
 
 N_PART = 300  # points of the part
-N_STARTS = 3  # sets of pairs of each of three slacks, from which a map is grown (`grow_starts`)
 # A part with this many times the area of the whole is not a part of it in the same unit.
 MOST_AREA = 1.5
 # Pieces with less of the area of the whole are not matched: they have too few patches.
@@ -67,14 +66,16 @@ def match_shapes(
        turn from the direction on the part to that on the whole is the same as for other pairs: the
        leading fixed point of x_i ← |Σ_j c_ij x_j|, with complex c_ij. Mirror images get no support,
        since their turns do not agree (compare Leordeanu and Hebert 2005, Singer 2011).
-    3. There are nine starts: distances agree within 40, 30 or 20 %, three times each. The largest
-       continuous piece of each is kept and grown over the rest, twice.
-    4. The part is bent onto the whole by each of these maps: first to where the map places its
-       points, then to the nearest points that face the same way (non-rigid registration). The map
-       after which the smallest gaps are left with the least strain is taken.
-    5. The part is bent again from that map, made smooth by 60 eigenfunctions of both shapes. If
-       rims cut off most discs of the part, as those of a scan, it is also compared with the piece of
-       the whole that the map covers, and maps are grown from there.
+    3. There are 33 starts. Three are the fixed points for distances that agree within 40, 30 and
+       20 %. The others assign 14 points far from each other to points of the whole, so that limbs
+       are tried in all places: a beam search for what agrees best in distances, directions and
+       patches. The part is bent roughly by each assignment, and the best nine are kept.
+    4. Of each start, the largest continuous piece is kept and grown over the rest, twice. The part is
+       bent onto the whole by each of these maps: first to where the map places its points, then to
+       the nearest points that face the same way (non-rigid registration). The map after which the
+       smallest gaps are left with the least strain is taken.
+    5. The four best maps are grown and bent again, and the best one also from where it lies after 60
+       eigenfunctions of both shapes made it smooth.
     6. Eigenfunctions of both shapes make the best map smooth.
 
     Parameters
@@ -177,7 +178,7 @@ def _find_scale(mesh: TriangleMesh, target: MatchTarget) -> float:
     for factor in factors.tolist():
         surface = describe_surface(largest, target.unit / factor, N_PART)
         differences = patch_differences(surface, target.surface)
-        maps = fitted_maps(plan_fit(surface, target.surface), differences, 1)
+        maps = fitted_maps(plan_fit(surface, target.surface), differences)
         score = 0.0
         if maps:
             one = maps[0]
@@ -271,11 +272,9 @@ def _match_piece(mesh: TriangleMesh, target: MatchTarget, factor: float) -> _Pie
     if handed and turned > upright and outward_vote(part.mesh) < CLEAR_VOTE:
         part = turn_over(part)
     differences = patch_differences(part, whole)
-    plan = plan_fit(part, whole)
-    maps = fitted_maps(plan, differences, N_STARTS)
+    modes = modes_of_part(part.mesh, target.modes)
+    maps = find_maps(plan_fit(part, whole), differences, modes, target.modes)
     if maps:
-        modes = modes_of_part(part.mesh, target.modes)
-        maps = improve_maps(plan, differences, maps, modes, target.modes)
         best = maps[0]
         quality = rate_map(part, whole, differences, best.pairs, best.fit.places)
         evidence = vertex_evidence(part, whole, differences, maps, quality)

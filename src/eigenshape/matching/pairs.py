@@ -15,14 +15,11 @@ N_CANDIDATES = 5  # partners that are tried for each point; ten found nothing mo
 # Discs of views are one of eight, so that one of them is near by chance: their differences count so
 # many times. Near a rim both discs are cut alike, and weigh more than the product of their weights.
 FOREIGN, RIM_SHARE = 1.2, 0.5
-# Points of the whole that a map leaves free count so many times when the map is tried again.
-OUTSIDE = 1.3
 # Share of a distance by which two pairs may disagree and still support each other
 SLACK = 0.4
 # The same, for starts. What a wide one finds a narrow one misses and the other way round: of 15 hard
 # pairs of the tuning half each has maps that are nearest to the truth, and the best fit is taken.
 START_SLACKS = 0.4, 0.3, 0.2
-NEXT_SLACKS = 0.3, 0.2  # the same, of the second round
 SHORTEST = 0.05  # errors of shorter distances are shares of this
 # A distance that is longer on the part counts half: around a hole or a cut paths are longer.
 LONGER = 0.5
@@ -76,15 +73,6 @@ def patch_differences(part: Surface, whole: Surface) -> Float[np.ndarray, "m k"]
     for view in whole.views:
         seen = FOREIGN * _differences(part, view, RIM_SHARE)
         found[:, view.points] = np.minimum(found[:, view.points], seen)
-    return found
-
-
-def cover_differences(
-    part: Surface, differences: Float[np.ndarray, "m k"], cover: View
-) -> Float[np.ndarray, "m k"]:
-    """Return differences of patches if the part covers a piece of the whole, given those so far."""
-    found = OUTSIDE * differences
-    found[:, cover.points] = _differences(part, cover, RIM_SHARE)
     return found
 
 

@@ -3,7 +3,6 @@
 from functools import partial
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Int
 
 from eigenshape._threads import map_in_threads
@@ -11,8 +10,8 @@ from eigenshape.geometry.geodesic import geodesic_waves
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import edge_table, is_closed, submesh
-from eigenshape.matching.surface import MATCHED_RADII, Surface, View, whiten_discs
+from eigenshape.geometry.topology import is_closed
+from eigenshape.matching.surface import MATCHED_RADII, View, whiten_discs
 from eigenshape.retrieval.patches.patches import describe_discs, whole_shares
 from eigenshape.scans.partial import view_of
 
@@ -32,36 +31,8 @@ def describe_views(mesh: TriangleMesh, points: Int[np.ndarray, " m"]) -> tuple[V
 
 
 def _describe_view(mesh: TriangleMesh, points: Int[np.ndarray, " m"], number: int) -> View:
-    part = view_of(mesh, number)
-    return _describe_piece(part.mesh, part.source_vertices, points)
-
-
-def describe_cover(whole: Surface, places: Int[np.ndarray, " n"]) -> View | None:
-    """Describe the piece of a whole that a part covers by a map, or return None if it has no points.
-
-    Its discs end where those of the part end, if the map is about right: among its five most
-    similar points are the right ones of 0.45 of the points of scans, and of all views 0.36.
-    """
-    n = whole.mesh.n_vertices
-    edges = edge_table(whole.mesh).edges
-    links = sp.coo_array((np.ones(len(edges)), edges.T), shape=(n, n)).tocsr()
-    links = links + links.T + sp.eye_array(n)
-    covered = np.zeros(n)
-    covered[places] = 1
-    # Two rings close the gaps between images, and one is taken off the rim again.
-    for _ in range(2):
-        covered = (links @ covered > 0).astype(np.float64)
-    free = links @ (1 - covered) > 0
-    piece, vertices = submesh(whole.mesh, ~free[whole.mesh.faces].any(axis=1))
-    if not np.isin(whole.points, vertices).any():
-        return None
-    return _describe_piece(piece, vertices, whole.points)
-
-
-def _describe_piece(
-    piece: TriangleMesh, sources: Int[np.ndarray, " n"], points: Int[np.ndarray, " m"]
-) -> View:
-    """Describe those of some vertices of a whole that lie on a piece of it."""
+    view = view_of(mesh, number)
+    piece, sources = view.mesh, view.source_vertices
     places = np.full(max(sources.max(), points.max()) + 1, -1)
     places[sources] = np.arange(piece.n_vertices)
     seen = np.flatnonzero(places[points] >= 0)

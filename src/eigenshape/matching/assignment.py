@@ -1,0 +1,109 @@
+"""Few far points of a part assigned to points of a whole in many ways: which limb goes where."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape.matching.pairs import Pairs, couplings
+from eigenshape.matching.surface import Surface
+
+N_FAR = 14  # points of the part that are assigned; 20 take half as long again and gain 0.3 to 0.8
+N_PLACES = 100  # cells of the whole; each far point goes to the most similar point of one of them
+# Distances of far points change with the pose by up to 18 %; slacks of 0.3 and 0.4 are as good.
+FAR_SLACK = 0.4
+# What the logarithm of a difference of patches counts beside the support by one other pair, and the
+# least difference, in medians of those of the most similar points. Twice as much is worse by 1.
+UNLIKE, LEAST_COST = 0.5, 0.2
+# Assignments are kept that are among the best N_ALIKE of those that take the first two points to
+# the same two of N_REGIONS regions of the whole, so that all permutations of limbs stay in the
+# search; without regions one to five different assignments are left, and their errors are two to
+# three times as large.
+N_REGIONS, N_ALIKE = 30, 4
+WIDTH = 1000  # partial assignments that are extended at a time
+N_ASSIGNMENTS = 30  # that are bent roughly, which takes half a second
+# Two assignments differ if they take more than this share of the points farther apart than APART.
+DIFFERENT, APART = 0.2, 0.12
+
+
+def assign_far_points(
+    part: Surface, whole: Surface, costs: Float[np.ndarray, "m k"]
+) -> list[Pairs]:
+    """Return different assignments of far points of a part to points of a whole, the best first.
+
+    The search extends partial assignments by one point at a time and keeps the best ones (beam
+    search). An assignment is worth what its pairs support each other, by distances and directions
+    along the surface (`couplings`), less what their patches differ. A part with too few points has
+    no assignment.
+    """
+    if len(part.points) < N_FAR:
+        return []
+    far = _far_points(part)
+    # In each cell of the whole, each far point has one candidate: the most similar point.
+    cell = whole.between[:, :N_PLACES].argmin(axis=1)
+    order = np.lexsort((costs[far], np.broadcast_to(cell, (len(far), len(cell)))), axis=1)
+    firsts = np.flatnonzero(np.diff(cell[order[0]], prepend=-1))
+    partners = order[:, firsts]
+    count = len(firsts)
+    points = np.repeat(far, count)
+    coupling = couplings(part, whole, points, partners.ravel(), FAR_SLACK)
+    unlike = UNLIKE * np.log(np.maximum(costs[points, partners.ravel()], LEAST_COST))
+    region = whole.between[partners.ravel(), :N_REGIONS].argmin(axis=1)
+
+    # Row b of `chosen` holds candidates of the first points, `sums` the support of each by the
+    # others, and `kind` the regions of the first two.
+    chosen = np.arange(count)[:, None]
+    sums = np.zeros((count, 1), dtype=np.complex64)
+    cost, kind = unlike[:count], np.zeros(count, dtype=np.int64)
+    for step in range(1, len(far)):
+        new = np.arange(step * count, (step + 1) * count)
+        for_old = coupling[chosen[:, :, None], new]
+        for_new = coupling[new, chosen[:, :, None]].sum(axis=1)
+        support = np.abs(sums[:, :, None] + for_old).sum(axis=1) + np.abs(for_new)
+        costs_now = cost[:, None] + unlike[new]
+        worth = support / step - costs_now
+        if step == 1:
+            old, one = np.divmod(np.arange(count**2), count)
+            kinds = region[old] * N_REGIONS + region[new[one]]
+        else:
+            # No assignment has more than N_ALIKE extensions among the best N_ALIKE of its kind.
+            one = np.argsort(-worth, axis=1, kind="stable")[:, :N_ALIKE].ravel()
+            old = np.repeat(np.arange(len(worth)), len(one) // len(worth))
+            kept = _best_of_kinds(worth[old, one], kind[old])[:WIDTH]
+            old, one = old[kept], one[kept]
+            kinds = kind[old]
+        sums = np.hstack([sums[old] + for_old[old, :, one], for_new[old, one][:, None]])
+        chosen = np.hstack([chosen[old], new[one][:, None]])
+        cost, kind = costs_now[old, one], kinds
+    return [
+        Pairs(far, ends, np.ones(len(far))) for ends in _different(whole, partners.ravel()[chosen])
+    ]
+
+
+def _far_points(part: Surface) -> Int[np.ndarray, " f"]:
+    """Return points of a part that are far from each other and, if possible, from its rim."""
+    inside = part.weights.min(axis=1).astype(np.float64)
+    found = [int((inside * part.between.mean(axis=1)).argmax())]
+    while len(found) < N_FAR:
+        found.append(int((inside * part.between[found].min(axis=0)).argmax()))
+    return np.array(found)
+
+
+def _best_of_kinds(
+    worth: Float[np.ndarray, " a"], kinds: Int[np.ndarray, " a"]
+) -> Int[np.ndarray, " k"]:
+    """Return the numbers of the best `N_ALIKE` of each kind, the best first."""
+    order = np.lexsort((-worth, kinds))
+    sorted_kinds = kinds[order]
+    ranks = np.arange(len(order)) - np.searchsorted(sorted_kinds, sorted_kinds)
+    kept = order[ranks < N_ALIKE]
+    return kept[np.argsort(-worth[kept], kind="stable")]
+
+
+def _different(whole: Surface, images: Int[np.ndarray, "a f"]) -> list[Int[np.ndarray, " f"]]:
+    """Return the first images that differ from all that were taken before."""
+    found: list[Int[np.ndarray, " f"]] = []
+    for ends in images:
+        if all((whole.between[ends, other] > APART).mean() > DIFFERENT for other in found):
+            found.append(ends)
+            if len(found) == N_ASSIGNMENTS:
+                break
+    return found
