@@ -84,20 +84,24 @@ def find_parts(
 ) -> PartDecomposition:
     """Find the parts of a surface, such as limbs, head and torso.
 
-    A part is a region with little heat flow across its boundary, a crease around it, or a thickness
-    of its own. Heat flows slowly across concave creases (`curvature_tensors`, α = 10). The basins
-    of the maxima of early heat are merged in the order in which diffusion equalizes them
-    (`part_tree`) while less than 0.15 of a temperature difference is left, and each boundary is
-    moved to the shortest cut nearby (`smooth_boundaries`). The parts so found are merged further,
-    cheapest pair first. The odds that two adjacent parts R and S are seen as two are
+    A part is a region with little heat flow across its boundary, a crease around it, a thickness of
+    its own, or points that see each other but not those of its neighbors. Heat flows slowly across
+    concave creases (`curvature_tensors`, α = 10). The basins of the maxima of early heat are merged
+    in the order in which diffusion equalizes them (`part_tree`) while less than 0.15 of a
+    temperature difference is left, and each boundary is moved to the shortest cut nearby
+    (`smooth_boundaries`). The parts so found are merged further, cheapest pair first. The odds that
+    two adjacent parts R and S are seen as two are
 
-        o ∝ (|R||S| / (|R| + |S|))^0.6 · |c_R - c_S|² · exp(0.6 ϑ + 0.5 |log r_R - log r_S|),
+        o ∝ (|R||S| / (|R| + |S|))^0.6 · |c_R - c_S|² · exp(0.6 ϑ + 0.5 |log r_R - log r_S|)
+            · (min(v_R, v_S) + 0.05) / (v_RS + 0.05),
 
     where |R| and |S| are shares of the area, c is the mean of e^{-tλ} φ as in `part_tree`, ϑ is the
     mean angle by which the surface turns across the boundary, positive where it is concave (the
-    minima rule of Hoffman and Richards 1984), and r is the radius of the inscribed balls (Shapira,
-    Shamir and Cohen-Or 2008). The tree is cut where o / (1 + o) is 0.3. All times and lengths are
-    relative to the surface area, so the result does not depend on the unit of length.
+    minima rule of Hoffman and Richards 1984), r is the radius of the inscribed balls (Shapira,
+    Shamir and Cohen-Or 2008), and v_RS is the share of the short lines between points of R and S
+    that run inside the solid at both ends (Asafi, Goren and Cohen-Or 2013). The tree is cut where
+    o / (1 + o) is 0.3. All times and lengths are relative to the surface area, so the result does
+    not depend on the unit of length.
 
     Each component has at least one part. A fragment with less than a hundredth of the area
     (`fragment_vertices`) is always exactly one part.

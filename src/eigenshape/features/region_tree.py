@@ -88,7 +88,7 @@ class PartTree(RegionTree):
         Between 0 and 1, infinite for one part of each component. In a tree of `part_tree`: the
         share of a temperature difference between the part and its parent that is left after the
         diffusion time, 0 if heat flows freely between them, 1 if no heat flows. In a tree of
-        `find_parts`, where it is above 0.15, it also counts creases and thickness.
+        `find_parts`, where it is above 0.15, it also counts creases, thickness and lines of sight.
     parent : (m,) int
         The part from which this part splits, which has a higher maximum; -1 if there is none.
     basins : (f,) int

@@ -116,13 +116,14 @@ def test_patches_are_spread_over_what_has_the_area_of_one():
 
 @pytest.mark.parametrize("mesh", [SPECKED, SOUP, DUST], ids=["specked", "soup", "dust"])
 def test_each_component_is_a_part_at_least(mesh):
-    found = es.find_parts(mesh)
+    # At level 0 the specks change one part of the body, whose persistence is that of the cut.
+    found = es.find_parts(mesh, level=-0.5)
     count, labels = es.geometry.vertex_components(mesh)
     owners = np.unique(np.column_stack([found.parts.labels, labels[mesh.faces[:, 0]]]), axis=0)
     assert len(np.unique(owners[:, 1])) == count
     assert len(owners) == len(found.parts.features.vertices), "no part has faces of two components"
     if mesh is SPECKED:
-        alone = es.find_parts(BODY)
+        alone = es.find_parts(BODY, level=-0.5)
         assert len(owners) == len(alone.parts.features.vertices) + 70
 
 
