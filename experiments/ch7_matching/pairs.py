@@ -29,6 +29,8 @@ RIGID = {
 }
 SETS = ("cuts", "holes", "scans", "noise", "wholes")
 FURTHER_SETS = ("pieces", "bridges")
+# The share of the vertices that a plane removes, at least and at most
+REMOVED = {"cuts": (0.3, 0.7), "small cuts": (0.4, 0.8)}
 N_VERTICES = 5000  # of the whole, and of the other shape before it is cut
 N_TRUE = 400  # vertices of a part at which errors are measured
 JITTER = 0.15  # of the mean edge: vertices are moved along the surface before they are thinned out
@@ -42,6 +44,10 @@ SLAB = 0.42, 0.58  # the share of the vertices below each of two parallel planes
 # Ends of a bridge: at most so far through space, at least so far along the surface, and the radius of
 # the tube, in roots of the area
 BRIDGE_ACROSS, BRIDGE_ALONG, BRIDGE_RADIUS = 0.25, 0.6, 0.03
+# Bumps that stretch a shape: how many, how wide (a share of its longest side), the standard deviation
+# of the logarithm by which they stretch along each axis, and the least and the most that they add
+N_BUMPS, BUMP_WIDTHS = 6, (0.12, 0.25)
+BUMP_STRETCH, MOST_STRETCH = 0.375, (-0.5, 0.8)
 # Radii of holes, in roots of the area of the whole
 HOLE_RADII = 0.02, 0.07
 
@@ -93,8 +99,8 @@ def cut(mesh: es.TriangleMesh, kind: str, rng: np.random.Generator) -> es.Triang
     """Return the part of a set: its largest piece, or all of them if they are the matter."""
     if kind == "pieces":
         return without_slab(mesh, rng)
-    if kind == "cuts":
-        planes = es.scans.random_planes(mesh, rng, share=rng.uniform(0.3, 0.7))
+    if kind in REMOVED:
+        planes = es.scans.random_planes(mesh, rng, share=rng.uniform(*REMOVED[kind]))
         part = es.scans.cut_by_planes(mesh, planes).mesh
     elif kind == "scans":
         part = es.partial_scan(mesh, rng).mesh
@@ -102,8 +108,9 @@ def cut(mesh: es.TriangleMesh, kind: str, rng: np.random.Generator) -> es.Triang
         part = with_holes(mesh, rng)
     elif kind == "bridges":
         part = with_bridge(mesh, rng)
-    elif kind == "noise":
-        part = cut(mesh, str(rng.choice(["cuts", "holes", "scans"])), rng)
+    elif kind == "noise" or kind.startswith("noisy "):
+        clean = rng.choice(["cuts", "holes", "scans"]) if kind == "noise" else kind[len("noisy ") :]
+        part = cut(mesh, str(clean), rng)
         edge = es.geometry.edge_lengths(part).mean()
         noise = NOISE * edge * rng.standard_normal(part.vertices.shape)
         part = es.TriangleMesh(part.vertices + noise, part.faces)
@@ -149,10 +156,28 @@ def with_bridge(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleM
     raise ValueError("no two places of the shape are near in space and far along it")
 
 
-def make_pair(animal: str, poses: tuple[str, str], kind: str, seed: int) -> Pair:
-    """Return a part of the first pose and the second pose as a whole."""
+def stretched(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMesh:
+    """Return a shape of which smooth bumps stretch or shrink the surroundings of some vertices."""
+    size = np.ptp(mesh.vertices, axis=0).max()
+    vertices = np.array(mesh.vertices)
+    for _ in range(N_BUMPS):
+        away = mesh.vertices - mesh.vertices[rng.integers(mesh.n_vertices)]
+        width = size * rng.uniform(*BUMP_WIDTHS)
+        weights = np.exp(-(away**2).sum(axis=1) / (2 * width**2))
+        stretch = np.expm1(rng.normal(0, BUMP_STRETCH, 3)).clip(*MOST_STRETCH)
+        vertices += weights[:, None] * away * stretch
+    return es.TriangleMesh(vertices, mesh.faces)
+
+
+def make_pair(
+    animal: str, poses: tuple[str, str], kind: str, seed: int, *, stretch: bool = False
+) -> Pair:
+    """Return a part of the first pose, which may be stretched, and the second pose as a whole."""
     rng = np.random.default_rng(seed)
     first, second = (read_shape(pose) for pose in poses)
+    if stretch:
+        # drawn apart, so that what is cut does not depend on it
+        first = stretched(first, np.random.default_rng(seed + 7))
     whole = remesh(second, N_VERTICES, np.random.default_rng(1))
     part = cut(remesh(first, N_VERTICES, np.random.default_rng(2)), kind, rng)
     foot = es.geometry.closest_points(first, part.vertices)

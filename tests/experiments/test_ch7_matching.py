@@ -7,7 +7,7 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch7_matching"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text())
-FULL, FURTHER = EXPECTED["full"], EXPECTED["further"]
+FULL, FURTHER, CALIBRATED = EXPECTED["full"], EXPECTED["further"], EXPECTED["calibrate"]
 
 
 def test_the_readme_shows_the_expected_figures():
@@ -26,6 +26,14 @@ def test_the_readme_shows_the_expected_figures():
     for cls, row in FURTHER["individuals"].items():
         line = f"| {cls} | {row['wholes']:.2f} | {row['cuts']:.2f} | {row['usual']:.2f} |"
         assert line in text, line
+    for group, row in CALIBRATED["groups"].items():
+        line = f"| {group} | {row['right']:.2f} |"
+        for way in ("confidence", "left out", "former"):
+            score = row.get(way)
+            line += f" {score['Brier']:.2f} |" if score else " – |"
+        assert line in text, line
+    means = " | ".join(f"{mean:.1f}" for mean in CALIBRATED["mean errors"].values())
+    assert f"| maps of `match_shapes` | {means} |" in text
 
 
 @pytest.mark.long
@@ -40,3 +48,12 @@ def test_two_parts_of_lions_are_placed(quick_form):
 def test_a_hand_is_placed_on_another_one(quick_form):
     row = quick_form("ch7_matching/further.py")["individuals"]["hand"]
     assert row["wholes"] > row["usual"] + 0.1
+
+
+@pytest.mark.long
+@pytest.mark.data
+def test_constants_fitted_to_three_parts_tell_right_vertices_from_wrong_ones(quick_form):
+    groups = quick_form("ch7_matching/calibrate.py")["groups"].values()
+    # Half of all vertices are right, so that one number for all would score 0.25.
+    scores = [row["fitted"]["Brier"] for row in groups]
+    assert sum(scores) / len(scores) < 0.2

@@ -21,11 +21,11 @@ MOST_STRETCH = 5.0  # the same, for ratios of lengths
 N_OTHERS = 2  # maps of other starts that are compared
 LEAST_MISFIT = 1e-4  # a pair of equal shapes has less, which says no more
 TINY = np.finfo(float).tiny
-# Logistic regression on parts of the tuning half of experiments/ch7_matching: 52 cuts and scans of
-# cats and horses that a smooth field stretches (22 of them with noise), 8 parts matched to hands,
-# planes, people and teddies, where nothing is right, and, with as much weight in all, 15 of plain
-# pairs. A constant, then the columns of `vertex_evidence`. On parts that were left out of the fit the
-# area under the curve is 0.88, and each tenth of confidence is right to within 0.1.
+# Fitted by experiments/ch7_matching/calibrate.py, which prints how good they are: logistic regression on
+# parts of its tuning half, 52 cuts and scans of cats and horses that a smooth field stretches (22 of them
+# with noise), 8 parts matched to hands, planes, people and teddies, where nothing is right, and, with as
+# much weight in all, 15 of plain pairs. A constant, then the columns of `vertex_evidence`. Each tenth of
+# confidence is right to within 0.1 on parts that are left out of the fit.
 CALIBRATION = np.array(
     [0.312, 0.964, -42.6, -6.56, -8.68, 0.653, -47.6, 0.885, 0.0691, 4.68, 0.773, -1.27, -0.229]
 )
