@@ -60,12 +60,13 @@ def _solve(mine: SymmetricFactor, right: np.ndarray, *_: object) -> Work:
     ]  # L there and back
 
 
-def _orthogonal(_inner: object, space: np.ndarray, columns: np.ndarray, _rng: object) -> Work:
-    width = (
-        columns.shape[0] * columns.shape[2]
-    )  # what is known is read to project on it, and again to take that away
-    space = space[: -len(columns)]
-    return 2.0 * space.nbytes, 4.0 * (space.size / columns.shape[1]) * columns.shape[1] * width
+def _orthogonal(
+    _inner: object, space: np.ndarray, columns: np.ndarray, _rng: object, *, skip: bool = False
+) -> Work:
+    # What is known is read to project on it, and again to take that away.
+    groups = len(columns)
+    known = space[:-groups][-2 * groups :] if skip else space[:-groups]
+    return 2.0 * known.nbytes, 4.0 * known.size * groups * columns.shape[2]
 
 
 def _eigh(krylov: Any, _shift: float) -> Work:

@@ -179,7 +179,7 @@ def block_lanczos(
                 chosen = chosen[np.argsort(ritz.values[chosen], kind="stable")]
                 return ritz.values[chosen], inner.leave(_vectors(krylov, ritz, chosen))
             seen.append((size, missing))
-            check = size + _until_next_check(seen, block)
+            check = min(size + _until_next_check(seen, block), capacity)
         report(size / (size + 0.6 * (wanted.below + wanted.above) + block))
     raise ConvergenceError(
         f"Block Lanczos must converge within {capacity} vectors; {missing} of {wanted.below + wanted.above} "
