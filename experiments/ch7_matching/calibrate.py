@@ -18,7 +18,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import give_out, output_file
+from outputs import give_out, output_file, output_folder
 from real_shapes import DATA, require_data
 
 STRETCHED = "stretched"
@@ -180,7 +180,9 @@ def main() -> None:
     """Match, fit, and print constants, errors and scores."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="three parts")
-    parser.add_argument("--lions", type=Path, help="folder --db of run.py: compare on lions, too")
+    parser.add_argument(
+        "--lions", type=output_folder, help="folder --db of run.py: compare on lions, too"
+    )
     parser.add_argument("--out", type=output_file, default="ch7-calibrate.json")
     arguments = parser.parse_args()
     require_data()
@@ -191,6 +193,10 @@ def main() -> None:
         results |= judge_left_out(rows)
     if arguments.lions:
         files = sorted(arguments.lions.glob("*lion*.npz"))
+        if not files:
+            parser.error(
+                f"--lions must be a folder that run.py --db filled; {arguments.lions} has no lions."
+            )
         rows += [{"group": "lion", **np.load(file)} for file in files]
     for row in rows:
         row |= {"fitted": confidence_by(row, constants), "former": confidence_by(row, FORMER)}
