@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matched_poses import N_POINTS, describe_poses
 
 import eigenshape as es
 from eigenshape.matching.assignment import (
@@ -12,18 +13,13 @@ from eigenshape.matching.assignment import (
     assign_far_points,
 )
 from eigenshape.matching.pairs import descriptor_costs, patch_differences
-from eigenshape.matching.surface import UNIT, describe_surface
-
-N_VERTICES = 600
-N_POINTS = 150
+from eigenshape.matching.surface import describe_surface
 
 
 @pytest.fixture(scope="module")
 def surfaces():
     """Two poses of a creature in one unit, with the same vertices."""
-    poses = [es.make_creature("quadruped", pose, n_vertices=N_VERTICES) for pose in (0, 1)]
-    unit = UNIT * float(np.sqrt(es.geometry.surface_area(poses[1])))
-    return [describe_surface(pose, unit, N_POINTS) for pose in poses]
+    return describe_poses()
 
 
 @pytest.fixture(scope="module")

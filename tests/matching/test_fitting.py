@@ -4,25 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matched_poses import N_POINTS, N_VERTICES, describe_poses
 
 import eigenshape as es
 from eigenshape.matching.fitting import fit_part, plan_fit
 from eigenshape.matching.growth import find_maps, fitted_maps
 from eigenshape.matching.pairs import patch_differences
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, smooth_places
-from eigenshape.matching.surface import UNIT, describe_surface
+from eigenshape.matching.surface import describe_surface
 from eigenshape.matching.views import N_VIEWS, describe_views
-
-N_VERTICES = 600
-N_POINTS = 150
 
 
 @pytest.fixture(scope="module")
 def surfaces():
     """Two poses of a creature in one unit, with the same vertices."""
-    poses = [es.make_creature("quadruped", pose, n_vertices=N_VERTICES) for pose in (0, 1)]
-    unit = UNIT * float(np.sqrt(es.geometry.surface_area(poses[1])))
-    return [describe_surface(pose, unit, N_POINTS) for pose in poses]
+    return describe_poses()
 
 
 def test_a_part_that_is_bent_by_the_true_map_comes_to_lie_there(surfaces):
