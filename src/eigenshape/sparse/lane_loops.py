@@ -118,6 +118,57 @@ add_eight_sums = _summation(8, "fadd", ahead=AHEAD)
 
 
 @intrinsic
+def write_row_product(
+    context: Any,
+    entries: Any,
+    indices: Any,
+    start: Any,
+    stop: Any,
+    given: Any,
+    taken: Any,
+    to: Any,
+) -> Any:
+    """Write Σ entries[p] given[indices[p]] for p from start to stop - 1 to row `to` of `taken`.
+
+    Even and odd terms are summed separately, so that an addition need not wait for the one before.
+    """
+    whole = types.int64
+    signature = types.void(entries, indices, whole, whole, given, taken, whole)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        entries, indices, given, taken = (
+            context.make_array(signature.args[place])(context, builder, arguments[place]).data
+            for place in (0, 1, 4, 5)
+        )
+        start, stop, to = (arguments[place] for place in (2, 3, 6))
+        one, eight = ir.Constant(start.type, 1), ir.Constant(start.type, LANES)
+        even, odd = (
+            cgutils.alloca_once_value(builder, ir.Constant(VECTOR, None)) for _ in range(2)
+        )
+
+        def add_term(place: Any, total: Any) -> None:
+            index = builder.load(builder.gep(indices, [place]))
+            index = builder.sext(index, start.type)
+            row = _load(builder, given, builder.mul(index, eight))
+            entry = _repeat_scalar(builder, builder.load(builder.gep(entries, [place])))
+            builder.store(_multiply_add(builder, entry, row, builder.load(total)), total)
+
+        count = builder.sub(stop, start)
+        pairs = builder.lshr(count, one)
+        with cgutils.for_range(builder, pairs) as loop:
+            place = builder.add(start, builder.shl(loop.index, one))
+            add_term(place, even)
+            add_term(builder.add(place, one), odd)
+        with builder.if_then(builder.icmp_signed("<", builder.shl(pairs, one), count)):
+            add_term(builder.sub(stop, one), even)
+        total = builder.fadd(builder.load(even), builder.load(odd))
+        builder.store(total, _pointer(builder, taken, builder.mul(to, eight)), align=8)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@intrinsic
 def fetch_row(context: Any, rows: Any, at: Any) -> Any:
     """Ask memory for row `at` of `rows`, which may lie beyond the end."""
     return _row_action(rows, _fetch)

@@ -15,7 +15,8 @@ class Certificate:
     of eigenvalues below σ. If as many B-orthonormal eigenvectors were found, and their error
     intervals end below σ, none is missing and none is extra. If the k-th eigenvalue is multiple (to
     `resolution`) and more copies follow, σ is below all copies, and the pairs found at the level of
-    the k-th eigenvalue are the rest of the k. For an interval far up in the spectrum a second
+    the k-th eigenvalue are the rest of the k. An operator with many entries a row is bounded from
+    below by a sparser one instead, and counted where eigenvectors do not tell what it is. For an interval far up in the spectrum a second
     factor counts below its lower end, and the difference of the counts must have been found.
 
     Attributes
@@ -51,6 +52,9 @@ class Certificate:
     clusters : tuple of int
         Sizes of the clusters of eigenvalues, in ascending order of eigenvalues. Within a cluster
         neighbors are equal to 1e-6 of the largest eigenvalue, or to the rounding of the vectors.
+    n_deflated : int
+        0 if a factor of the operator itself was counted. Otherwise a factor of a sparser operator
+        below it was, outside the space of this many eigenvectors.
     estimate : float or None
         Approximate method: estimated error of the eigenvalues, relative to the largest.
 
@@ -77,6 +81,7 @@ class Certificate:
     clusters: tuple[int, ...] = ()
     first: int = 0
     floor: float = -np.inf
+    n_deflated: int = 0
     estimate: float | None = None
 
     __repr__ = short_repr
@@ -130,6 +135,12 @@ class Certificate:
                 f"Factors of W - σB at σ = {self.floor:.6g} and {self.shift:.6g} (1/length²) differ by {self.count} in "
                 f"their negative pivots, so {self.count} eigenvalues lie between, and {self.n_found} were found there. "
                 f"{quality}{self._clusters()}"
+            )
+        if self.n_deflated:
+            return (
+                f"Outside the space of {self.n_deflated} eigenvectors the operator is not below a sparser one, whose "
+                f"factor has no eigenvalue there up to σ = {self.shift:.6g} (1/length²). So {self.count} eigenvalues "
+                f"lie below σ, and {self.n_found} were found there. {quality}{self._clusters()}"
             )
         n = self.count
         counted = (

@@ -120,7 +120,7 @@ def prove(pencil: Pencil, pairs: Pairs, factor: Factor | None = None) -> Certifi
     if k == pencil.n:
         return certificate
     above = count_beside(pencil, pairs, k - 1, certificate.resolution, factor)
-    certificate = _with_count(certificate, pairs, above)
+    certificate = with_count(certificate, pairs, above.shift, above.count)
     return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate, above)
 
 
@@ -192,22 +192,23 @@ def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Fac
             f"of {len(pairs.values)} do not. Repair nearly degenerate elements."
         )
     return replace(
-        _with_count(above, pairs, factor),
+        with_count(above, pairs, factor.shift, factor.count),
         resolution=resolution,
         n_split=beside.count - len(pairs.values),
     )
 
 
-def _with_count(certificate: Certificate, pairs: Pairs, factor: Factor) -> Certificate:
-    n_found = int(np.count_nonzero(pairs.values < factor.shift))
+def with_count(certificate: Certificate, pairs: Pairs, shift: float, count: int) -> Certificate:
+    """Return the certificate of pairs with the number of all eigenvalues below a shift."""
+    n_found = int(np.count_nonzero(pairs.values < shift))
     low = float(pairs.values[n_found - 1]) + error_bound(pairs) if n_found else -np.inf
     return replace(
         certificate,
-        shift=factor.shift,
-        count=factor.count,
+        shift=shift,
+        count=count,
         n_found=n_found,
-        gap=(low, factor.shift),
-        resolution=float(np.abs(pairs.values - factor.shift).min()),
+        gap=(low, shift),
+        resolution=float(np.abs(pairs.values - shift).min()),
     )
 
 

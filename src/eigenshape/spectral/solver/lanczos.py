@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg as sl
@@ -29,6 +30,9 @@ NEGLIGIBLE = 1e-13
 MOST_LOST = 1e-6
 # Distance of two θ, relative to them, below which one eigenvector is not corrected by the other.
 CLUSTERED = 1e-6
+# Residual of a Ritz vector, relative to θ, up to which it is orthogonal to the others after a step of
+# the operator, up to the square.
+PRECISE = 1e-6
 # A space grows by at least this part of itself before it is checked again.
 CHECK_SHARE = 16
 # Pivots of a Gram matrix, relative to lengths: below this one Cholesky has lost too many digits,
@@ -37,8 +41,35 @@ DEPENDENT_PIVOT = 1e-4
 INDEPENDENT_PIVOT = 0.1
 
 
+class Operator(Protocol):
+    """What a Krylov space is made of: an operator, symmetric in some inner product, whose largest θ are wanted."""
+
+    pencil: Pencil
+
+    @property
+    def size(self) -> float:
+        """The size of the wanted eigenvalues of the pencil, which residuals are compared with."""
+
+    def image(self, block: Block) -> Block:
+        """Return the operator's image of each slot."""
+
+    def weigh(self, block: Float[np.ndarray, "g n b"]) -> Float[np.ndarray, "g n b"]:
+        """Return what the plain product with columns is the inner product with."""
+
+    def enter(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return the operator's vectors u for those of the pencil, φ."""
+
+    def leave(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return φ for u, which is used up."""
+
+    def values(
+        self, thetas: Float[np.ndarray, " m"]
+    ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+        """Return the eigenvalues λ of the pencil for θ, and |dλ/dθ| there; both infinite where θ tells none."""
+
+
 @dataclass(frozen=True, eq=False)
-class Operator:
+class ShiftedInverse:
     """(W - σB)⁻¹B in an inner product in which it is symmetric.
 
     Where B is diagonal that is B^½ (W - σB)⁻¹ B^½ in the plain one, on u = B^½ φ, and nothing is
@@ -49,6 +80,11 @@ class Operator:
     factor: Factor
     roots: Float[np.ndarray, "n 1"] | None
     scratch: Scratch
+
+    @property
+    def size(self) -> float:
+        """|σ|, since eigenvalues near the shift are wanted."""
+        return abs(self.factor.shift)
 
     def image(self, block: Block) -> Block:
         """Return the operator's image of each slot."""
@@ -80,11 +116,18 @@ class Operator:
             vectors /= self.roots
         return vectors
 
+    def values(
+        self, thetas: Float[np.ndarray, " m"]
+    ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+        """Return λ = σ + 1/θ, and 1/θ²."""
+        distances = 1 / np.where(thetas == 0, np.finfo(np.float64).tiny, thetas)
+        return self.factor.shift + distances, distances**2
 
-def operator(pencil: Pencil, factor: Factor) -> Operator:
+
+def shifted_inverse(pencil: Pencil, factor: Factor) -> ShiftedInverse:
     """Choose the inner product, and allocate the memory for the solves of one run."""
     roots = np.sqrt(pencil.mass_diagonal)[:, None] if pencil.mass_floor == 1.0 else None
-    return Operator(pencil, factor, roots, factor.lower.scratch())
+    return ShiftedInverse(pencil, factor, roots, factor.lower.scratch())
 
 
 @dataclass(frozen=True)
@@ -118,12 +161,36 @@ class Krylov:
 
 @dataclass(frozen=True, eq=False)
 class Ritz:
-    """Eigenpairs of `Krylov.projected`: θ ascending, coefficients, values σ + 1/θ, and which of them have converged."""
+    """Eigenpairs of `Krylov.projected`, and what they are of the pencil.
+
+    θ ascending, coefficients, lengths of their residuals, eigenvalues λ, and which have converged.
+    """
 
     thetas: Float[np.ndarray, " m"]
     coefficients: Float[np.ndarray, "m m"]
+    rests: Float[np.ndarray, " m"]
     values: Float[np.ndarray, " m"]
     converged: Bool[np.ndarray, " m"]
+
+
+@dataclass(frozen=True, eq=False)
+class RitzSpace:
+    """A Krylov space, its Ritz pairs, and the numbers of those that were wanted, by ascending eigenvalues."""
+
+    inner: Operator
+    krylov: Krylov
+    ritz: Ritz
+    chosen: Int[np.ndarray, " j"]
+
+    def lowest(self, count: int) -> Int[np.ndarray, " j"]:
+        """Return the numbers of the Ritz pairs with the lowest eigenvalues, up to one that is not precise enough."""
+        order = np.argsort(self.ritz.values, kind="stable")
+        precise = self.ritz.rests <= PRECISE * np.abs(self.ritz.thetas)
+        return order[: min(count, int(np.argmin(np.append(precise[order], False))))]
+
+    def vectors(self, numbers: Int[np.ndarray, " j"]) -> Float[np.ndarray, "n j"]:
+        """Return eigenvectors for some of the Ritz pairs."""
+        return self.inner.leave(_vectors(self.krylov, self.ritz, numbers))
 
 
 def block_lanczos(
@@ -135,22 +202,42 @@ def block_lanczos(
     groups: int = 1,
     report: Callable[[float], None],
 ) -> tuple[Float[np.ndarray, " j"], Float[np.ndarray, "n j"]]:
-    """Return eigenvalues around the shift, ascending, and eigenvectors, orthogonal to `locked`.
+    """Return eigenvalues around the shift of a factor, ascending, and eigenvectors, orthogonal to `locked`.
 
     They are B-orthonormal to more than half of the digits, and `lowest_pairs` makes them so to all.
-    The columns of `locked` are B-orthonormal. Unrestarted block Lanczos on (W - σB)⁻¹B in the
-    inner product of B (Grimes, Lewis and Simon 1994), in blocks of `groups` times eight columns.
-    Every second block is orthogonalized against all before it, the others against two (Simon 1984),
-    and what that leaves in the recurrence is taken out of the eigenvectors. It stops when what the
-    space has seen of `wanted` has converged; copies of an eigenvalue beyond the width of the block
-    may be missing, which an inertia count tells afterwards.
 
     Raises
     ------
     ConvergenceError
         If the space has grown to four times what is wanted, or to all there is.
     """
-    inner = operator(pencil, factor)
+    inner = shifted_inverse(pencil, factor)
+    found = grow_space(inner, wanted, locked=locked, groups=groups, report=report)
+    return found.ritz.values[found.chosen], found.vectors(found.chosen)
+
+
+def grow_space(
+    inner: Operator,
+    wanted: Wanted,
+    *,
+    locked: Float[np.ndarray, "n l"],
+    groups: int = 1,
+    report: Callable[[float], None],
+) -> RitzSpace:
+    """Return a Krylov space, orthogonal to `locked`, in which what it has seen of `wanted` has converged.
+
+    The columns of `locked` are B-orthonormal. Unrestarted block Lanczos (Grimes, Lewis and Simon
+    1994), in blocks of `groups` times eight columns. Every second block is orthogonalized against
+    all before it, the others against two (Simon 1984), and what that leaves in the recurrence is
+    taken out of the eigenvectors. Copies of an eigenvalue beyond the width of the block may be
+    missing, which an inertia count tells afterwards.
+
+    Raises
+    ------
+    ConvergenceError
+        If the space has grown to four times what is wanted, or to all there is.
+    """
+    pencil = inner.pencil
     rng, first, block = np.random.default_rng(0), -(-locked.shape[1] // LANES), groups * LANES
     capacity = _capacity(pencil, wanted, locked.shape[1], block)
     space = np.empty(
@@ -173,11 +260,11 @@ def block_lanczos(
         skip = not skip and _stays_orthogonal(along, coupling)
         if size >= check:
             krylov = Krylov(space[first : filled + groups], projected[:size, :size], coupling)
-            ritz = _ritz(krylov, factor.shift)
+            ritz = _ritz(krylov, inner)
             chosen, missing = _choose(ritz, wanted)
             if not missing:
                 chosen = chosen[np.argsort(ritz.values[chosen], kind="stable")]
-                return ritz.values[chosen], inner.leave(_vectors(krylov, ritz, chosen))
+                return RitzSpace(inner, krylov, ritz, chosen)
             seen.append((size, missing))
             check = min(size + _until_next_check(seen, block), capacity)
         report(size / (size + 0.6 * (wanted.below + wanted.above) + block))
@@ -332,14 +419,14 @@ def _weigh(inner: Operator, column: Float[np.ndarray, " n"]) -> Float[np.ndarray
     return inner.weigh(column[None, :, None])[0, :, 0]
 
 
-def _ritz(krylov: Krylov, shift: float) -> Ritz:
+def _ritz(krylov: Krylov, inner: Operator) -> Ritz:
     thetas, coefficients = sl.eigh(krylov.projected, lower=False)
     block = len(krylov.coupling)
-    values = shift + 1 / np.where(thetas == 0, np.finfo(np.float64).tiny, thetas)
+    values, slopes = inner.values(thetas)
     rests = np.linalg.norm(krylov.coupling @ coefficients[-block:], axis=0)
-    residuals = rests * (values - shift) ** 2
-    converged = (residuals <= TOLERANCE * abs(shift)) | (rests <= FLOOR * np.abs(thetas).max())
-    return Ritz(thetas, coefficients, values, converged)
+    precise = rests <= FLOOR * np.abs(thetas).max()
+    converged = (rests <= TOLERANCE * inner.size / slopes) | (precise & np.isfinite(values))
+    return Ritz(thetas, coefficients, rests, values, converged)
 
 
 def _choose(ritz: Ritz, wanted: Wanted) -> tuple[Int[np.ndarray, " j"], int]:

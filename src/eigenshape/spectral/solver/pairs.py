@@ -37,6 +37,11 @@ class Pairs:
     residuals: Float[np.ndarray, " k"]
 
 
+def first_pairs(pairs: Pairs, k: int) -> Pairs:
+    """Return the k lowest pairs."""
+    return Pairs(pairs.values[:k], pairs.vectors[:, :k], pairs.residuals[:k])
+
+
 def error_bound(pairs: Pairs) -> float:
     """Bound the distance of the values to eigenvalues, matched one to one (Kahan 1967)."""
     return float(np.linalg.norm(pairs.residuals))

@@ -13,7 +13,8 @@ from eigenshape._memory import require_memory
 from eigenshape._progress import Progress, silent
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.solver.certify import in_user_units, prove
+from eigenshape.spectral.solver.certify import in_user_units, prove, take_pairs
+from eigenshape.spectral.solver.complement import prove_outside, sparser_below
 from eigenshape.spectral.solver.components import (
     Parts,
     connected_parts,
@@ -22,7 +23,8 @@ from eigenshape.spectral.solver.components import (
     widths,
 )
 from eigenshape.spectral.solver.factor import Factor
-from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
+from eigenshape.spectral.solver.filters import chebyshev_filter
+from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos, grow_space
 from eigenshape.spectral.solver.pairs import Pairs, lowest_pairs, polish
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import (
@@ -38,6 +40,15 @@ Solve = Callable[[Pencil, int, Progress], tuple[Pairs, Certificate]]
 
 # Points up to which a dense solve is faster than a sparse one.
 DENSE_POINTS = 300
+# Entries a row from which products of W are used in place of a factor (measured),
+FILTER_ENTRIES = 100
+# in a filter that damps what lies above about 1.9 times as many eigenvalues as are wanted of a
+# sparser operator below W, which has more of them.
+DAMPED_FROM = 3
+# Vectors of that proof beyond those that the sparser operator has below γ, and γ relative to the
+# last eigenvalue that was found.
+MORE_VECTORS = 16
+COUNTED_TO = 1.001
 # A dense solve is also used if k is more than n / DENSE_SHARE,
 DENSE_SHARE = 4
 # and n is at most this: it takes 32 n² bytes, 1.1 GiB for 6,000 points.
@@ -77,6 +88,8 @@ def _solve_connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, C
     if dense_serves(pencil, k):
         return _solve_dense(pencil, k, report)
     methods: list[Solve] = []
+    if filter_serves(pencil, k):
+        methods.append(_solve_filtered)
     if k > ONE_SHIFT_PAIRS:
         methods.append(partial(_solve_sparse, start=walk))
     methods.append(partial(_solve_sparse, start=_at_once))
@@ -260,6 +273,47 @@ def _at_once(
 
 def _in_run(report: Progress, run: int) -> Callable[[float], None]:
     return lambda done: report(0.05 + 0.8 * done, f"run {run + 1} of block Lanczos")
+
+
+def filter_serves(pencil: Pencil, k: int) -> bool:
+    """Return whether products are so much cheaper than factors that a filter replaces the inverse."""
+    entries = pencil.stiffness.nnz / pencil.n
+    return pencil.mass_floor == 1.0 and entries >= FILTER_ENTRIES and k <= ONE_SHIFT_PAIRS
+
+
+def _solve_filtered(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
+    """Find the pairs with products of W alone, and prove them complete with factors of a sparser operator."""
+    report(0.02, "looking for a filter")
+    sparser = sparser_below(pencil)
+    analysis = sparser.shift_pattern.elimination
+    require_memory_for_pairs(pencil, k, 24 * (analysis.n_entries + pencil.stiffness.nnz))
+    low = shift_inside(sparser, DAMPED_FROM * k).shift
+    inner = chebyshev_filter(pencil, analysis.order, low)
+    none = np.empty((pencil.n, 0))
+    space = grow_space(inner, Wanted(below=0, above=k), locked=none, report=_in_run(report, 0))
+    report(0.85, "counting eigenvalues")
+    gamma = float(np.sort(space.ritz.values)[k - 1]) * COUNTED_TO
+    below = factorize_near(sparser, gamma)
+    vectors = space.vectors(space.lowest(max(below.count, k) + MORE_VECTORS))
+    del space
+    for run in range(1, MOST_RUNS):
+        pairs = lowest_pairs(pencil, vectors, vectors.shape[1])
+        found, certificate = prove_outside(pencil, pairs, k, below)
+        missing = certificate.n_missing
+        if not missing:
+            return take_pairs(pencil, found, certificate, 0, k)
+        groups = min(1 + -(-missing // LANES), MOST_GROUPS)
+        more = grow_space(
+            inner,
+            Wanted(below=0, above=missing),
+            locked=pairs.vectors,
+            groups=groups,
+            report=_in_run(report, run),
+        )
+        vectors = np.hstack([pairs.vectors, more.vectors(more.chosen)])
+    raise ConvergenceError(
+        f"Every eigenvalue that is counted must be found; {missing} of {k} are missing."
+    )
 
 
 def _remaining(
