@@ -50,7 +50,9 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
     The certified method proves that no eigenvalue is missing. It runs block Lanczos on (W - σB)⁻¹B
     with σ among the wanted eigenvalues, counts the eigenvalues below a gap by Sylvester's law of
     inertia (Parlett 1998, section 3.3), and searches for what is missing until both counts agree.
-    Small operators are solved densely.
+    Small operators are solved densely. Operators with a hundred entries a row or more, such as
+    kernels, are not factored: Lanczos runs on a Chebyshev polynomial (Zhou, Saad, Tiago and
+    Chelikowsky 2006), and eigenvalues are counted in a sparser operator below the given one.
 
     The approximate method factors nothing of full size and proves nothing. It aggregates points
     (Vaněk, Mandel and Brezina 1996), solves the coarsest level exactly, and refines the

@@ -19,8 +19,8 @@ from eigenshape.spectral.solver.pairs import Pairs, first_pairs
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Entries below this share of the largest ones beside the diagonal, in their row and their column,
-# are left out: of a Gaussian kernel those beyond 1.8 widths, 80 % of them.
-SMALL_ENTRIES = 0.04
+# are left out: of a Gaussian kernel those beyond 2 widths, 75 % of them.
+SMALL_ENTRIES = 0.02
 # Rounding of a sum of entries of a row, relative.
 SUMS = 1e-12
 # Rounding of the form on the other pairs, relative to σ, a millionth of what they must differ by.
@@ -66,30 +66,34 @@ def prove_outside(
     Raises
     ------
     ConvergenceError
-        If the cluster has no end, the pairs are not B-orthonormal eigenvectors, or rounding or
-        residuals are too large to tell.
+        If the pairs are not B-orthonormal eigenvectors, or not precise enough for a proof, or the
+        cluster has no end among them.
     """
     certificate = quality(pencil, first_pairs(pairs, k))
     ends = np.flatnonzero(np.diff(pairs.values[k - 1 :]) > 2 * certificate.resolution)
-    if not ends.size:
-        raise ConvergenceError("A proof needs a gap after the last pair; there is none.")
-    found = first_pairs(pairs, k + int(ends[0]))
+    found = first_pairs(pairs, k + int(ends[0])) if ends.size else pairs
     if len(found.values) > k:
         certificate = quality(pencil, found)
     shift = float(found.values[-1]) + certificate.resolution
-    missing = _most_missing(pencil, pairs, len(found.values), shift, below)
+    missing = _most_missing(pencil, pairs, len(found.values), shift, below) if ends.size else None
+    if missing is None:
+        raise ConvergenceError(
+            f"A proof by a sparser operator needs pairs above a gap and precise ones; of {len(pairs.values)} pairs "
+            f"{len(found.values)} end at {np.ldexp(shift, pencil.value_exponent):.6g} (1/length²)."
+        )
     certificate = with_count(certificate, found, shift, len(found.values) + missing)
     return found, replace(certificate, n_deflated=len(pairs.values))
 
 
 def _most_missing(
     pencil: Pencil, pairs: Pairs, n_found: int, shift: float, below: Factor
-) -> int:
-    """Bound the number of eigenvalues below σ beside those of the first pairs, which are below it.
+) -> int | None:
+    """Bound the number of eigenvalues below σ beside those of the first pairs; None where rounding hides it.
 
-    Let y be B-orthogonal to all pairs V, and U the pairs that are not below σ. Then 
-    (Ua + y)ᵀ(W - σB)(Ua + y) ≥ aᵀ(UᵀWU - σUᵀBU)a + 2aᵀRᵀy + yᵀ(W₀ - σB)y with R = WU - BUΘ. If W₀
-    had no eigenvalue below γ on all y, that were positive.
+    Let y be B-orthogonal to all pairs V, and U the pairs above σ. Then (Ua + y)ᵀ(W - σB)(Ua + y)
+    is at least aᵀ(UᵀWU - σUᵀBU)a + 2aᵀRᵀy + yᵀ(W₀ - σB)y, with R = WU - BUΘ. That is positive
+    where W₀ has no eigenvalue below γ among the y and R is small; otherwise W has at most as many
+    eigenvalues more as W₀ has there.
     """
     weighed = pencil.weigh(pairs.vectors)
     solved = below.solve(weighed)
@@ -100,8 +104,7 @@ def _most_missing(
     on_pairs = np.linalg.eigvalsh((projected + projected.T) / 2)
     error = 2 * float(np.einsum("ij,i,ij->", solved, loss, solved))
     if not np.abs(on_pairs).min() > error:
-        raise ConvergenceError("The solves of a proof must be precise; γ is near an eigenvalue.")
-    missing = below.count - int(np.count_nonzero(on_pairs < 0))
+        return None
 
     # The form is least at y = -B⁻¹Ra / (γ - σ).
     others, of_others = pairs.vectors[:, n_found:], weighed[:, n_found:]
@@ -112,5 +115,5 @@ def _most_missing(
     form -= rests.T @ (rests / pencil.mass_diagonal[:, None]) / margin
     least = np.linalg.eigvalsh((form + form.T) / 2)[0]
     if not (margin > 0 and least > ROUNDING * shift):
-        raise ConvergenceError("The pairs of a proof must be precise beside their distance to σ.")
-    return missing
+        return None
+    return below.count - int(np.count_nonzero(on_pairs < 0))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy.linalg as sl
@@ -41,6 +41,7 @@ DEPENDENT_PIVOT = 1e-4
 INDEPENDENT_PIVOT = 0.1
 
 
+@runtime_checkable
 class Operator(Protocol):
     """What a Krylov space is made of: an operator, symmetric in some inner product, whose largest θ are wanted."""
 
