@@ -87,7 +87,7 @@ def test_a_factor_below_the_pairs_proves_nothing():
         prove_outside(PENCIL, pairs_of(range(60)), K, factor_above(K - 10))
 
 
-@pytest.mark.parametrize("k", [1, 2, 5, 30, 50])
+@pytest.mark.parametrize("k", [1, 2, 5, 20, 30])
 def test_filters_and_factors_find_the_same_spectrum(monkeypatch, k):
     laplacian = mesh_laplacian(icosphere(4))
     filtered = solve_spectrum(laplacian, k)

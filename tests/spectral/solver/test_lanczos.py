@@ -43,6 +43,15 @@ def test_skipped_projections_cost_no_digit(monkeypatch):
     assert residuals[MOST_LOST] < 3 * residuals[0.0]
 
 
+def test_a_second_run_is_orthogonal_to_the_first_to_rounding():
+    pencil = normalize(cotangent_laplacian(icosphere(3)))
+    factor = factorize(pencil, 0.05 * pencil.level)
+    found = run(pencil, factor, Wanted(below=factor.count, above=12))
+    first = lowest_pairs(pencil, found, found.shape[1]).vectors
+    second = run(pencil, factor, Wanted(below=0, above=20), locked=first)
+    np.testing.assert_allclose(first.T @ pencil.weigh(second), 0, atol=1e-14)
+
+
 def test_a_second_run_finds_the_copies_that_the_block_was_too_narrow_for():
     pencil = normalize(cotangent_laplacian(tetrahedra(100)))  # the eigenvalue 0 a hundred times
     factor = factorize(pencil, 0.01 * pencil.level)

@@ -228,9 +228,9 @@ def grow_space(
     """Return a Krylov space, orthogonal to `locked`, in which what it has seen of `wanted` has converged.
 
     The columns of `locked` are B-orthonormal. Unrestarted block Lanczos (Grimes, Lewis and Simon
-    1994), in blocks of `groups` times eight columns. Every second block is orthogonalized against
-    all before it, the others against two (Simon 1984), and what that leaves in the recurrence is
-    taken out of the eigenvectors. Copies of an eigenvalue beyond the width of the block may be
+    1994), in blocks of `groups` times eight columns. Where nothing is locked, every second block is
+    orthogonalized against all before it, the others against two (Simon 1984), and what that leaves
+    in the recurrence is taken out of the eigenvectors. Copies of an eigenvalue beyond the width of the block may be
     missing, which an inertia count tells afterwards.
 
     Raises
@@ -258,7 +258,8 @@ def grow_space(
         image = inner.image(space[filled - groups : filled])
         along, coupling = _orthonormalize(inner, space[: filled + groups], image, rng, skip=skip)
         projected[:size, size - block : size] = along[first * LANES :]
-        skip = not skip and _stays_orthogonal(along, coupling)
+        # What is left of locked vectors is in no recurrence, so that nothing could take it out.
+        skip = not (first or skip) and _stays_orthogonal(along, coupling)
         if size >= check:
             krylov = Krylov(space[first : filled + groups], projected[:size, :size], coupling)
             ritz = _ritz(krylov, inner)
@@ -467,7 +468,8 @@ def _corrected(
 ) -> Float[np.ndarray, "m j"]:
     """Return coefficients of eigenvectors of T + R, to first order in R.
 
-    Those of `ritz` are of T + R + Rᵀ, so s loses Σ_i s_i (s_iᵀ Rᵀ s) / (θ - θ_i).
+    Those of `ritz` are of T + R + Rᵀ, so s loses Σ_i s_i (s_iᵀ Rᵀ s) / (θ - θ_i). Close neighbors
+    stay skew to second order, which `lowest_pairs` and `polish` make good.
     """
     weights, thetas = ritz.coefficients[:, chosen], ritz.thetas[chosen]
     parts = ritz.coefficients.T @ (krylov.rounding().T @ weights)

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+import scipy.linalg as sl
+from jaxtyping import Float, Float32
 
 from eigenshape._errors import ConvergenceError
 from eigenshape._threads import map_in_threads, share_units
@@ -17,15 +18,16 @@ from eigenshape.spectral.solver.pencil import (
 
 # Largest entry of |ΦᵀBΦ - I| that needs no correction.
 LOOSE = 1e-12
-# Largest entry that one Newton step corrects to rounding, since its error is the square; beyond it
-# the vectors of different runs are wrong.
-SKEW = 1e-5
+# Largest entry that one Newton step corrects to rounding, since its error is the square,
+ONE_STEP = 1e-6
+# and largest one from which these steps lead to rounding; copies are beyond it.
+SKEW, NEWTON_STEPS = 0.03, 4
 # Columns before one that it may lean on: more than a slice has.
 LEANING_COLUMNS = 384
 # Rows that are corrected at once.
 ROWS = 512
 # Residual, relative to the largest eigenvalue, above which a pair takes one more solve.
-POLISHED = 2e-9
+POLISHED = 2e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,16 +50,19 @@ def error_bound(pairs: Pairs) -> float:
 
 
 def polish(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
-    """Refine the pairs whose residuals are large because of the rounding of the factor.
+    """Refine the pairs whose residuals are large because of rounding.
 
-    One step of (W - σB)⁻¹ on a residual gives the error of the vector outside the space of all
-    vectors.
+    Neighbors that are mixed are separated by Rayleigh and Ritz among these pairs. Then one step of
+    (W - σB)⁻¹ on a residual gives the error of the vector outside the space of all vectors.
     """
     late = np.flatnonzero(pairs.residuals > POLISHED * np.abs(pairs.values).max(initial=0.0))
     if not late.size:
         return pairs
     values, vectors, residuals = pairs.values.copy(), pairs.vectors.copy(), pairs.residuals.copy()
     part = vectors[:, late]
+    values[late], rotation = sl.eigh(part.T @ (pencil.stiffness @ part))
+    part = part @ rotation
+    vectors[:, late] = part
     step = factor.solve(pencil.stiffness @ part - pencil.weigh(part) * values[late])
     vectors[:, late] -= step - vectors @ (vectors.T @ pencil.weigh(step))
     values[late], residuals[late] = rayleigh_residuals(pencil, vectors[:, late])
@@ -81,26 +86,41 @@ def lowest_pairs(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> P
 def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.ndarray, "n j"]:
     """Make columns B-orthonormal, in place, that are so up to the tolerance of the iteration.
 
-    That is one Newton step towards the nearest such columns. Columns ascend nearly, and lean on
-    those whose eigenvalues are near; what is further apart is orthogonal by its residuals.
+    By Newton steps towards the nearest such columns, of which one is enough as a rule. Columns
+    ascend nearly, and lean on those whose eigenvalues are near; what is further apart is orthogonal
+    by its residuals.
     """
     k = vectors.shape[1]
     chunks = column_chunks(k)
     starts = [max(columns.start - LEANING_COLUMNS, 0) for columns in chunks]
-    offs = map_in_threads(
-        lambda place: gram_columns(pencil, vectors, *place), zip(chunks, starts, strict=True)
-    )
-    off = max((float(np.abs(each).max()) for each in offs), default=0.0)
-    if off < LOOSE:
-        return vectors
-    if not off <= SKEW:
-        raise ConvergenceError(
-            f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}."
+    for _ in range(NEWTON_STEPS):
+        offs = map_in_threads(
+            lambda place: gram_columns(pencil, vectors, *place), zip(chunks, starts, strict=True)
         )
-    gram = np.zeros((k, k), np.float32)  # a correction needs few digits
-    for columns, start, each in zip(chunks, starts, offs, strict=True):
-        gram[start : columns.stop, columns] = each
-        gram[columns, start : columns.start] = each[: columns.start - start].T
+        off = max((float(np.abs(each).max()) for each in offs), default=0.0)
+        if off < LOOSE:
+            break
+        if not off <= SKEW:
+            raise ConvergenceError(
+                f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}."
+            )
+        gram = np.zeros((k, k), np.float32)  # a correction needs few digits
+        for columns, start, each in zip(chunks, starts, offs, strict=True):
+            gram[start : columns.stop, columns] = each
+            gram[columns, start : columns.start] = each[: columns.start - start].T
+        _subtract_half(vectors, gram, chunks)
+        if off <= ONE_STEP:
+            break
+    return vectors
+
+
+def _subtract_half(
+    vectors: Float[np.ndarray, "n k"], gram: Float32[np.ndarray, "k k"], chunks: list[slice]
+) -> None:
+    """Subtract half of the product of columns and a banded matrix from them, in single precision.
+
+    In place, since touching new memory costs as much as the products.
+    """
 
     def correct(share: tuple[int, int]) -> None:
         rows = vectors[slice(*share)]
@@ -112,6 +132,4 @@ def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[
         step *= 0.5
         rows -= step
 
-    # In place, since touching new memory costs as much as the products.
     map_in_threads(correct, share_units(len(vectors), ROWS, len(vectors)))
-    return vectors

@@ -46,7 +46,7 @@ FILTER_ENTRIES = 100
 # sparser operator below W, which has more of them.
 DAMPED_FROM = 4
 # Runs before the method with factors of the operator itself takes over.
-FILTER_RUNS = 5
+FILTER_RUNS = 4
 # Pairs beyond the wanted ones, among which the cluster of the last should end.
 BEYOND = 8
 # Vectors of that proof beyond as many as the sparser operator has eigenvalues below γ,
@@ -308,6 +308,8 @@ def _solve_filtered(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Ce
         missing = certificate.n_missing
         if not missing:
             return take_pairs(pencil, found, certificate, 0, k)
+        if missing > MOST_GROUPS * LANES:
+            break
         groups = min(1 + -(-missing // LANES), MOST_GROUPS)
         more = grow_space(
             inner,
