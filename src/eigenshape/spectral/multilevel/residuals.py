@@ -123,9 +123,9 @@ class Stored:
     tower: Tower
     columns: np.ndarray
 
-    def rows(self, rows: slice, k: int) -> np.ndarray:
-        """Return rows of the first k columns."""
-        return self.columns[rows, :k]
+    def rows(self, rows: slice) -> np.ndarray:
+        """Return some rows of the columns."""
+        return self.columns[rows]
 
     def pick(self, some: np.ndarray) -> np.ndarray:
         """Return some of the columns as a contiguous block."""
@@ -147,10 +147,10 @@ class Interpolated:
     tower: Tower
     below: np.ndarray
 
-    def rows(self, rows: slice, k: int) -> np.ndarray:
-        """Return rows of the first k columns."""
-        product = np.empty((rows.stop - rows.start, k), dtype=np.float32)
-        return multiply(self.tower.levels[0].rough_prolong, self.below[:, :k], product, rows)
+    def rows(self, rows: slice) -> np.ndarray:
+        """Return some rows of the columns."""
+        product = np.empty((rows.stop - rows.start, self.below.shape[1]), dtype=np.float32)
+        return multiply(self.tower.levels[0].rough_prolong, self.below, product, rows)
 
     def pick(self, some: np.ndarray) -> np.ndarray:
         """Return some of the columns as a contiguous block."""

@@ -196,7 +196,7 @@ def _approximate_signature(
     decay = estimate.decay.astype(np.float32)
 
     def fill(rows: slice) -> None:
-        part = columns.rows(rows, goal.k)
+        part = columns.rows(rows)[:, : goal.k]
         heat[rows] = (part * part) @ decay
 
     change_rows(start.tower, fill)
