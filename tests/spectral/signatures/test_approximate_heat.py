@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
+from eigenshape.spectral.signatures import approximate_heat
 
 TIMES = np.array([1e-3, 4e-3, 2e-2, 0.1])
 
@@ -71,6 +72,22 @@ def test_the_error_falls_with_the_accuracy():
     assert true[0] > 5 * true[1]
     assert runs[0].errors[0] > 5 * runs[1].errors[0]
     assert true[1] < 1e-3
+
+
+def test_pairs_that_are_good_enough_are_not_refined(monkeypatch):
+    def refuse(*_):
+        raise AssertionError("refined")
+
+    _, laplacian = creature()
+    times = TIMES * laplacian.mass.sum()
+    monkeypatch.setattr(approximate_heat, "refine", refuse)
+    found = es.spectral.approximate_heat_signature(laplacian, 12, times, accuracy=0.05)
+    assert not found.complete
+    off = true_errors(laplacian, found, exact(laplacian, 12, times))
+    assert off.max() < 0.05
+    assert (off <= 1.5 * found.errors).all()
+    with pytest.raises(AssertionError, match="refined"):
+        es.spectral.approximate_heat_signature(laplacian, 12, times, accuracy=1e-4)
 
 
 def test_eigenvalues_are_ritz_values():

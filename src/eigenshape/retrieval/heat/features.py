@@ -168,7 +168,7 @@ def find_heat_features(
         `gaussian_curvature`.
     accuracy : float, optional
         Approximate heat to this relative error, 0.0001 to 0.1, instead of solving a spectrum
-        (`approximate_heat_signature`). A million vertices then take about a minute on one
+        (`approximate_heat_signature`). A million vertices then take about half a minute on one
         core with 0.01. A mesh with few vertices for the eigenpairs of the recipe is solved anyway.
     progress : callable, optional
         Called as progress(fraction_done, message); twice from 0 to 1 for a mesh with a boundary.

@@ -9,13 +9,16 @@ from jaxtyping import Float
 
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, smooth_columns
 
-LARGEST = 64  # most points in an aggregate, on average
+LARGEST = 256  # most points in an aggregate, on average
 TOO_LITTLE = 1.5  # ratio of points between levels below which another level is not worth its cost
-DEGREE = 1.0  # smoothing steps per edge of an aggregate's diameter
+# Smoothing steps per edge of an aggregate's diameter. From a million points to 9,000, 18 steps make
+# eigenvalues err by 0.2 % of the 300th, 16 steps by 0.3 %, and 10 steps by several per cent. Each
+# step lengthens the rows of P and of the next level by a tenth.
+DEGREE = 1.7
 MESH_ROW = 7.0  # entries per row of a triangle mesh, where a smoothing step reaches one edge far
 # Smoothing keeps functions with at least size / PASSED points per wavelength (an area on surfaces),
 # where `size` is the number of points in an aggregate.
-PASSED = 4.0
+PASSED = 2.8
 LEAST_RATIO = 2.5  # smallest ratio of the ends of the interval that smoothing damps
 # Lanczos steps for the bound of the largest eigenvalue of diag(A)⁻¹ A.
 LANCZOS_STEPS = 12

@@ -8,9 +8,10 @@ from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.multilevel.residuals import (
+    Interpolated,
+    Stored,
     change_rows,
     images,
-    keep_outside,
     map_groups,
     norms_of_residuals,
     pick_columns,
@@ -66,6 +67,11 @@ class Goal:
     least: float
     rounds: int
     strict: bool
+
+    def scale(self, values: np.ndarray) -> float:
+        """Return the k-th of some values, or `least` if it is negligible beside that."""
+        last = float(values[self.k - 1])
+        return last if last > ZERO_SHARE * self.least else self.least
 
 
 @dataclass(frozen=True)
@@ -149,8 +155,7 @@ def _standing(
     residuals, by a factor q per round, the remaining error is q / (1 - q) times the last decrease.
     The factor is limited to 10, so that rounding in the residuals does not dominate.
     """
-    last = float(values[goal.k - 1])
-    scale = last if last > ZERO_SHARE * goal.least else goal.least
+    scale = goal.scale(values)
     worst = float(residuals[: goal.k].max()) / scale
     factor = worst / before if np.isfinite(before) and before > 0 else 1.0
     return Standing(scale, worst, lowered / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT))
@@ -230,19 +235,46 @@ def _look_again(
     these columns lowers one of the first k values by half the bound or more, they are included and
     the new values are returned. Otherwise nothing changes.
     """
-    level, m = tower.levels[0], len(values)
-    shifts = np.zeros(PROBES, dtype=np.float32)
-    block = np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32)
-    for _ in range(PROBE_STEPS):
-        block *= level.rough_scales[0] / np.abs(block).max(axis=0)
-        block = correct(tower, block, shifts, SMOOTHING_STEPS[0])
-        keep_outside(tower, space.columns, block)
+    m = len(values)
+    block = _inverse_iteration(Stored(tower, space.columns), seed)
     space = Space(space.columns, block)
     lower, weights = _combination(tower, space, values, slice(m, m + PROBES))
     if (values[:k] - lower[:k] < 0.5 * bound).all():
         return values
     _combine(tower, space, weights)
     return lower
+
+
+def misses_pairs(columns: Interpolated, values: np.ndarray, k: int, bound: float) -> bool:
+    """Search for eigenvectors that the coarser levels cannot represent, as refinement does.
+
+    Return whether random columns, after inverse iteration, lower one of the first k values by half
+    the bound or more.
+    """
+    tower, m = columns.tower, len(values)
+    block = _inverse_iteration(columns, 0)
+    image, _ = residual_block(tower, block, np.zeros(PROBES), np.ones(PROBES))
+    beside = columns.below.T @ columns.restrict(image)
+    block = block.astype(np.float64)
+    gram, projected = np.eye(m + PROBES), np.diag(np.append(values, np.zeros(PROBES)))
+    gram[m:, m:] = block.T @ (tower.levels[0].weights * block)
+    projected[:m, m:], projected[m:, :m] = beside, beside.T
+    energies = block.T @ image
+    projected[m:, m:] = (energies + energies.T) / 2
+    lower, _ = _lowest_pairs(gram, projected, m, DEPENDENT_COLUMNS[image.itemsize])
+    return bool((values[:k] - lower[:k] >= 0.5 * bound).any())
+
+
+def _inverse_iteration(columns: Stored | Interpolated, seed: int) -> np.ndarray:
+    """Return random columns after some steps of inverse iteration outside the span of others."""
+    level = columns.tower.levels[0]
+    shifts = np.zeros(PROBES, dtype=np.float32)
+    block = np.random.default_rng(seed).standard_normal((level.n, PROBES), dtype=np.float32)
+    for _ in range(PROBE_STEPS):
+        block *= level.rough_scales[0] / np.abs(block).max(axis=0)
+        block = correct(columns.tower, block, shifts, SMOOTHING_STEPS[0])
+        columns.keep_outside(block)
+    return block
 
 
 def _ritz(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> np.ndarray:
@@ -277,16 +309,26 @@ def _combination(
     gram, projected = _grams(tower, space, fresh)
     gram[:known, :known] = np.eye(known)
     projected[:known, :known] = np.diag(values[:known])
+    dependent = DEPENDENT_COLUMNS[space.columns.dtype.itemsize]
+    return _lowest_pairs(gram, projected, len(values), dependent)
+
+
+def _lowest_pairs(
+    gram: np.ndarray, projected: np.ndarray, m: int, dependent: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the m lowest Ritz values of columns S by SᵀMS and SᵀAS, and the coefficients.
+
+    Axes of SᵀMS below the share `dependent` of the largest one are left out.
+    """
     scales = 1 / np.sqrt(np.diagonal(gram))
     sizes, axes = np.linalg.eigh(gram * scales * scales[:, None])
-    kept = sizes > DEPENDENT_COLUMNS[space.columns.dtype.itemsize] * sizes[-1]
-    if np.count_nonzero(kept) < len(values):
+    kept = sizes > dependent * sizes[-1]
+    if np.count_nonzero(kept) < m:
         raise ConvergenceError(
-            f"Smoothed eigenvectors must be independent; fewer than {len(values)} are. {TOO_FAR}"
+            f"Smoothed eigenvectors must be independent; fewer than {m} are. {TOO_FAR}"
         )
     axes = (scales[:, None] * axes[:, kept]) / np.sqrt(sizes[kept])
     found, weights = np.linalg.eigh(axes.T @ projected @ axes)
-    m = len(values)
     return np.array(found[:m]), axes @ weights[:, :m]
 
 

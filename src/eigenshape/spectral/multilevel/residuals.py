@@ -1,6 +1,7 @@
 """Images and residuals of tall blocks of columns, computed in chunks of rows."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeVar
 
@@ -110,6 +111,65 @@ def residual_block(
         return squares
 
     return block, np.sqrt(np.sum(map_groups(tower, fill), axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """Orthonormal columns on the finest level, all in memory.
+
+    Orthonormal is meant for M or its diagonal.
+    """
+
+    tower: Tower
+    columns: np.ndarray
+
+    def rows(self, rows: slice) -> np.ndarray:
+        """Return some rows of the columns."""
+        return self.columns[rows]
+
+    def pick(self, some: np.ndarray) -> np.ndarray:
+        """Return some of the columns as a contiguous block."""
+        return pick_columns(self.tower, self.columns, some)
+
+    def keep_outside(self, block: np.ndarray) -> None:
+        """Project the span of the columns out of a block, in place."""
+        keep_outside(self.tower, self.columns, block)
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolated:
+    """Orthonormal columns PV of the finest level, of which only the columns V are in memory.
+
+    V are orthonormal columns of the second level, and P is the prolongation. PᵀMP is the M of the
+    second level, so PV are orthonormal as well.
+    """
+
+    tower: Tower
+    below: np.ndarray
+
+    def rows(self, rows: slice) -> np.ndarray:
+        """Return some rows of the columns."""
+        product = np.empty((rows.stop - rows.start, self.below.shape[1]), dtype=np.float32)
+        return multiply(self.tower.levels[0].rough_prolong, self.below, product, rows)
+
+    def pick(self, some: np.ndarray) -> np.ndarray:
+        """Return some of the columns as a contiguous block."""
+        return self._prolong(np.ascontiguousarray(self.below[:, some]))
+
+    def keep_outside(self, block: np.ndarray) -> None:
+        """Project the span of the columns out of a block, in place."""
+        level = self.tower.levels[0]
+        inside = self.below.T @ self.restrict(level.rough_scales[0] * block)
+        block -= self._prolong(self.below @ inside)
+
+    def restrict(self, block: np.ndarray) -> np.ndarray:
+        """Return Pᵀ times a block."""
+        matrix = self.tower.levels[0].rough_restrict
+        return multiply(matrix, block, np.empty((matrix.shape[0], block.shape[1]), np.float32))
+
+    def _prolong(self, block: np.ndarray) -> np.ndarray:
+        matrix = self.tower.levels[0].rough_prolong
+        return multiply(matrix, block, np.empty((matrix.shape[0], block.shape[1]), np.float32))
 
 
 def keep_outside(tower: Tower, columns: np.ndarray, block: np.ndarray) -> None:
