@@ -7,8 +7,8 @@ import pytest
 from matched_poses import N_POINTS, N_VERTICES, describe_poses
 
 import eigenshape as es
-from eigenshape.matching.fitting import fit_part, plan_fit
-from eigenshape.matching.growth import find_maps, fitted_maps
+from eigenshape.matching.fitting import fit_part, plan_fit, plan_rough_fit, slide_part
+from eigenshape.matching.growth import find_maps, fitted_maps, grow_maps
 from eigenshape.matching.pairs import patch_differences
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, smooth_places
 from eigenshape.matching.surface import describe_surface
@@ -108,24 +108,58 @@ def test_low_modes_make_a_map_smooth(surfaces):
     assert after.mean() < 0.7 * before.mean()
 
 
-def test_more_starts_fit_no_worse_and_are_sorted(surfaces):
+@pytest.fixture(scope="module")
+def grown(surfaces):
+    """A plan to bend what one viewpoint sees of a pose onto the other, differences, and maps."""
     pose, whole = surfaces
     scan = es.partial_scan(pose.mesh, [0.3, 0.2, 1])
     part = describe_surface(scan.mesh, 1.0, N_POINTS)
-    differences = patch_differences(part, whole)
-    plan, modes = plan_fit(part, whole), lowest_modes(whole.mesh)
+    plan, differences = plan_fit(part, whole), patch_differences(part, whole)
+    return plan, differences, grow_maps(plan, differences)
+
+
+def test_more_starts_fit_no_worse_and_are_sorted(grown):
+    plan, differences, more = grown
     maps = fitted_maps(plan, differences)
-    more = find_maps(plan, differences, modes_of_part(part.mesh, modes), modes)
     misfits = [one.fit.misfit for one in more]
     assert len(more) > len(maps)
     assert misfits == sorted(misfits)
     assert misfits[0] <= maps[0].fit.misfit
 
 
-def test_a_fit_with_few_frames_carries_the_same_vertices(surfaces):
+def test_the_best_map_is_smoothed_and_slides(grown):
+    plan, differences, maps = grown
+    modes = lowest_modes(plan.whole.mesh)
+    ours = modes_of_part(plan.part.mesh, modes)
+    found = find_maps(plan, differences, ours, modes)
+    assert len(found) == len(maps)
+    assert found[0].fit.misfit <= maps[0].fit.misfit
+    assert not np.array_equal(found[0].fit.places, maps[0].fit.places)
+
+
+def test_a_part_slides_back_from_a_shifted_map(surfaces):
     part, whole = surfaces
-    plan = plan_fit(part, whole, 40, 100)
-    fit = fit_part(plan, part.points[:40])
-    assert len(fit.places) == N_VERTICES
-    gaps = whole.mesh.vertices[fit.places] - whole.mesh.vertices
+    shifted = whole.mesh.vertices[part.points] + [0.04, 0, 0]
+    apart = np.linalg.norm(shifted[:, None] - whole.mesh.vertices, axis=2)
+    plan = plan_fit(part, whole)
+    stuck = fit_part(plan, apart.argmin(axis=1))
+    slid = slide_part(plan, stuck)
+    errors = [
+        np.linalg.norm(whole.mesh.vertices[fit.places] - whole.mesh.vertices, axis=1).mean()
+        for fit in (stuck, slid)
+    ]
+    assert errors[1] < 0.8 * errors[0]
+    assert slid.misfit == stuck.misfit
+
+
+def test_a_rough_fit_places_the_points_of_the_part(surfaces):
+    part, whole = surfaces
+    plan = plan_rough_fit(part, whole)
+    fit = fit_part(plan, part.points[: len(plan.frames)])
+    assert len(fit.places) == len(part.points)
+    # The poses share their vertices.
+    gaps = whole.mesh.vertices[fit.places] - whole.mesh.vertices[part.points]
     assert np.linalg.norm(gaps, axis=1).mean() < 0.03
+    some = fit.select(np.arange(3))
+    assert np.array_equal(some.places, fit.places[:3])
+    assert np.array_equal(some.gaps, fit.gaps[:3])

@@ -6,7 +6,14 @@ from jaxtyping import Float
 from eigenshape._threads import map_in_threads
 from eigenshape.matching.assignment import assign_far_points
 from eigenshape.matching.evidence import FittedMap
-from eigenshape.matching.fitting import FARTHEST, Fit, FitPlan, fit_part, plan_fit
+from eigenshape.matching.fitting import (
+    FARTHEST,
+    Fit,
+    FitPlan,
+    fit_part,
+    plan_rough_fit,
+    slide_part,
+)
 from eigenshape.matching.pairs import (
     FEWEST_PAIRS,
     FIRST_ROUNDS,
@@ -26,8 +33,6 @@ from eigenshape.matching.surface import Surface, turn_over
 
 # Of rough bends, the best ones are grown; of grown maps, the best few once more
 N_GROWN, N_GROWN_AGAIN = 9, 4
-# Frames and samples of a rough bend
-N_ROUGH_FRAMES, N_ROUGH_SAMPLES = 100, 200
 # Modes that make a map smooth before the part is bent again: 30 and 100 lower the misfit less.
 N_LOW_MODES = 60
 MOST_SMOOTHINGS = 2  # it ends earlier if a bend is no better
@@ -79,17 +84,25 @@ def _best_first(maps: list[FittedMap]) -> list[FittedMap]:
 def find_maps(
     plan: FitPlan, differences: Float[np.ndarray, "m k"], ours: Modes, theirs: Modes
 ) -> list[FittedMap]:
+    """Return maps of a part, the best fit first, which low modes made smooth and which slid."""
+    maps = grow_maps(plan, differences)
+    if not maps:
+        return []
+    first, *others = _smooth_best(plan, maps, ours, theirs)
+    return [FittedMap(first.pairs, slide_part(plan, first.fit)), *others]
+
+
+def grow_maps(plan: FitPlan, differences: Float[np.ndarray, "m k"]) -> list[FittedMap]:
     """Return maps of a part from many starts, the best fit first.
 
     A fit from the true places leaves about half of the misfit of the best of nine sets of
     pairs, so that starts are what is missing. Far points are therefore assigned in many more ways,
     the part is bent roughly by each, and maps are grown from where the best of these bends place
-    it, then once more from the best maps. The best map is made smooth by low modes at last, from
-    which the part is bent again.
+    it, then once more from the best maps.
     """
     part, whole = plan.part, plan.whole
     costs = descriptor_costs(differences)
-    rough = plan_fit(part, whole, N_ROUGH_FRAMES, N_ROUGH_SAMPLES)
+    rough = plan_rough_fit(part, whole)
 
     def fit_roughly(pairs: Pairs) -> Fit:
         return fit_part(rough, place_points(part, whole, pairs, rough.frames)[0])
@@ -98,21 +111,19 @@ def find_maps(
     fits = sorted(fits, key=lambda fit: fit.misfit)[:N_GROWN]
     starts = grow_starts(part, whole, costs) + _grow_again(plan, costs, fits)
     maps = _best_first(_fit_pairs(plan, starts))
-    again = _grow_again(plan, costs, [one.fit for one in maps[:N_GROWN_AGAIN]])
-    maps = _best_first([*maps, *_fit_pairs(plan, again)])
-    return _smooth_best(plan, maps, ours, theirs) if maps else []
+    best = [one.fit.select(part.points) for one in maps[:N_GROWN_AGAIN]]
+    return _best_first([*maps, *_fit_pairs(plan, _grow_again(plan, costs, best))])
 
 
 def _grow_again(plan: FitPlan, costs: Float[np.ndarray, "m k"], fits: list[Fit]) -> list[Pairs]:
-    """Return sets of pairs that grow from where fits place the points of a part."""
-    points = plan.part.points
+    """Return sets of pairs that grow from where fits, at the points of a part, place these."""
 
     def grow(fit: Fit) -> Pairs:
         # Points with a small gap are better supported.
-        support = np.maximum(1 - fit.gaps[points] / FARTHEST, 1e-3)
-        partners = plan.whole.nearest[fit.places[points]]
+        support = np.maximum(1 - fit.gaps / FARTHEST, 1e-3)
+        partners = plan.whole.nearest[fit.places]
         return grow_pairs(
-            plan.part, plan.whole, costs, Pairs(np.arange(len(points)), partners, support)
+            plan.part, plan.whole, costs, Pairs(np.arange(len(partners)), partners, support)
         )
 
     return [found for found in map_in_threads(grow, fits) if len(found.points) >= FEWEST_PAIRS]

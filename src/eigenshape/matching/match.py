@@ -75,7 +75,8 @@ def match_shapes(
        the nearest points that face the same way (non-rigid registration). The map after which the
        smallest gaps are left with the least strain is taken.
     5. The four best maps are grown and bent again, and the best one also from where it lies after 60
-       eigenfunctions of both shapes made it smooth.
+       eigenfunctions of both shapes made it smooth. From there the part slides: it is bent once
+       more, nearly free to move along the surface.
     6. Eigenfunctions of both shapes make the best map smooth.
 
     Parameters
