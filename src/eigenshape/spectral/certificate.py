@@ -15,9 +15,11 @@ class Certificate:
     of eigenvalues below σ. If as many B-orthonormal eigenvectors were found, and their error
     intervals end below σ, none is missing and none is extra. If the k-th eigenvalue is multiple (to
     `resolution`) and more copies follow, σ is below all copies, and the pairs found at the level of
-    the k-th eigenvalue are the rest of the k. An operator with many entries a row is bounded from
-    below by a sparser one instead, and counted where eigenvectors do not tell what it is. For an interval far up in the spectrum a second
+    the k-th eigenvalue are the rest of the k. For an interval far up in the spectrum a second
     factor counts below its lower end, and the difference of the counts must have been found.
+
+    An operator with many entries a row is bounded from below by a sparser one, whose eigenvalues
+    are counted outside the space of the eigenvectors that were found.
 
     Attributes
     ----------

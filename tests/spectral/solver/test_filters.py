@@ -70,5 +70,7 @@ def test_a_space_of_filtered_vectors_holds_the_lowest_eigenvectors():
 
 
 def test_a_filter_that_damps_little_is_refused():
-    with pytest.raises(ConvergenceError, match=r"must damp most of the spectrum; it is to begin at 0\.\d+ of it"):
+    with pytest.raises(
+        ConvergenceError, match=r"must damp most of the spectrum; it is to begin at 0\.\d+ of it"
+    ):
         chebyshev_filter(PENCIL, ORDER, 0.8 * float(VALUES[-1]))

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.certificate import Certificate
@@ -47,9 +46,7 @@ def sparser_below(pencil: Pencil) -> Pencil:
     return replace(pencil, stiffness=kept)
 
 
-def prove_outside(
-    pencil: Pencil, pairs: Pairs, k: int, below: Factor
-) -> tuple[Pairs, Certificate]:
+def prove_outside(pencil: Pencil, pairs: Pairs, k: int, below: Factor) -> tuple[Pairs, Certificate]:
     """Return the first k pairs, with the rest of the cluster of the k-th, and a certificate, complete or not.
 
     Parameters

@@ -159,7 +159,8 @@ def _largest_eigenvalue(matrix: sp.csr_array) -> float:
         image = matrix @ vector - length * before
         diagonal[step] = image @ vector
         image -= diagonal[step] * vector
-        length = beside[step] = np.linalg.norm(image)
+        length = float(np.linalg.norm(image))
+        beside[step] = length
         before, vector = vector, image / length
     values, vectors = sl.eigh_tridiagonal(diagonal, beside[:-1])
     return float(values[-1] + length * abs(vectors[-1, -1])) * RAISED

@@ -45,7 +45,9 @@ INDEPENDENT_PIVOT = 0.1
 class Operator(Protocol):
     """What a Krylov space is made of: an operator, symmetric in some inner product, whose largest θ are wanted."""
 
-    pencil: Pencil
+    @property
+    def pencil(self) -> Pencil:
+        """The pencil whose eigenvectors are wanted."""
 
     @property
     def size(self) -> float:
