@@ -96,11 +96,11 @@ class ChebyshevFilter:
         """Return λ for θ = T_m(z(λ)) > 1, and |dλ/dθ|; both infinite for other θ, which several λ share."""
         low, high = self.damped
         values, slopes = np.full_like(thetas, np.inf), np.full_like(thetas, np.inf)
-        told = thetas > 1
-        angles = np.arccosh(thetas[told]) / self.degree
+        beyond = thetas > 1
+        angles = np.arccosh(thetas[beyond]) / self.degree
         half = (high - low) / 2
-        values[told] = low - half * (np.cosh(angles) - 1)
-        slopes[told] = half * np.sinh(angles) / (self.degree * np.sinh(self.degree * angles))
+        values[beyond] = low - half * (np.cosh(angles) - 1)
+        slopes[beyond] = half * np.sinh(angles) / (self.degree * np.sinh(self.degree * angles))
         return values, slopes
 
     def _multiply(
