@@ -44,6 +44,10 @@ AS_HANDED = 0.9
 CLEAR_VOTE = 0.3
 # Sizes of the part that are tried, as shares of the longest side of the whole's box
 SIZES = 1.25 ** np.arange(1, -6, -1.0)
+# Quantile of the ratios of distances on the whole to those on the part that stands for its size.
+# Ways around what was cut off are longer on the part, so that the median is 4 to 15 % too small; on
+# eight cuts and scans of the tuning half this quantile was 10 % too small to 6 % too large.
+UNCUT = 0.7
 
 
 @one_blas_thread()
@@ -187,17 +191,17 @@ def _find_scale(mesh: TriangleMesh, target: MatchTarget) -> float:
             score = quality.score * np.sqrt(surface.area)
         if score > highest:
             # Between the sizes that are tried, distances between pairs say how large the part is.
-            stretch = _median_stretch(surface, target.surface, maps[0].pairs) if maps else 1.0
+            stretch = _stretch(surface, target.surface, maps[0].pairs) if maps else 1.0
             best, highest = factor * stretch, score
     return best
 
 
-def _median_stretch(part: Surface, whole: Surface, pairs: Pairs) -> float:
-    """Return the median ratio of distances on the whole to those on the part."""
+def _stretch(part: Surface, whole: Surface, pairs: Pairs) -> float:
+    """Return how much larger than the part it is on the whole, from distances between pairs."""
     ours = part.between[np.ix_(pairs.points, pairs.points)].astype(np.float64)
     theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
     known = (ours > 0) & (theirs > 0)
-    return float(np.median(theirs[known] / ours[known])) if known.any() else 1.0
+    return float(np.quantile(theirs[known] / ours[known], UNCUT)) if known.any() else 1.0
 
 
 def _pieces(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " k"]]:

@@ -44,3 +44,13 @@ def test_neighbors_that_are_mixed_are_separated():
     apart = polish(PENCIL, FACTOR, mixed)
     np.testing.assert_allclose(apart.values, pairs.values, atol=1e-12 * pairs.values[-1])
     assert apart.residuals.max() < 1e-10 * pairs.values[-1]
+
+
+def test_numbers_near_the_quotients_leave_values_and_residuals_as_they_are():
+    pairs = found_pairs()
+    blurred = pairs.vectors + 1e-6 * np.random.default_rng(0).standard_normal(pairs.vectors.shape)
+    values, residuals = rayleigh_residuals(PENCIL, blurred)
+    near = values + 1e-7 * values[-1] * np.linspace(-1, 1, len(values))
+    again, bounds = rayleigh_residuals(PENCIL, blurred, near)
+    np.testing.assert_array_equal(again, values)
+    np.testing.assert_allclose(bounds, residuals, rtol=1e-6)

@@ -70,13 +70,18 @@ def polish(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
     return Pairs(values[order], vectors[:, order], residuals[order])
 
 
-def lowest_pairs(pencil: Pencil, vectors: Float[np.ndarray, "n j"], k: int) -> Pairs:
+def lowest_pairs(
+    pencil: Pencil,
+    vectors: Float[np.ndarray, "n j"],
+    k: int,
+    near: Float[np.ndarray, " j"] | None = None,
+) -> Pairs:
     """Return the k lowest eigenpairs of nearly B-orthonormal vectors, by their Rayleigh quotients.
 
-    The vectors are used up.
+    The vectors are used up. What they nearly are may be given where B is diagonal.
     """
     vectors = _orthonormalize(pencil, vectors)
-    values, residuals = rayleigh_residuals(pencil, vectors)
+    values, residuals = rayleigh_residuals(pencil, vectors, near)
     order = np.argsort(values, kind="stable")[:k]
     if not np.array_equal(order, np.arange(vectors.shape[1])):
         vectors = vectors[:, order]

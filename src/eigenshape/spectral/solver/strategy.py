@@ -300,10 +300,11 @@ def _solve_filtered(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Ce
     report(0.85, "counting eigenvalues")
     values = np.sort(space.ritz.values)
     below = factorize_near(sparser, float(values[k - 1] + COUNTED_PAST * values[n_sought - 1]))
-    vectors = space.vectors(space.lowest(max(below.count, n_sought) + MORE_VECTORS))
+    lowest = space.lowest(max(below.count, n_sought) + MORE_VECTORS)
+    vectors, near = space.vectors(lowest), space.ritz.values[lowest]
     del space  # and its memory
     for run in range(1, FILTER_RUNS):
-        pairs = lowest_pairs(pencil, vectors, vectors.shape[1])
+        pairs = lowest_pairs(pencil, vectors, vectors.shape[1], near)
         found, certificate = prove_outside(pencil, pairs, k, below)
         missing = certificate.n_missing
         if not missing:
@@ -319,6 +320,7 @@ def _solve_filtered(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Ce
             report=_in_run(report, run),
         )
         vectors = np.hstack([pairs.vectors, more.vectors(more.chosen)])
+        near = np.append(pairs.values, more.ritz.values[more.chosen])
     raise ConvergenceError(
         f"Every eigenvalue that is counted must be found; up to {missing} of {k} are missing."
     )
