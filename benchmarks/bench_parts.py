@@ -80,9 +80,10 @@ def _combine(krylov: Any, _ritz: object, chosen: np.ndarray) -> Work:
     return REAL * float(n) * (m + j), 2.0 * n * m * j
 
 
-def _residuals(of: Any, vectors: np.ndarray) -> Work:
+def _residuals(of: Any, vectors: np.ndarray, near: object = None) -> Work:
     chunks = len(pencil.column_chunks(vectors.shape[1]))
-    return 2.0 * (vectors.nbytes + chunks * 12 * of.stiffness.nnz), 0.0  # quotients first
+    passes = 2.0 if near is None else 1.0  # quotients first
+    return passes * (vectors.nbytes + chunks * 12 * of.stiffness.nnz), 0.0
 
 
 def _proof(_pencil: object, of: Any, *_: object) -> Work:
