@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from eigenshape.sparse.largest import largest_ritz_value
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, smooth_columns
 
 LARGEST = 256  # most points in an aggregate, on average
@@ -20,8 +20,6 @@ MESH_ROW = 7.0  # entries per row of a triangle mesh, where a smoothing step rea
 # where `size` is the number of points in an aggregate.
 PASSED = 2.8
 LEAST_RATIO = 2.5  # smallest ratio of the ends of the interval that smoothing damps
-# Lanczos steps for the bound of the largest eigenvalue of diag(A)⁻¹ A.
-LANCZOS_STEPS = 12
 ENERGY_ROUNDING = 1e-12  # share of the summed energies below which an energy counts as rounding
 # Smoothing damps the eigenvalues above top / (SMOOTHED × points of an aggregate).
 SMOOTHED = 0.6
@@ -204,21 +202,8 @@ def _top(matrix: sp.csr_array) -> float:
     only the speed of corrections depends on it.
     """
     inverse = 1 / _positive(matrix.diagonal())
-    gershgorin = float((inverse * abs(matrix).sum(axis=1)).max())
-    return min(gershgorin, _lanczos_top(matrix, np.sqrt(inverse))) or 1.0
-
-
-def _lanczos_top(matrix: sp.csr_array, roots: Float[np.ndarray, " n"]) -> float:
-    column = np.random.default_rng(0).standard_normal(len(roots))
-    column /= np.linalg.norm(column)
-    before, rest, diagonal, beside = np.zeros_like(column), 0.0, [], []
-    for _ in range(LANCZOS_STEPS):
-        image = roots * (matrix @ (roots * column)) - rest * before
-        diagonal.append(float(column @ image))
-        image -= diagonal[-1] * column
-        rest = float(np.linalg.norm(image))
-        beside.append(rest)
-        if rest < 1e-10:
-            break
-        before, column = column, image / rest
-    return float(sl.eigvalsh_tridiagonal(diagonal, beside[:-1])[-1]) + rest
+    gershgorin, roots = float((inverse * abs(matrix).sum(axis=1)).max()), np.sqrt(inverse)
+    value, rest, _ = largest_ritz_value(
+        lambda column: roots * (matrix @ (roots * column)), len(roots)
+    )
+    return min(gershgorin, value + rest) or 1.0

@@ -124,6 +124,11 @@ def prove(pencil: Pencil, pairs: Pairs, factor: Factor | None = None) -> Certifi
     return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate, above)
 
 
+def distinct_from(pencil: Pencil, pairs: Pairs) -> float:
+    """Return the distance from which two eigenvalues count as different."""
+    return max(RESOLUTION * _scale(pencil, pairs), 4 * error_bound(pairs))
+
+
 def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
     """Return the certificate of pairs without a count, in the pencil's units; complete if these are all n.
 
@@ -132,7 +137,7 @@ def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
     ConvergenceError
         If the pairs are not B-orthonormal eigenvectors.
     """
-    resolution = max(RESOLUTION * _scale(pencil, pairs), 4 * error_bound(pairs))
+    resolution = distinct_from(pencil, pairs)
     return Certificate(
         n_pairs=len(pairs.values),
         shift=np.inf,
@@ -162,9 +167,7 @@ def take_pairs(
     resolution = RESOLUTION * _scale(pencil, pairs)
     rest = pairs.values[stop:] - pairs.values[stop - 1]
     equal = int(np.count_nonzero(rest <= resolution))
-    fewer = Pairs(
-        pairs.values[start:stop], pairs.vectors[:, start:stop], pairs.residuals[start:stop]
-    )
+    fewer = pairs.select(slice(start, stop))
     return fewer, replace(
         certificate,
         first=certificate.first + start,

@@ -12,9 +12,9 @@ import scipy.sparse as sp
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.solver.certify import quality, with_count
+from eigenshape.spectral.solver.certify import distinct_from, quality, with_count
 from eigenshape.spectral.solver.factor import Factor, rounding
-from eigenshape.spectral.solver.pairs import Pairs, first_pairs
+from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Entries below this share of the largest ones beside the diagonal, in their row and their column,
@@ -66,11 +66,10 @@ def prove_outside(pencil: Pencil, pairs: Pairs, k: int, below: Factor) -> tuple[
         If the pairs are not B-orthonormal eigenvectors, or not precise enough for a proof, or the
         cluster has no end among them.
     """
-    certificate = quality(pencil, first_pairs(pairs, k))
-    ends = np.flatnonzero(np.diff(pairs.values[k - 1 :]) > 2 * certificate.resolution)
-    found = first_pairs(pairs, k + int(ends[0])) if ends.size else pairs
-    if len(found.values) > k:
-        certificate = quality(pencil, found)
+    width = 2 * distinct_from(pencil, pairs.select(slice(k)))
+    ends = np.flatnonzero(np.diff(pairs.values[k - 1 :]) > width)
+    found = pairs.select(slice(k + int(ends[0]))) if ends.size else pairs
+    certificate = quality(pencil, found)
     shift = float(found.values[-1]) + certificate.resolution
     missing = _most_missing(pencil, pairs, len(found.values), shift, below) if ends.size else None
     if missing is None:

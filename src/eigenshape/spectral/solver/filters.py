@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from eigenshape._errors import ConvergenceError
 from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.sparse.basis import Block
+from eigenshape.sparse.largest import largest_ritz_value
 from eigenshape.sparse.product_loops import multiply_rows
 from eigenshape.spectral.solver.pencil import Pencil
 
@@ -19,8 +19,8 @@ from eigenshape.spectral.solver.pencil import Pencil
 REACH = 2.2
 # Degrees of a filter.
 LOWEST_DEGREE, HIGHEST_DEGREE = 2, 60
-# Steps of the iteration for the largest eigenvalue, and what its bound is raised by.
-BOUND_STEPS, RAISED = 12, 1.01
+# What the estimate of the largest eigenvalue is raised by.
+RAISED = 1.01
 # Rows that a thread multiplies at least.
 ROWS = 1024
 
@@ -130,7 +130,9 @@ def chebyshev_filter(pencil: Pencil, order: Int[np.ndarray, " n"], low: float) -
     scaled.sort_indices()
     inverse = 1 / roots[order]
     scaled.data *= np.repeat(inverse, np.diff(scaled.indptr)) * inverse[scaled.indices]
-    high = _largest_eigenvalue(scaled)
+    # A little less than the largest eigenvalue does no harm.
+    value, rest, share = largest_ritz_value(lambda column: scaled @ column, pencil.n)
+    high = RAISED * (value + share * rest)
     if not 0 < low < high / 2:
         raise ConvergenceError(
             f"A filter must damp most of the spectrum; it is to begin at {low / high:.2g} of it."
@@ -147,20 +149,3 @@ def chebyshev_filter(pencil: Pencil, order: Int[np.ndarray, " n"], low: float) -
         degree=min(max(degree, LOWEST_DEGREE), HIGHEST_DEGREE),
         damped=(low, high),
     )
-
-
-def _largest_eigenvalue(matrix: sp.csr_array) -> float:
-    """Return about the largest eigenvalue by Lanczos, raised by its residual; a little less does no harm."""
-    vector = np.random.default_rng(0).standard_normal(matrix.shape[0])
-    vector /= np.linalg.norm(vector)
-    before, length = np.zeros_like(vector), 0.0
-    diagonal, beside = np.empty(BOUND_STEPS), np.empty(BOUND_STEPS)
-    for step in range(BOUND_STEPS):
-        image = matrix @ vector - length * before
-        diagonal[step] = image @ vector
-        image -= diagonal[step] * vector
-        length = float(np.linalg.norm(image))
-        beside[step] = length
-        before, vector = vector, image / length
-    values, vectors = sl.eigh_tridiagonal(diagonal, beside[:-1])
-    return float(values[-1] + length * abs(vectors[-1, -1])) * RAISED

@@ -131,7 +131,7 @@ def _restrict_to_interval(
     lower = count_beside(pencil, pairs, *before, most=False)
     upper = count_beside(pencil, pairs, *after)
     found = (pairs.values > lower.shift) & (pairs.values < upper.shift)
-    inner = Pairs(pairs.values[found], pairs.vectors[:, found], pairs.residuals[found])
+    inner = pairs.select(found)
     return inner, replace(
         quality(pencil, pairs),
         n_found=len(inner.values),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
-from jaxtyping import Float, Float32
+from jaxtyping import Bool, Float, Float32, Int
 
 from eigenshape._errors import ConvergenceError
 from eigenshape._threads import map_in_threads, share_units
@@ -38,10 +38,9 @@ class Pairs:
     vectors: Float[np.ndarray, "n k"]
     residuals: Float[np.ndarray, " k"]
 
-
-def first_pairs(pairs: Pairs, k: int) -> Pairs:
-    """Return the k lowest pairs."""
-    return Pairs(pairs.values[:k], pairs.vectors[:, :k], pairs.residuals[:k])
+    def select(self, chosen: slice | Bool[np.ndarray, " k"] | Int[np.ndarray, " j"]) -> "Pairs":
+        """Return some of the pairs."""
+        return Pairs(self.values[chosen], self.vectors[:, chosen], self.residuals[chosen])
 
 
 def error_bound(pairs: Pairs) -> float:
@@ -59,15 +58,14 @@ def polish(pencil: Pencil, factor: Factor, pairs: Pairs) -> Pairs:
     if not late.size:
         return pairs
     values, vectors, residuals = pairs.values.copy(), pairs.vectors.copy(), pairs.residuals.copy()
-    part = vectors[:, late]
-    values[late], rotation = sl.eigh(part.T @ (pencil.stiffness @ part))
-    part = part @ rotation
-    vectors[:, late] = part
-    step = factor.solve(pencil.stiffness @ part - pencil.weigh(part) * values[late])
+    images = pencil.stiffness @ vectors[:, late]
+    values[late], rotation = sl.eigh(vectors[:, late].T @ images)
+    vectors[:, late] = part = vectors[:, late] @ rotation
+    step = factor.solve(images @ rotation - pencil.weigh(part) * values[late])
     vectors[:, late] -= step - vectors @ (vectors.T @ pencil.weigh(step))
     values[late], residuals[late] = rayleigh_residuals(pencil, vectors[:, late])
     order = np.argsort(values, kind="stable")
-    return Pairs(values[order], vectors[:, order], residuals[order])
+    return Pairs(values, vectors, residuals).select(order)
 
 
 def lowest_pairs(

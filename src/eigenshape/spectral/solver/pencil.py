@@ -281,11 +281,10 @@ def rayleigh_residuals(
 
     Numbers near the quotients, where B is diagonal, save half of the products.
     """
-    if near is None:
-        near, _, _ = _sums(pencil, vectors, None)
     values, lengths, squares = _sums(pencil, vectors, near)
-    # ‖Wφ - λBφ‖² = ‖Wφ - νBφ‖² - (λ - ν)² ‖Bφ‖² for ν near the quotient λ, in the norm of B⁻¹.
-    squares = np.maximum(squares - (values - near) ** 2 * lengths, EPS * squares)
+    if near is not None:
+        # ‖Wφ - λBφ‖² = ‖Wφ - νBφ‖² - (λ - ν)² ‖Bφ‖² for ν near the quotient λ, in the norm of B⁻¹.
+        squares = np.maximum(squares - (values - near) ** 2 * lengths, EPS * squares)
     return values, np.sqrt(squares / pencil.mass_floor / lengths)
 
 
@@ -303,25 +302,29 @@ def residual_norms(
 def _sums(
     pencil: Pencil, vectors: Float[np.ndarray, "n k"], values: Float[np.ndarray, " k"] | None
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-    """Return φᵀWφ / φᵀBφ, φᵀBφ, and Σ (Wφ - λBφ)² / D for given λ, of each column."""
-    k = vectors.shape[1]
-    sums = np.zeros((3, k))
+    """Return φᵀWφ / φᵀBφ, φᵀBφ, and Σ (Wφ - λBφ)² / D of each column, λ as given or that quotient."""
+    sums = np.empty((3, vectors.shape[1]))
     # One type of indices, whatever SciPy chose, so that the loop is compiled once.
     matrices = tuple(
         (part.indptr.astype(np.int64), part.indices.astype(np.int64), part.data)
         for part in (pencil.stiffness, pencil.mass)
     )
-    given = np.zeros(k) if values is None else values
 
-    def add(columns: slice) -> None:
+    def measure(columns: slice) -> None:
         part = np.ascontiguousarray(vectors[:, columns])
-        own = np.zeros((3, part.shape[1]))
-        scratch = np.empty((2, part.shape[1])), np.zeros((3, part.shape[1]))
-        weights = pencil.mass_diagonal
-        add_sums(*matrices, part, given[columns], weights, values is not None, *scratch, own)
+        k = part.shape[1]
+        scratch = np.empty((2, k)), np.zeros((3, k))
+        weights, own = pencil.mass_diagonal, np.zeros((3, k))
+        if values is None:
+            unused = np.zeros(k)
+            add_sums(*matrices, part, unused, weights, False, *scratch, own)
+            given, own = own[0] / own[1], np.zeros((3, k))
+        else:
+            given = values[columns]
+        add_sums(*matrices, part, given, weights, True, *scratch, own)
         sums[:, columns] = own
 
-    map_in_threads(add, column_chunks(k))
+    map_in_threads(measure, column_chunks(vectors.shape[1]))
     return sums[0] / sums[1], sums[1], sums[2]
 
 

@@ -223,9 +223,13 @@ def _solve_sparse(
         if certificate is not None:
             # The count has spent the factor, which saves much memory where nothing is missing.
             factor = factorize_near(pencil, factor.shift)
-        groups, more = min(1 + -(-missing // LANES), MOST_GROUPS), _in_run(report, run)
         _, found = block_lanczos(
-            pencil, factor, wanted, locked=pairs.vectors, groups=groups, report=more
+            pencil,
+            factor,
+            wanted,
+            locked=pairs.vectors,
+            groups=_groups_for(missing),
+            report=_in_run(report, run),
         )
         if not found.shape[1]:
             break
@@ -275,6 +279,11 @@ def _at_once(
     ], factor
 
 
+def _groups_for(missing: int) -> int:
+    """Return the width of a block, in groups of eight columns, that finds so many copies at once."""
+    return min(1 + -(-missing // LANES), MOST_GROUPS)
+
+
 def _in_run(report: Progress, run: int) -> Callable[[float], None]:
     return lambda done: report(0.05 + 0.8 * done, f"run {run + 1} of block Lanczos")
 
@@ -311,12 +320,11 @@ def _solve_filtered(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Ce
             return take_pairs(pencil, found, certificate, 0, k)
         if missing > MOST_GROUPS * LANES:
             break
-        groups = min(1 + -(-missing // LANES), MOST_GROUPS)
         more = grow_space(
             inner,
             Wanted(below=0, above=missing),
             locked=pairs.vectors,
-            groups=groups,
+            groups=_groups_for(missing),
             report=_in_run(report, run),
         )
         vectors = np.hstack([pairs.vectors, more.vectors(more.chosen)])
