@@ -3,9 +3,7 @@
     python benchmarks/bench_approximate.py                        all cases (a quarter of an hour)
     python benchmarks/bench_approximate.py --cases sphere-160k --accuracies 0.1 1e-6
     python benchmarks/bench_approximate.py --quick                a small one
-    python benchmarks/bench_approximate.py --json approximate.json --markdown docs/spectra.md
-    python benchmarks/bench_approximate.py --peers --repeats 3 --markdown docs/benchmarks.md
-                                                                  beside pyamg (two hours)
+    python benchmarks/bench_approximate.py --peers --repeats 3    beside pyamg (two hours)
 
 Each solve runs in a process of its own, on one core, after a small one that loads and compiles; the operator is built
 before the clock starts. MiB: the most that the process held during the solve, beyond what it held before. promised:
@@ -265,13 +263,10 @@ def main() -> None:
     parser.add_argument("--accuracies", nargs="+", type=float, default=[1e-3])
     parser.set_defaults(repeats=1)
     options = parser.parse_args()
-    report = Report(
-        __file__, ["eigenshape", "numpy", "scipy", "numba", "pyamg"], options, COLUMNS, cells
-    )
+    report = Report(["eigenshape", "numpy", "scipy", "numba", "pyamg"], options, COLUMNS, cells)
     quick, usual = (QUICK_PEERS, PEERS) if options.peers else (QUICK, CASES)
     for name in options.cases or (quick if options.quick else usual):
         measure(name, report)
-    report.write()
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
     python benchmarks/bench_calculus.py                     50,000 vertices, a few minutes
     python benchmarks/bench_calculus.py --quick             600 vertices, seconds
-    python benchmarks/bench_calculus.py --json calculus.json --markdown docs/benchmarks.md
 
 Each call begins with vertices and faces and has a process of its own on one core, after a small call that loads and
 compiles. Libraries take turns. "Poisson" fixes one vertex at 0. "Heat" is one implicit step of the squared mean edge
@@ -173,13 +172,12 @@ def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
     packages = ["eigenshape", "lapy", "libigl", "potpourri3d", "numpy", "scipy", "numba"]
-    report = Report(__file__, packages, options, COLUMNS, cells)
+    report = Report(packages, options, COLUMNS, cells)
     for task in TASKS:
         for count in COUNTS:
             n = QUICK if options.quick else FULL
             for row in rows_of(task, n, count, options.repeats):
                 report.add(row)
-    report.write()
 
 
 if __name__ == "__main__":

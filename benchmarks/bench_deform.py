@@ -2,7 +2,6 @@
 
     python benchmarks/bench_deform.py                       7,000 to 100,000 vertices; three minutes
     python benchmarks/bench_deform.py --quick               2,500 vertices, seconds
-    python benchmarks/bench_deform.py --json deform.json --markdown docs/benchmarks.md
 
 The tail half of a giraffe turns by 60° (8 modes), or one leg (50). `bind`, and details of a skeleton, are done once a
 region, steps 1 and 2 at each move of the hand, step 3 when it lets go. ARAP starts at rest, the same vertices held: ten
@@ -148,9 +147,8 @@ def cells(row: Row) -> list[str]:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
-    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
+    report = Report(PACKAGES, options, COLUMNS, cells)
     measure(QUICK if options.quick else FULL, report)
-    report.write()
 
 
 if __name__ == "__main__":

@@ -225,12 +225,11 @@ def main() -> None:
         help="levels of icospheres, points",
     )
     options = parser.parse_args()
-    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
+    report = Report(PACKAGES, options, COLUMNS, cells)
     for size in [3] if options.quick else options.sizes:
         rows = [in_process(measured, name, size, options.repeats) for name in METHODS]
         for row in rows:
             report.add(with_ratios(row, rows[0]))
-    report.write()
 
 
 if __name__ == "__main__":

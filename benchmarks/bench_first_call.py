@@ -3,7 +3,6 @@
     python benchmarks/bench_first_call.py                    all calls, about ten minutes
     python benchmarks/bench_first_call.py --quick            one call and its peer on a small mesh, half a minute
     python benchmarks/bench_first_call.py --calls solve,find_parts
-    python benchmarks/bench_first_call.py --json first.json --markdown docs/benchmarks.md
 
 Each run takes two processes, one after the other, which share a numba cache that is empty at first: the first process
 compiles what it calls, the second loads it. Libraries take turns, and figures are medians. NumPy is imported before the
@@ -148,14 +147,13 @@ def main() -> None:
         if unknown:
             sys.exit(f"Calls must be of {', '.join(CALLS)}; {unknown[0]!r} is not.")
     packages = ["eigenshape", "lapy", "robust_laplacian", "numpy", "scipy", "numba"]
-    report = Report(__file__, packages, options, COLUMNS, cells)
+    report = Report(packages, options, COLUMNS, cells)
     with tempfile.TemporaryDirectory() as folder:
         mesh = Path(folder) / "mesh.npz"
         save_mesh(mesh, n_vertices)
         for name in chosen:
             for row in rows_of(name, mesh, options.repeats):
                 report.add(row)
-    report.write()
 
 
 if __name__ == "__main__":

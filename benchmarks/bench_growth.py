@@ -99,11 +99,10 @@ def main() -> None:
     parser = options_of(__doc__)
     parser.add_argument("--only", nargs="+", choices=SERIES, default=list(SERIES))
     options = parser.parse_args()
-    report = Report(__file__, ["eigenshape", "numpy", "numba", "scipy"], options, COLUMNS, cells)
+    report = Report(["eigenshape", "numpy", "numba", "scipy"], options, COLUMNS, cells)
     for name in options.only:
         for row in measured(name, options.repeats, quick=options.quick):
             report.add(row)
-    report.write()
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
     python benchmarks/bench_index.py                        10,000 and 100,000 shapes
     python benchmarks/bench_index.py --sizes 1000000        6 GB of disk, half an hour
     python benchmarks/bench_index.py --quick                1,000 shapes
-    python benchmarks/bench_index.py --markdown docs/benchmarks.md
 
 Shapes are described by patches without views, with random codes and the points of one creature, so that a shape takes
 6 KB of rows; all else is as in any index. A reader is opened in a process of its own. "Memory" is what that process
@@ -127,13 +126,12 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="*", help="numbers of shapes")
     parser.add_argument("--folder", type=Path, help="where indexes are written")
     options = parser.parse_args()
-    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
+    report = Report(PACKAGES, options, COLUMNS, cells)
     for n_shapes in options.sizes or (QUICK if options.quick else FULL):
         with tempfile.TemporaryDirectory(dir=options.folder) as folder:
             make_index(Path(folder), n_shapes)
             for row in in_process(measure, folder)["rows"]:
                 report.add({"shapes": n_shapes} | row)
-    report.write()
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Time and peak memory to assemble a Gaussian kernel, beside scipy's and scikit-learn's trees, in one run.
 
     python benchmarks/bench_kernel.py              both sizes (about five minutes)
-    python benchmarks/bench_kernel.py --repeats 1
+    python benchmarks/bench_kernel.py --quick      a small one, seconds
 
 Points lie on the unit sphere. The first size is that of the mesh Laplacian at t = e²; the second a million points with
 100 neighbors each. Every method ends with the same matrix, W as sparse rows; each runs in a process of its own, after
@@ -9,23 +9,25 @@ one small run that loads and compiles what it needs. Wall seconds, median; a rat
 work is memory: a matrix of z entries has 12 z bytes, to be written once, and z exponentials.
 """
 
-import argparse
 import multiprocessing
 import resource
 import statistics
-import sys
 import time
 import warnings
 from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
+from report import Report, Row, options_of, ratio_text
 from scipy.spatial import cKDTree
 from sklearn.neighbors import radius_neighbors_graph
 
 from eigenshape.operators import gaussian_laplacian
 
-SIZES = {"mesh Laplacian, t = e²": (160_000, 247), "graph, 100 neighbors": (1_000_000, 100)}
+# Points and entries a row: of the mesh Laplacian at t = e², and of a graph with 100 neighbors
+FULL, QUICK = ((160_000, 247), (1_000_000, 100)), ((2_000, 247),)
+PACKAGES = ["eigenshape", "numpy", "scipy", "scikit-learn", "numba"]
+COLUMNS = ("kernel", "method", "wall s", "ratio", "most GiB")
 CUTOFF = 4.0
 
 
@@ -69,45 +71,49 @@ def _stiffness(kernel: sp.csr_array, t: float) -> sp.csr_array:
 METHODS = {"eigenshape": ours, "cKDTree": kd_tree, "scikit-learn": scikit_learn}
 
 
-def measured(method: str, n: int, neighbors: int, repeats: int) -> tuple[float, float, float, int]:
-    """Return seconds, peak GiB, a checksum and the number of entries; run in a process of its own."""
+def measured(method: str, n: int, neighbors: int) -> Row:
+    """Return seconds, peak GiB, the trace and the number of entries; run in a process of its own."""
     warnings.simplefilter("ignore")
     build: Callable[[np.ndarray, float], sp.csr_array] = METHODS[method]
     build(sphere_points(2000), 0.002)
     points, t = sphere_points(n), neighbors / (CUTOFF**2 * n)  # π (4h)² of 4π holds so many
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        matrix = build(points, t)
-        times.append(time.perf_counter() - start)
-        checksum, entries = float(matrix.diagonal().sum()), matrix.nnz
-        del matrix
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    return statistics.median(times), peak, checksum, entries
+    start = time.perf_counter()
+    matrix = build(points, t)
+    return {
+        "wall": time.perf_counter() - start,
+        "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20,
+        "trace": float(matrix.diagonal().sum()),
+        "entries": matrix.nnz,
+    }
+
+
+def cells(row: Row) -> list[str]:
+    """Return the texts of one row."""
+    return [
+        f"{row['n']:,} points, {row['entries'] / row['n']:.0f} entries a row",
+        row["method"],
+        f"{row['wall']:.2f}",
+        ratio_text(row["ratio"]),
+        f"{row['memory']:.1f}",
+    ]
 
 
 def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--repeats", type=int, default=3)
-    repeats = parser.parse_args().repeats
-    sys.stdout.write(
-        f"{'':<26} {'n':>8} {'entries':>10} {'seconds':>8} {'ratio':>6} {'peak GiB':>9} {'trace':>14}\n"
-    )
+    """Measure, print, and write what was asked for."""
+    options = options_of(__doc__).parse_args()
+    report = Report(PACKAGES, options, COLUMNS, cells, threads="all threads")
     context = multiprocessing.get_context("spawn")
-    for size, (n, neighbors) in SIZES.items():
-        base = 0.0
+    for n, neighbors in QUICK if options.quick else FULL:
+        ours = 0.0
         for method in METHODS:
-            with context.Pool(1) as pool:
-                seconds, peak, checksum, entries = pool.apply(
-                    measured, (method, n, neighbors, repeats)
-                )
-            base = base or seconds
-            sys.stdout.write(
-                f"{method:<26} {n:>8} {entries:>10} {seconds:>8.2f} {seconds / base:>6.2f} {peak:>9.2f} "
-                f"{checksum:>14.8g}   {size}\n"
-            )
-            sys.stdout.flush()
+            runs = []
+            for _ in range(options.repeats):
+                with context.Pool(1) as pool:
+                    runs.append(pool.apply(measured, (method, n, neighbors)))
+            median = statistics.median(run["wall"] for run in runs)
+            ours = ours or median
+            row = {"n": n, "method": method} | runs[0]
+            report.add(row | {"wall": median, "ratio": median / ours})
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
     python benchmarks/bench_merge.py                        15,000, 100,000 and a million vertices; a few minutes
     python benchmarks/bench_merge.py --quick                600 vertices, seconds
-    python benchmarks/bench_merge.py --json merge.json --markdown docs/benchmarks.md
 
 GUDHI is asked three times: for the persistence of the whole mesh, whose pairs of triangles and edges are ours and are
 compared with them; for that of its vertices and edges alone, which is enough for maxima; and for ToMATo on the same
@@ -144,14 +143,11 @@ def cells(row: Row) -> list[str]:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
-    report = Report(
-        __file__, ["eigenshape", "gudhi", "numpy", "scipy", "numba"], options, COLUMNS, cells
-    )
+    report = Report(["eigenshape", "gudhi", "numpy", "scipy", "numba"], options, COLUMNS, cells)
     for n in QUICK if options.quick else FULL:
         for function in ("waves", "noise"):
             for row in rows_of(n, function, options.repeats):
                 report.add(row)
-    report.write()
 
 
 if __name__ == "__main__":

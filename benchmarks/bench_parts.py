@@ -211,9 +211,7 @@ def main() -> None:
     one_core()
     with threadpool_limits(1):
         es.solve_spectrum(es.cotangent_laplacian(es.icosphere(4)), 20)  # loads and compiles
-        report = Report(
-            __file__, ["eigenshape", "numpy", "scipy", "numba"], options, COLUMNS, cells
-        )
+        report = Report(["eigenshape", "numpy", "scipy", "numba"], options, COLUMNS, cells)
         speed = rates(2**20 if options.quick else 2**25)
         told = f"triad {speed['bandwidth'] / 1e9:.1f} GB/s, dgemm {speed['dgemm'] / 1e9:.0f} GF/s"
         report.figures["settings"] |= {"speed": told, "rates": speed}
@@ -221,7 +219,6 @@ def main() -> None:
             mesh = make()
             for row in measured(mesh, k, options.repeats, speed):
                 report.add({"case": f"{name}, n = {mesh.n_points:,}, k = {k}"} | row)
-    report.write()
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
     python benchmarks/bench_retrieval.py                       4,800 to 1.5 million vertices; a quarter of an hour
     python benchmarks/bench_retrieval.py --quick               2,500 vertices, 30 shapes
-    python benchmarks/bench_retrieval.py --markdown docs/benchmarks.md
 
 Creatures stand for the thesis' models, with as many vertices, split for the two large ones. EVD and LFD are ours too.
 Each call has a process of its own, after a small one that loads and compiles. The last row of a method is one query
@@ -32,7 +31,6 @@ FULL = {  # vertices and how often faces are split, and the seconds that the the
     (12_600, 0): (30.7, 8.6, 1.4),
     (15_200, 0): (42.8, 8.9, 1.5),
     (62_500, 2): (712.0, 28.0, 40.0),
-    (93_750, 2): (1032.0, 37.0, 60.0),
 }
 QUICK = {(2_500, 0): ()}
 QUERY = (0.02, 0.006, 36.0)
@@ -166,9 +164,8 @@ def cells(row: Row) -> list[str]:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
-    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
+    report = Report(PACKAGES, options, COLUMNS, cells)
     measure(QUICK if options.quick else FULL, 30 if options.quick else N_SHAPES, report)
-    report.write()
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@
     python benchmarks/bench_search.py --quick               2,500 shapes
     python benchmarks/bench_search.py --sizes 1000000 --queries 20 40 minutes, 1.3 GB of disk
     python benchmarks/bench_search.py --entries FILE.npz --meshes FOLDER    mixtures of real shapes, described first
-    python benchmarks/bench_search.py --markdown docs/benchmarks.md
 
 A database shape is a mixture of three described shapes, views included, with random weights. Queries are mixtures that
 are not in the database, half of them of closed shapes and half of partial scans. `--meshes` describes the first closed
@@ -404,9 +403,8 @@ def main() -> None:
     parser.add_argument("--meshes", type=Path, help="folder of folders of meshes to describe")
     parser.add_argument("--folder", type=Path, help="where temporary rows are written")
     options = parser.parse_args()
-    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
+    report = Report(PACKAGES, options, COLUMNS, cells)
     measure_all(tuple(options.sizes or (QUICK if options.quick else FULL)), report)
-    report.write()
 
 
 if __name__ == "__main__":

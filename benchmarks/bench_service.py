@@ -188,12 +188,11 @@ def main() -> None:
     parser.add_argument("--clients", type=int, default=16)
     parser.set_defaults(repeats=1)
     options = parser.parse_args()
-    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
+    report = Report(PACKAGES, options, COLUMNS, cells, threads="all threads")
     n_clients, seconds = (4, 10.0) if options.quick else (options.clients, 60 * options.minutes)
     with tempfile.TemporaryDirectory() as folder:
         for row in measure(Path(folder), n_clients, seconds):
             report.add(row)
-    report.write()
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@
 
 Every library is called as its documentation does (`spectrum_libraries.py`), each time in a new process with one thread,
 and they take turns: A B C, A B C, A B C. A figure is the median of its repetitions; a ratio to ours under 1.4 is a tie.
-Cases that the JSON file has from an earlier run, and this one has not, are kept there and in the table.
 Ours includes the proof that nothing is missing, theirs prove nothing; so what they return is compared with the
 certified eigenvalues of their own matrices.
 """
@@ -21,11 +20,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-from report import THREADS, Row, dump, new_figures, options_of, put
+from report import THREADS, Row, dump, new_figures, options_of
 from rich.console import Console
 from spectrum_cases import FULL, QUICK, Case
 from spectrum_libraries import LIBRARIES, OURS
-from spectrum_tables import markdown, printed
+from spectrum_tables import HEADER, cells, printed, title
 
 import eigenshape as es
 
@@ -45,9 +44,6 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("-k", type=int, help="eigenpairs, instead of what the case has")
     parser.add_argument(
         "--limit", type=float, default=900.0, help="seconds after which a process is stopped"
-    )
-    parser.add_argument(
-        "--no-run", action="store_true", help="measure nothing, write the table of the JSON"
     )
     return parser.parse_args(argv)
 
@@ -143,45 +139,26 @@ def with_ratios(rows: list[Row]) -> list[Row]:
     return rows
 
 
-def kept(path: Path | None, cases: dict[str, Case]) -> list[Row]:
-    """Return the rows of an earlier run that this one does not measure again."""
-    if path is None or not path.exists():
-        return []
-    return [row for row in json.loads(path.read_text())["rows"] if row["case"] not in cases]
-
-
-def in_order(rows: list[Row]) -> list[Row]:
-    """Return rows in the order of the cases, those of meshes of one's own at the end."""
-    places = {name: place for place, name in enumerate([*FULL, *QUICK])}
-    return sorted(rows, key=lambda row: places.get(row["case"], len(places)))
-
-
-def measure(options: argparse.Namespace) -> Row:
-    """Run all chosen cases, print each when it is done, and return the report."""
-    console, cases = Console(), chosen_cases(options)
+def measure(options: argparse.Namespace) -> None:
+    """Run all chosen cases, print each when it is done, and write what was asked for."""
+    console = Console()
     packages = sorted({library.package for library in LIBRARIES.values()})
-    report = new_figures([*packages, *ALSO], repeats=options.repeats, limit=options.limit)
-    report |= {
-        "calls": {name: library.call for name, library in LIBRARIES.items()},
-        "rows": kept(options.json, cases),
-    }
-    for name, case in cases.items():
+    figures = new_figures(
+        [*packages, *ALSO],
+        ("shape", *HEADER),
+        "one thread",
+        repeats=options.repeats,
+        limit=options.limit,
+        calls={name: library.call for name, library in LIBRARIES.items()},
+    )
+    for name, case in chosen_cases(options).items():
         rows = run_case(name, case, options, console)
         console.print(printed(rows))
-        report["rows"] = in_order(report["rows"] + rows)
+        figures["rows"] += rows
+        figures["table"] += [(title(row), *cells(row)) for row in rows]
         if options.json:
-            dump(options.json, report)
-    return report
-
-
-def main(argv: list[str] | None = None) -> None:
-    """Measure, print, and write what was asked for."""
-    options = arguments(argv)
-    report = json.loads(options.json.read_text()) if options.no_run else measure(options)
-    report["rows"] = in_order(report["rows"])
-    if options.markdown:
-        put(options.markdown, markdown(report), Path(__file__).name)
+            dump(options.json, figures)
 
 
 if __name__ == "__main__":
-    main()
+    measure(arguments())

@@ -58,14 +58,13 @@ def main() -> None:
     parser.set_defaults(repeats=REPEATS)
     options = parser.parse_args()
     names = [name for name in (QUICK if options.quick else STARTS) if is_installed(name)]
-    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
+    report = Report(PACKAGES, options, COLUMNS, cells)
     for name in names:
         start_seconds(STARTS[name])
     rounds = [{name: start_seconds(STARTS[name]) for name in names} for _ in range(options.repeats)]
     medians = {name: statistics.median(taken[name] for taken in rounds) for name in names}
     for name, cpu in medians.items():
         report.add({"start": name, "cpu": cpu, "ratio": cpu / medians[OURS]})
-    report.write()
 
 
 if __name__ == "__main__":

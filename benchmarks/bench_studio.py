@@ -313,7 +313,7 @@ def main() -> None:
     options = parser.parse_args()
     if not THREE.exists():
         install_packages()
-    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
+    report = Report(PACKAGES, options, COLUMNS, cells, threads="all threads")
     drag, large, reported = QUICK if options.quick else FULL
     with tempfile.TemporaryDirectory() as work, studio.start_browser() as browser:
         folder = Path(work)
@@ -326,7 +326,6 @@ def main() -> None:
         for name, measure in parts.items():
             for found in measure() if options.only in (None, name) else []:
                 report.add(found)
-    report.write()
 
 
 if __name__ == "__main__":

@@ -146,10 +146,15 @@ def main() -> None:
     parser = options_of(__doc__)
     parser.add_argument("--only", nargs="+", choices=CASES, default=list(CASES))
     options = parser.parse_args()
-    report = Report(__file__, ["eigenshape", "numpy", "numba", "scipy"], options, COLUMNS, cells)
+    report = Report(
+        ["eigenshape", "numpy", "numba", "scipy"],
+        options,
+        COLUMNS,
+        cells,
+        threads="one and two threads",
+    )
     for name in options.only:
         report.add(measured(name, options.quick, options.repeats))
-    report.write()
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
     python benchmarks/bench_transport.py              50,000 vertices; some minutes
     python benchmarks/bench_transport.py --quick      2,500 vertices, seconds
-    python benchmarks/bench_transport.py --markdown docs/transport.md
 
 Each task takes its own process, after a small call that loads and compiles. CPU seconds: preparation, one source, and
 99 more sources with what is kept.
@@ -121,13 +120,12 @@ def cells(row: Row) -> list[str]:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
-    report = Report(__file__, PACKAGES, options, COLUMNS, cells)
+    report = Report(PACKAGES, options, COLUMNS, cells)
     n = QUICK if options.quick else FULL
     for key in TASKS:
         runs = [in_process(measured, key, n) for _ in range(options.repeats)]
         medians = {name: float(np.median([run[name] for run in runs])) for name in runs[0]}
         report.add({"key": key, "n": n} | medians)
-    report.write()
 
 
 if __name__ == "__main__":

@@ -168,7 +168,7 @@ def main() -> None:
     )
     parser.add_argument("--only", help="only damages whose name holds this")
     options = parser.parse_args()
-    report = Report(__file__, ["numpy", "scipy"], options, COLUMNS, cells)
+    report = Report(["numpy", "scipy"], options, COLUMNS, cells, threads="all threads")
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         index = make_index(folder)
@@ -182,7 +182,6 @@ def main() -> None:
     report.figures["refused"] = refused
     if options.json:
         dump(options.json, report.figures)
-    report.write()
 
 
 def make_index(folder: Path) -> Path:

@@ -4,12 +4,14 @@ import os
 import platform
 import re
 import resource
+import subprocess
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_info
 
+ROOT = Path(__file__).resolve().parents[1]
 STATUS, CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
 
@@ -28,6 +30,20 @@ def describe(packages: list[str]) -> dict[str, object]:
         "blas": sorted({f"{pool['internal_api']} {pool['version']}" for pool in threadpool_info()}),
         "versions": {package: _version(package) for package in packages},
     }
+
+
+def commit() -> str:
+    """Name the commit whose code runs; "and changes" if files of the library differ from it."""
+    try:
+        head, changed = (
+            subprocess.run(
+                ["git", *words], cwd=ROOT, capture_output=True, text=True, check=True
+            ).stdout.strip()
+            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "--", "src", "studio"])
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "not known"
+    return f"{head[:12]} and changes" if changed else head[:12]
 
 
 def _field(path: str, pattern: str) -> str:

@@ -1,18 +1,18 @@
-"""What every benchmark does alike: its options, a process for each call, its table, and where that is written."""
+"""What every benchmark does alike: its options, a process for each call, its rows, and the file that keeps them."""
 
 import argparse
 import datetime
 import json
 import multiprocessing
 import os
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from machine import describe
+from machine import commit, describe
 
 TIE = 1.4
-END = "<!-- end -->\n"
 THREADS = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -30,10 +30,7 @@ def options_of(text: str | None, **settings: Any) -> argparse.ArgumentParser:
     parser.add_argument(
         "--repeats", type=int, default=3, help="runs of each, of which the median is taken"
     )
-    parser.add_argument("--json", type=Path, help="write all figures")
-    parser.add_argument(
-        "--markdown", type=Path, help="write the table; into a page between its two marks"
-    )
+    parser.add_argument("--json", type=Path, help="write all figures and their table")
     return parser
 
 
@@ -56,82 +53,57 @@ def ratio_text(ratio: float) -> str:
 
 
 class Report:
-    """Rows of one benchmark: printed as they come, and written where the options say."""
+    """Rows of one run of a benchmark: printed as they come, and written where the options say."""
 
     def __init__(
         self,
-        script: str,
         packages: list[str],
         options: argparse.Namespace,
         columns: Sequence[str],
         cells: Callable[[Row], Sequence[str]],
+        *,
+        threads: str = "one thread",
     ) -> None:
-        """Take the script's `__file__`, and how it makes texts of a row; the first names what rows have in common."""
-        self.script, self.options, self.columns, self.cells = (
-            Path(script).name,
-            options,
-            columns,
-            cells,
-        )
-        self.figures = new_figures(packages, repeats=options.repeats)
+        """Take how texts of a row are made; the first names what rows have in common."""
+        self.options, self.cells = options, cells
+        self.figures = new_figures(packages, columns, threads, repeats=options.repeats)
 
     def add(self, row: Row) -> None:
         """Keep a row, also in the JSON file, and print it."""
         self.figures["rows"].append(row)
+        self.figures["table"].append(list(self.cells(row)))
         if self.options.json:
             dump(self.options.json, self.figures)
-        print(*self.cells(row), sep="  ", flush=True)
-
-    def write(self) -> None:
-        """Write the table, if one was asked for."""
-        if self.options.markdown:
-            rows = [self.cells(row) for row in self.figures["rows"]]
-            put(
-                self.options.markdown,
-                f"{measured_on(self.figures)}\n\n{table(self.columns, rows)}",
-                self.script,
-            )
+        print(*self.figures["table"][-1], sep="  ", flush=True)
 
 
-def new_figures(packages: list[str], **settings: object) -> dict[str, Any]:
-    """Return figures without rows yet: the day, the machine, and the settings."""
-    today = datetime.datetime.now(datetime.UTC).date().isoformat()
-    return {"date": today, "machine": describe(packages), "settings": settings, "rows": []}
+def new_figures(
+    packages: list[str], columns: Sequence[str], threads: str, **settings: object
+) -> dict[str, Any]:
+    """Return figures without rows yet: the command, the day, the commit, the machine and the settings."""
+    program, *words = sys.argv
+    if "--json" in words:
+        place = words.index("--json")
+        del words[place : place + 2]
+    return {
+        "command": " ".join(["python", f"benchmarks/{Path(program).name}", *words]),
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "commit": commit(),
+        "machine": describe(packages) | {"threads": threads},
+        "settings": settings,
+        "columns": list(columns),
+        "table": [],
+        "rows": [],
+    }
 
 
 def dump(path: Path, figures: dict[str, Any]) -> None:
-    """Write all figures as JSON."""
-    path.write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n")
-
-
-def measured_on(figures: dict[str, Any]) -> str:
-    """Say when and on what figures were measured, in one paragraph."""
-    machine, repeats = figures["machine"], figures["settings"]["repeats"]
-    versions = [f"{name} {number}" for name, number in machine["versions"].items() if number]
-    speed = figures["settings"].get("speed")
-    parts = (
-        f"Measured {figures['date']} on one of {machine['cores']} cores, {machine['cpu']}, {machine['memory_gib']} GiB",
-        f"load {machine['load'][0]} at the start{f', {speed}' if speed else ''}; {machine['system']}",
-        f"Python {machine['python']}; {', '.join([*versions, *machine['blas']])}",
-    )
-    runs = f"Medians of {repeats} unless the table says so." if repeats > 1 else "One run each."
-    return f"{', '.join(parts)}. {runs}"
-
-
-def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table for a page; a first cell that repeats the one above it is left empty."""
-    lines = [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
-    before = None
-    for first, *others in rows:
-        lines.append(f"| {' | '.join(['' if first == before else first, *others])} |")
-        before = first
-    return "\n".join(lines) + "\n"
-
-
-def put(path: Path, text: str, script: str) -> None:
-    """Write a section to a file; where the file has the two marks of the script, between them."""
-    page, begin = path.read_text() if path.exists() else "", f"<!-- {script} --markdown -->\n"
-    if begin in page and END in page.split(begin)[1]:
-        before, rest = page.split(begin)
-        text = before + begin + "\n" + text + "\n" + END + rest.split(END, 1)[1]
-    path.write_text(text)
+    """Write figures as JSON, one line for each entry and for each row."""
+    lines = []
+    for name, value in figures.items():
+        if name in ("table", "rows") and value:
+            items = ",\n  ".join(json.dumps(item, ensure_ascii=False) for item in value)
+            lines.append(f" {json.dumps(name)}: [\n  {items}\n ]")
+        else:
+            lines.append(f" {json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}")
+    path.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")

@@ -1,6 +1,6 @@
-"""The figures of `bench_spectrum.py` as tables for a terminal and for a page."""
+"""The figures of `bench_spectrum.py` as texts of a table, and as one for a terminal."""
 
-from report import Row, measured_on, ratio_text, table
+from report import Row, ratio_text
 from rich.table import Table
 
 HEADER = ("library", "CPU s", "ratio", "wall s", "MiB", "worst residual", "wrong", "missing")
@@ -31,7 +31,7 @@ def _missing(row: Row) -> str:
 
 def printed(rows: list[Row]) -> Table:
     """Return the table of one case for a terminal."""
-    shown = Table(title=_title(rows[0]), title_justify="left")
+    shown = Table(title=title(rows[0]), title_justify="left")
     for place, name in enumerate(HEADER):
         shown.add_column(name, justify="right" if place else "left", overflow="fold")
     for row in rows:
@@ -39,12 +39,7 @@ def printed(rows: list[Row]) -> Table:
     return shown
 
 
-def _title(row: Row) -> str:
+def title(row: Row) -> str:
+    """Name the case of a row, with how often it was run."""
     runs = len(row.get("cpu_runs", ()))
     return f"{row['title']}, n = {row['n']:,}, k = {row['k']}, {runs} run{'s' * (runs > 1)}"
-
-
-def markdown(report: Row) -> str:
-    """Return the whole report as a page's section."""
-    rows = [(_title(row), *cells(row)) for row in report["rows"]]
-    return f"{measured_on(report)}\n\n{table(('shape', *HEADER), rows)}"

@@ -1,6 +1,7 @@
 """Benchmarks as a user starts them."""
 
 import json
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -8,23 +9,25 @@ from pathlib import Path
 import pytest
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
-PAGE = "before\n<!-- {0} --markdown -->\nold\n<!-- end -->\nbetween\n<!-- other -->\n<!-- end -->\nafter\n"
 
 
 @pytest.fixture
 def run_quick(tmp_path):
-    """Run a script on something small; return its rows, what it printed, and a page with its table between marks."""
+    """Run a script on something small; return its rows, what it printed, and the table that a page would show."""
 
     def run(script, *options):
-        report, page = tmp_path / "report.json", tmp_path / "page.md"
-        page.write_text(PAGE.format(script))
+        report = tmp_path / "report.json"
         command = [sys.executable, BENCHMARKS / script, "--quick", "--repeats", "1", *options]
-        more = ["--json", report, "--markdown", page]
-        done = subprocess.run([*command, *more], capture_output=True, text=True, check=True)
-        figures, text = json.loads(report.read_text()), page.read_text()
+        done = subprocess.run(
+            [*command, "--json", report], capture_output=True, text=True, check=True
+        )
+        figures = json.loads(report.read_text())
         assert figures["machine"]["versions"]["numpy"]
-        assert text.startswith(f"before\n<!-- {script} --markdown -->\n\nMeasured ")
-        assert text.endswith("\n<!-- end -->\nbetween\n<!-- other -->\n<!-- end -->\nafter\n")
+        assert figures["command"].startswith(f"python benchmarks/{script} --quick")
+        assert "--json" not in figures["command"]
+        text = runpy.run_path(str(BENCHMARKS / "figures.py"))["table"](
+            figures["columns"], figures["table"]
+        )
         return figures["rows"], done.stdout, text
 
     return run

@@ -1,0 +1,270 @@
+"""The figures of the pages: measure them, write their tables, check them, and name those older than the code.
+
+    python benchmarks/figures.py                      check all pages; the house tests do the same
+    python benchmarks/figures.py --run [NAME ...]     measure, all or some, the most important first, and write
+    python benchmarks/figures.py --write              write all tables from their files
+    python benchmarks/figures.py --stale              name the figures that are older than the code that they time
+
+A benchmark writes `figures/NAME.json`: the command, the day, the commit, the machine, the versions, all rows, and the
+texts of the table. A page shows it between `<!-- figures: NAME -->` and `<!-- end -->`. One file is one run on one
+machine, and so is a table. A run that fails leaves the file of the run before.
+"""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = Path(__file__).with_name("figures")
+PAGES = [
+    ROOT / "README.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+    *sorted((ROOT / "experiments").rglob("*.md")),
+]
+MEASURED = re.compile(r"<!-- figures: (\w+) -->\n(.*?)<!-- end -->\n", re.DOTALL)
+# A table of an experiment: the file and a path in it, the key of each row, and the cells with paths below it.
+FILLED = re.compile(r"(<!-- figures: (\S+\.json.*)\n(.*)\n(.*) -->\n\n?)((?:\|.*\n)+)")
+PLACE = re.compile(r"\{(.*?)(?::([+,]*(?:\.\d[efg%])?))?\}")
+# Why a table with numbers may have no file of figures: its comment, `<!-- no figures: WHY -->`, says one of these.
+NO_FIGURES = {
+    "numbers are names, sections or parameters",
+    "values printed in the thesis",
+    "exact values",
+}
+COMMENTED = re.compile(r"<!-- no figures: (.*) -->\n\n?\Z")
+TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
+NOT_NUMBERS = re.compile(r"`[^`]*`|\]\([^)]*\)")
+NUMBER = re.compile(r"(?<![\w.^])\d")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A benchmark with its options, and the files that it times."""
+
+    command: str
+    times: tuple[str, ...]
+
+
+SOURCE = "src/eigenshape/"
+SOLVER = ("spectral/solver", "spectral/solve.py", "sparse")
+HEAT = ("spectral/multilevel", "spectral/signatures", "features")
+DESCRIBING = ("retrieval/patches", "retrieval/heat", "retrieval/baselines")
+STORE = ("retrieval/store", "retrieval/search")
+# The most important first, so that what there is time for is measured; about 35 minutes on two idle cores.
+FIGURES = {
+    "spectrum": Figure("bench_spectrum.py --repeats 1", SOLVER),
+    "start": Figure("bench_start.py", ("__init__.py", "cli")),
+    "threads": Figure("bench_threads.py", ("_threads.py", "sparse", "spectral/solver")),
+    "search": Figure("bench_search.py --queries 20 --qdrant 0", ("retrieval/search",)),
+    "retrieval": Figure("bench_retrieval.py --repeats 1", DESCRIBING),
+    "kernel": Figure("bench_kernel.py --repeats 1", ("operators",)),
+    "deform": Figure("bench_deform.py --repeats 1", ("deformation",)),
+    "transport": Figure("bench_transport.py --repeats 1", ("calculus", "geometry")),
+    "calculus": Figure("bench_calculus.py --repeats 1", ("calculus",)),
+    "approximate": Figure("bench_approximate.py", ("spectral/multilevel", *SOLVER)),
+    "factor": Figure("bench_factor.py --sizes 5 6 160000", ("sparse",)),
+    "parts": Figure("bench_parts.py", SOLVER),
+    "merge": Figure("bench_merge.py --repeats 1", ("features",)),
+    "growth": Figure("bench_growth.py --only points pairs kernel --repeats 1", SOLVER),
+    "features": Figure("bench_features.py --repeats 1", (*HEAT, *SOLVER)),
+    "first_call": Figure("bench_first_call.py --repeats 1", ("_compile.py", "spectral/solver")),
+    "peers": Figure(
+        "bench_approximate.py --peers --cases sphere-20k-20 sphere-100k-20 dragon-20",
+        ("spectral/multilevel",),
+    ),
+    "index": Figure("bench_index.py --sizes 10000", STORE),
+    "service": Figure("bench_service.py --minutes 1", ("retrieval/store", "../../studio/src")),
+    "build": Figure("bench_build.py", STORE),
+    "studio": Figure("bench_studio.py", ("../../studio", "deformation")),
+}
+
+
+def load(name: str) -> dict[str, Any] | None:
+    """Read the figures of one run, if there are any."""
+    path = FOLDER / f"{name}.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+
+
+def measured_on(figures: dict[str, Any]) -> str:
+    """Say when, by which command and on which machine figures were measured, in one paragraph."""
+    machine, settings = figures["machine"], figures["settings"]
+    versions = [f"{name} {number}" for name, number in machine["versions"].items() if number]
+    parts = [
+        f"Measured {figures['date']} by `{figures['command']}` at commit {figures['commit']}",
+        f"on {machine['cpu']}, {machine['threads']} of {machine['cores']} cores, {machine['memory_gib']} GiB",
+        f"load {machine['load'][0]} at the start",
+        *([settings["speed"]] if "speed" in settings else []),
+        f"{machine['system']}, Python {machine['python']}",
+        *versions,
+        *machine["blas"],
+    ]
+    repeats = settings["repeats"]
+    runs = f"Medians of {repeats} unless the table says so." if repeats > 1 else "One run each."
+    return f"{', '.join(parts)}. {runs}"
+
+
+def table(columns: list[str], rows: list[list[str]]) -> str:
+    """Return a table for a page; a first cell that repeats the one above it is left empty."""
+    lines = [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
+    before = None
+    for first, *others in rows:
+        lines.append(f"| {' | '.join(['' if first == before else first, *others])} |")
+        before = first
+    return "\n".join(lines) + "\n"
+
+
+def block(name: str) -> str:
+    """Return what a page shows of some figures."""
+    figures = load(name)
+    if figures is None:
+        shown = (
+            f"Not measured since its code changed: `python benchmarks/figures.py --run {name}`.\n"
+        )
+    else:
+        shown = f"{measured_on(figures)}\n\n{table(figures['columns'], figures['table'])}"
+    return f"<!-- figures: {name} -->\n\n{shown}\n<!-- end -->\n"
+
+
+def written(text: str, folder: Path) -> str:
+    """Return a page with all tables written anew from their files."""
+    text = MEASURED.sub(lambda found: block(found[1]), text)
+    return FILLED.sub(lambda found: found[1] + filled(folder, *found.groups()[1:]), text)
+
+
+def filled(folder: Path, root: str, keys: str, cells: str, rows: str) -> str:
+    """Return a table of an experiment with the numbers of its file."""
+    file, *path = root.split(">")
+    results = look_up(json.loads((folder / file).read_text(encoding="utf-8")), path)
+    head, line, *old = rows.splitlines()
+    lines = [head, line]
+    for key, row in zip(keys.split(" | "), old, strict=True):
+        kept = [cell.strip() for cell in row.strip("|").split("|")]
+        fresh = [
+            cell if template == "=" else fill(template, key, results)
+            for template, cell in zip(cells.split(" | "), kept, strict=True)
+        ]
+        lines.append(f"| {' | '.join(fresh)} |")
+    return "\n".join(lines) + "\n"
+
+
+def fill(template: str, key: str, results: Any) -> str:
+    """Return the text of one cell; none where the results have nothing for it."""
+
+    def number(found: re.Match[str]) -> str:
+        path, form = found.groups()
+        if path == "#":
+            return key.split(">")[-1]
+        path = path.replace("*", key) if "*" in path else f"{key}>{path}"
+        return format(look_up(results, path.split(">")), form or "").removesuffix("%")
+
+    try:
+        return PLACE.sub(number, template)
+    except KeyError:
+        return ""
+
+
+def look_up(results: Any, path: list[str]) -> Any:
+    """Return what stands at a path of names and places."""
+    for name in path:
+        results = results[int(name)] if isinstance(results, list) else results[name]
+    return results
+
+
+def complaints(page: Path) -> list[str]:
+    """Say what is wrong with the tables of a page: no source, or other than its file would write it."""
+    text, name = page.read_text(encoding="utf-8"), page.relative_to(ROOT)
+    anew = written(text, page.parent).splitlines()
+    found = [
+        f"{name}:{number}: {line!r} is {fresh!r} in its file; run benchmarks/figures.py --write"
+        for number, (line, fresh) in enumerate(zip(text.splitlines(), anew, strict=False), 1)
+        if line != fresh
+    ][:3]
+    rest = FILLED.sub("\n", MEASURED.sub("\n", text))
+    for each in TABLE.finditer(rest):
+        head, _, *rows = each[0].splitlines()
+        if not NUMBER.search(NOT_NUMBERS.sub("", "\n".join(rows))):
+            continue
+        reason = COMMENTED.search(rest, 0, each.start())
+        if reason is None:
+            found.append(f"{name}: numbers without a source in the table {head}")
+        elif reason[1] not in NO_FIGURES:
+            found.append(
+                f"{name}: {reason[1]!r} is no reason; it must be one of {NO_FIGURES}"
+            )
+    return found
+
+
+def run(name: str) -> None:
+    """Measure one set of figures; a run that fails keeps those of the run before."""
+    part, figure = FOLDER / f"{name}.part", FIGURES[name]
+    script, *options = figure.command.split()
+    print(f"== {name}: {figure.command}", flush=True)
+    FOLDER.mkdir(exist_ok=True)
+    command = [sys.executable, str(FOLDER.parent / script), *options, "--json", str(part)]
+    subprocess.run(command, cwd=ROOT, check=True)
+    times = [os.path.normpath(SOURCE + path) for path in figure.times]
+    first = f'{{\n "times": {json.dumps(times)},\n'
+    text = part.read_text(encoding="utf-8").replace("{\n", first, 1)
+    (FOLDER / f"{name}.json").write_text(text, encoding="utf-8")
+    part.unlink()
+
+
+def write() -> None:
+    """Write the tables of all pages from their files."""
+    for page in PAGES:
+        before = page.read_text(encoding="utf-8")
+        if (after := written(before, page.parent)) != before:
+            page.write_text(after, encoding="utf-8")
+            print(f"wrote {name}")
+
+
+def stale() -> list[str]:
+    """Name the figures whose code has changed since, or why that is not known."""
+    found = []
+    for path in sorted(FOLDER.glob("*.json")):
+        figures = json.loads(path.read_text(encoding="utf-8"))
+        since = f"{figures['commit'].split()[0]}..HEAD"
+        command = ["git", "log", "--format=%h", since, "--", *figures["times"]]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+        if done.returncode:
+            found.append(f"{path.stem}: age not known, since commit {since[:-6]} is not here")
+        elif commits := done.stdout.split():
+            found.append(
+                f"{path.stem}, of {figures['date']}, is older than what it times: "
+                f"{len(commits)} commits since {since[:-6]} in {', '.join(figures['times'])}"
+            )
+    return found
+
+
+def main() -> None:
+    """Do what the options ask for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--run", nargs="*", choices=FIGURES, help="measure all, or these")
+    parser.add_argument("--write", action="store_true", help="write all tables from their files")
+    parser.add_argument("--stale", action="store_true", help="name figures older than their code")
+    options = parser.parse_args()
+    failed = []
+    if options.run is not None:
+        for name in options.run or FIGURES:
+            try:
+                run(name)
+            except subprocess.CalledProcessError:
+                failed.append(f"{name} failed; its figures are those of the run before")
+            write()
+    elif options.write:
+        write()
+    elif options.stale:
+        print("\n".join(stale()))
+    else:
+        failed = [line for page in PAGES for line in complaints(page)]
+    sys.exit("\n".join(failed) or None)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,96 @@
+"""Every number in a table has a source, and each table stands as its file of figures writes it."""
+
+import json
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FIGURES = runpy.run_path(str(ROOT / "benchmarks" / "figures.py"))
+TABLE = "| shape | CPU s |\n|---|---|\n| sphere | 0.12 |\n"
+
+
+@pytest.mark.parametrize("page", FIGURES["PAGES"], ids=lambda page: str(page.relative_to(ROOT)))
+def test_tables_are_those_of_their_files(page):
+    assert FIGURES["complaints"](page) == []
+
+
+@pytest.mark.parametrize(
+    "path", sorted(FIGURES["FOLDER"].glob("*.json")), ids=lambda path: path.stem
+)
+def test_each_file_says_how_it_was_measured(path):
+    figures = json.loads(path.read_text(encoding="utf-8"))
+    assert path.stem in FIGURES["FIGURES"]
+    assert {"command", "date", "commit", "machine", "times", "rows"} <= figures.keys()
+    assert {"cpu", "cores", "threads", "load", "versions", "python"} <= figures["machine"].keys()
+    assert all((ROOT / place).exists() for place in figures["times"])
+    labels = [tuple(row[:2]) for row in figures["table"]]
+    assert len(set(labels)) == len(labels) == len(figures["rows"]), "rows of two runs"
+
+
+@pytest.fixture
+def a_page(tmp_path, monkeypatch):
+    """Return a function that writes a page and says what is wrong with it; its figures are in a folder of their own."""
+    monkeypatch.setitem(FIGURES["block"].__globals__, "FOLDER", tmp_path)
+    monkeypatch.setitem(FIGURES["block"].__globals__, "ROOT", tmp_path)
+
+    def complaints(text):
+        (tmp_path / "page.md").write_text(text)
+        return FIGURES["complaints"](tmp_path / "page.md")
+
+    return complaints
+
+
+def test_a_number_without_a_source_is_refused(a_page):
+    assert a_page(TABLE) == ["page.md: numbers without a source in the table | shape | CPU s |"]
+    assert a_page(TABLE.replace("0.12", "quick, by `es.solve_spectrum(laplacian, 20)`")) == []
+    assert a_page("<!-- no figures: exact values -->\n\n" + TABLE) == []
+    (refused,) = a_page("<!-- no figures: everybody knows -->\n" + TABLE)
+    assert "'everybody knows' is no reason" in refused
+
+
+def test_a_table_that_its_file_does_not_write_is_refused(a_page, tmp_path):
+    figures = {
+        "command": "python benchmarks/bench_x.py",
+        "date": "2026-11-25",
+        "commit": "abc",
+        "machine": {
+            "cpu": "a CPU",
+            "threads": "one thread",
+            "cores": 2,
+            "memory_gib": 8,
+            "load": [0],
+        }
+        | {"system": "Linux", "python": "3", "versions": {}, "blas": []},
+        "settings": {"repeats": 3},
+        "columns": ["shape", "CPU s"],
+        "table": [["sphere", "0.12"]],
+    }
+    (tmp_path / "x.json").write_text(json.dumps(figures))
+    page = FIGURES["written"]("before\n<!-- figures: x -->\nold\n<!-- end -->\nafter\n")
+    assert page.startswith(
+        "before\n<!-- figures: x -->\n\nMeasured 2026-11-25 by `python benchmarks/bench_x.py`"
+    )
+    assert page.endswith(
+        f"Medians of 3 unless the table says so.\n\n{TABLE}\n<!-- end -->\nafter\n"
+    )
+    assert a_page(page) == []
+    (refused,) = a_page(page.replace("0.12", "0.11"))
+    assert "the table of x differs from its file" in refused
+    (tmp_path / "x.json").unlink()
+    (refused,) = a_page(page)
+    assert "differs" in refused
+    assert "Not measured since" in FIGURES["written"](page)
+
+
+def test_ages_of_figures_are_told_without_a_history_too():
+    done = subprocess.run(
+        [sys.executable, ROOT / "benchmarks" / "figures.py", "--stale"],
+        text=True,
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
