@@ -146,27 +146,36 @@ def filled(folder: Path, root: str, keys: str, cells: str, rows: str) -> str:
     for key, row in zip(keys.split(" | "), old, strict=True):
         kept = [cell.strip() for cell in row.strip("|").split("|")]
         fresh = [
-            cell if template == "=" else fill(template, key, results)
+            cell if template == "=" else fill(template, key, results, cell)
             for template, cell in zip(cells.split(" | "), kept, strict=True)
         ]
         lines.append(f"| {' | '.join(fresh)} |")
     return "\n".join(lines) + "\n"
 
 
-def fill(template: str, key: str, results: Any) -> str:
-    """Return the text of one cell; none where the results have nothing for it."""
+def fill(template: str, key: str, results: Any, cell: str) -> str:
+    """Return the text of one cell; the words that stand there if the results have nothing for it."""
 
     def number(found: re.Match[str]) -> str:
         path, form = found.groups()
         if path == "#":
-            return key.split(">")[-1]
-        path = path.replace("*", key) if "*" in path else f"{key}>{path}"
-        return format(look_up(results, path.split(">")), form or "").removesuffix("%")
+            return key.rsplit(">", maxsplit=1)[-1]
+        stars, names = path.count("*"), key.split(">")
+        if stars == 0:
+            path = f"{key}>{path}"
+        elif stars == len(names):
+            path = path.replace("*", "{}").format(*names)
+        else:
+            path = path.replace("*", key)
+        value = look_up(results, path.split(">"))
+        if value is None:
+            raise KeyError(path)
+        return value if isinstance(value, str) else format(value, form or "").removesuffix("%")
 
     try:
         return PLACE.sub(number, template)
-    except KeyError:
-        return ""
+    except LookupError:
+        return "" if NUMBER.search(cell) else cell
 
 
 def look_up(results: Any, path: list[str]) -> Any:
@@ -194,9 +203,7 @@ def complaints(page: Path) -> list[str]:
         if reason is None:
             found.append(f"{name}: numbers without a source in the table {head}")
         elif reason[1] not in NO_FIGURES:
-            found.append(
-                f"{name}: {reason[1]!r} is no reason; it must be one of {NO_FIGURES}"
-            )
+            found.append(f"{name}: {reason[1]!r} is no reason; it must be one of {NO_FIGURES}")
     return found
 
 
@@ -221,7 +228,7 @@ def write() -> None:
         before = page.read_text(encoding="utf-8")
         if (after := written(before, page.parent)) != before:
             page.write_text(after, encoding="utf-8")
-            print(f"wrote {name}")
+            print(f"wrote {page.relative_to(ROOT)}")
 
 
 def stale() -> list[str]:

@@ -225,21 +225,6 @@ def measured(case: Case, name: str, sizes: tuple[int, ...]) -> dict[str, object]
     }
 
 
-def markdown(table: dict[str, dict[str, dict]]) -> str:
-    """Write the table as the README has it."""
-    lines = [
-        "| domain | operator | unknowns | median | worst | order | entries a row |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for case, rows in table.items():
-        for name, row in rows.items():
-            errors = " | ".join(f"{row[key][-1]:.2e}" for key in ("median", "worst"))
-            lines.append(
-                f"| {case} | {name} | {row['n'][-1]} | {errors} | {row['order']:.2f} | {row['row']:.1f} |"
-            )
-    return "\n".join(lines) + "\n"
-
-
 def draw(path: Path, n: int) -> None:
     """Draw the error of 300 eigenvalues on the unit sphere, an operator a line, the copies of one as one."""
     mesh, exact = es.shapes.fibonacci_sphere(n), es.shapes.sphere_eigenvalues(300)
@@ -273,7 +258,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="smaller meshes")
     parser.add_argument("--out", type=output_file, help="write the figures as JSON")
-    parser.add_argument("--table", type=output_file, help="write the table as Markdown")
     parser.add_argument("--picture", type=output_file, help="draw errors on the sphere (PNG)")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
@@ -288,8 +272,6 @@ def main() -> None:
             f"  order {row['order']:5.2f}  entries a row {row['row']:6.1f}  seconds {row['seconds']}"
         )
     save_figures(rounded(table), arguments.out)
-    if arguments.table:
-        arguments.table.write_text(markdown(table))
     if arguments.picture:
         draw(arguments.picture, 1000 if arguments.quick else 4000)
 

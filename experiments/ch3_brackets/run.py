@@ -164,29 +164,12 @@ def measured(case: Case, condition: str, *, with_order: bool) -> dict[str, objec
     }
 
 
-def markdown(table: dict[str, dict]) -> str:
-    """Write the table as the README has it."""
-    lines = [
-        "| shape, condition | points | hold | truth moved by (of width) | width of first, median, last | order |",
-        "|---|---|---|---|---|---|",
-    ]
-    for name, row in table.items():
-        sure = f"{row['moved / width']:.1e}" if row["room / moved"] else "exact"
-        wide = ", ".join(f"{row[key]:.3f}" for key in ("first", "median", "last"))
-        orders = f"{row['order'][0]:.2f} to {row['order'][1]:.2f}" if row["order"] else "–"
-        lines.append(
-            f"| {name} | {row['points']} | {row['held']} of {K} | {sure} | {wide} | {orders} |"
-        )
-    return "\n".join(lines) + "\n"
-
-
 def main() -> None:
     """Measure, print, and write what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="*", help="names of shapes")
     parser.add_argument("--quick", action="store_true", help=f"{', '.join(QUICK)}, without orders")
     parser.add_argument("--out", type=output_file, help="write the figures as JSON")
-    parser.add_argument("--table", type=output_file, help="write the table as Markdown")
     arguments = parser.parse_args()
     chosen = arguments.only or (QUICK if arguments.quick else None)
     cases = {name: case for name, case in (made() | real()).items() if not chosen or name in chosen}
@@ -205,8 +188,6 @@ def main() -> None:
         table[label] = measured(cases[name], condition, with_order=not arguments.quick)
         print(label, table[label], flush=True)
     save_figures(rounded(table), arguments.out)
-    if arguments.table:
-        arguments.table.write_text(markdown(table))
 
 
 if __name__ == "__main__":

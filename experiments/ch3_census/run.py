@@ -86,6 +86,9 @@ def census(*, quick: bool) -> dict[str, object]:
                 if name == OURS:
                     worst = max(worst, off)
                     failures += [f"{case.name}, k = {k}: {what}"] if what != "right" else []
+    for rows in table.values():
+        families = list(rows.values())
+        rows["all"] = {what: sum(row[what] for row in families) for what in COUNTS}
     print("CPU seconds: " + ", ".join(f"{name} {spent:.0f}" for name, spent in seconds.items()))
     return {
         "operators": len(every),
@@ -94,28 +97,6 @@ def census(*, quick: bool) -> dict[str, object]:
         "failures of ours": failures,
         "table": table,
     }
-
-
-def markdown(result: dict[str, object]) -> str:
-    """Write the counts of wrong solves as the README has them."""
-    table = result["table"]
-    families = list(table[OURS])
-    lines = [f"| wrong of | {' | '.join(table)} |", "|---|" + "---|" * len(table)]
-    for family in families:
-        cells = [_cell([rows[family]]) if family in rows else "–" for rows in table.values()]
-        lines.append(f"| {family} | {' | '.join(cells)} |")
-    lines.append(
-        f"| **all** | {' | '.join(_cell(list(rows.values())) for rows in table.values())} |"
-    )
-    for what, meaning in (("absent", "an eigenvalue left out"), ("refused", "an exception")):
-        totals = [str(sum(row[what] for row in rows.values())) for rows in table.values()]
-        lines.append(f"| of these {meaning} | {' | '.join(totals)} |")
-    return "\n".join(lines) + "\n"
-
-
-def _cell(rows: list[dict[str, int]]) -> str:
-    bad, solves = (sum(row[key] for row in rows) for key in ("wrong", "solves"))
-    return f"{bad} of {solves:,}" + (f" ({100 * bad / solves:.1f} %)" if bad else "")
 
 
 def main() -> None:
@@ -130,7 +111,9 @@ def main() -> None:
     always_sparse()
     with threadpool_limits(1, user_api="blas"):
         result = census(quick=arguments.quick)
-    print(markdown(result))
+    for name, rows in result["table"].items():
+        counts = (f"{row['wrong']} of {row['solves']} {family}" for family, row in rows.items())
+        print(f"{name}, wrong: {', '.join(counts)}")
     print(f"ours: {result['dense']} solved densely, worst error {result['worst error of ours']}")
     print("\n".join(result["failures of ours"]))
     save_figures(result, arguments.out)

@@ -110,16 +110,6 @@ def measured(
     }
 
 
-def markdown(table: dict[str, dict[str, float]]) -> str:
-    """Return the table of the README."""
-    head = f"| shape, operator | {' | '.join(COLUMNS)} |\n|{'---|' * (len(COLUMNS) + 1)}\n"
-    rows = [
-        f"| {name} | " + " | ".join(f"{row[key]:.0e}" for key in COLUMNS) + " |"
-        for name, row in table.items()
-    ]
-    return head + "\n".join(rows) + "\n"
-
-
 def main() -> None:
     """Measure, print, and write what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

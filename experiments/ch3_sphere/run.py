@@ -130,20 +130,6 @@ def summary(edges: list[float], found: list[dict]) -> dict[str, dict]:
     return table
 
 
-def markdown(table: dict[str, dict], what: str) -> str:
-    """Return medians by size, the worst at the largest, and the order, one row an operator."""
-    sizes = [key for key in next(iter(table.values())) if key != "order"]
-    lines = [
-        f"| operator | {' | '.join(sizes)} | worst there | order |",
-        "|---" * (len(sizes) + 3) + "|",
-    ]
-    for name, rows in table.items():
-        cells = [f"{rows[size][what][0]:.3g}" for size in sizes]
-        cells += [f"{rows[sizes[-1]][what][1]:.3g}", f"{rows['order'][what]:.2f}"]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
 def by_number(panels: dict[str, str], edges: list[float], found: list[dict], what: str) -> Figure:
     """Draw errors by number, one line a size, one panel an operator."""
     figure, axes = chart(10, 4.4, columns=len(panels))

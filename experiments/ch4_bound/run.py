@@ -224,38 +224,6 @@ def functional_errors() -> dict[str, float]:
     }
 
 
-def markdown(results: dict) -> dict[str, str]:
-    """Return the README's tables."""
-    laws = {
-        "measured, t ≥ 4δ²": "points, t ≥ 4δ²",
-        "theorem 4.3.1": "proven (4.3.1)",
-        "our bound": "proven (ours)",
-        "our bound for dense samples": "expected (dense)",
-    }
-    points = ["| largest change | power of δ | power of t |", "|---|---|---|"]
-    points += [
-        f"| {name} | {results[key]['delta']:.2f} | {results[key]['t']:.2f} |"
-        for name, key in laws.items()
-    ]
-    samples = ["| points | δ | largest change | of eigenvalues 1 to 10 |", "|---|---|---|---|"]
-    for n, row in results["samples"].items():
-        samples.append(f"| {n} | {row['delta']:.3f} | {row['change']:.2f} | {row['lowest']:.2f} |")
-    surfaces = [
-        "| operator | by number: power of δ | of t | as sets: power of δ | of t | constant | relative, most |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for name, row in results["surfaces"].items():
-        *powers, constant, most = row.values()
-        told = f"{constant:.1e} (theorem {list(row)[4].split()[-1]})"
-        surfaces.append(
-            f"| {name} | " + " | ".join(f"{x:.2f}" for x in powers) + f" | {told} | {most:.3f} |"
-        )
-    return {
-        name: "\n".join(rows)
-        for name, rows in (("points", points), ("samples", samples), ("surfaces", surfaces))
-    }
-
-
 def main() -> None:
     """Measure, print, draw."""
     arguments = parse_arguments(__doc__, HERE)

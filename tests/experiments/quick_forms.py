@@ -2,8 +2,6 @@
 
 import numpy as np
 
-CELL = "{mean:.4f} ({least:.4f} to {most:.4f})"
-
 # Figures are printed with four digits. They come from continuous functions of shapes, which another
 # CPU gets wrong by some 1e-12, so that at most the last digit turns over: by one in a thousand.
 LAST_DIGIT = 1e-3
@@ -38,18 +36,6 @@ def flat(value, path=""):
         items = value.items() if isinstance(value, dict) else enumerate(value)
         return {name: x for key, item in items for name, x in flat(item, f"{path}/{key}").items()}
     return {path: value}
-
-
-def change_rows(samples):
-    """Return the README's row of each variant: mean, least and most of the largest change, a column a run."""
-    names = dict.fromkeys(name for run in samples.values() for name in run)
-    for name in names:
-        rows = [run.get(name) for run in samples.values()]
-        yield (
-            f"| {name} | "
-            + " | ".join(CELL.format(**row["largest"]) if row else "" for row in rows)
-            + " |"
-        )
 
 
 def largest(rows, part="mean"):

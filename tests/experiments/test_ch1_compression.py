@@ -17,19 +17,6 @@ def test_at_equal_error_coordinates_are_smaller_than_gzip_s_on_three_classics():
         assert row["all, of gzip's coordinates"] < 1, name
 
 
-def test_the_readme_shows_the_ratios():
-    for name, row in FULL["at equal error"].items():
-        assert (
-            f"| {name} | " + " | ".join(f"{value:.2f}" for value in row.values()) + " |" in README
-        )
-
-
-def test_the_readme_shows_sizes_at_12_bits():
-    for name, found in FULL["curves"].items():
-        sizes = [rows["12 bits"][0] for rows in found.values()]
-        assert f"| {name} | " + " | ".join(f"{size:.1f}" for size in sizes) + " |" in README
-
-
 @pytest.mark.long
 def test_a_bumpy_sphere_is_smaller_than_gzip_s(quick_form):
     found = quick_form("ch1_compression/run.py")["at equal error"]["bumpy sphere"]

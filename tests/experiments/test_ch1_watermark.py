@@ -29,10 +29,7 @@ def test_wrong_keys_are_not_found():
     assert wrong["found"] == 0
 
 
-def test_the_readme_shows_the_attacks():
-    for attack, row in FULL["attacks"].items():
-        found, lowest, mean, exponent = row.values()
-        assert f"| {attack} | {found} | {lowest:.2f} | {mean:.2f} | {exponent:.0f} |" in README
+def test_the_text_says_what_wrong_keys_find():
     wrong = FULL["wrong keys"]
     assert f"{wrong['below 1e-3']} have a probability below 0.001" in README
     assert f"highest score is {wrong['highest score']:.2f}" in README

@@ -10,24 +10,6 @@ FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
 README = (FOLDER / "README.md").read_text()
 
 
-def test_the_readme_shows_the_expected_figures():
-    for kind, rows in FULL["errors"].items():
-        for n, row in rows.items():
-            cells = " | ".join(f"{value:.4f}" for value in row.values())
-            assert f"| {kind} | {n} | {cells} |" in README
-    for kind, row in FULL["rates"].items():
-        assert f"| {kind} | " + " | ".join(f"{value:.3f}" for value in row.values()) in README
-    for kind, rows in FULL["factors"].items():
-        for n, row in rows.items():
-            shown = next(
-                line
-                for line in README.splitlines()
-                if f"| {kind} | {n} | " in line and line.count("|") == 8
-            )
-            cells = [float(cell) for cell in shown.split("|")[3:-1]]
-            assert cells == pytest.approx(list(row.values()), abs=6e-4)
-
-
 def test_only_the_pointwise_rule_and_the_theorem_converge():
     for kind, row in FULL["rates"].items():
         default, pointwise, theorem, cotangent = row.values()

@@ -24,12 +24,11 @@ def census(monkeypatch):
 
 
 def total(result, solver, what):
-    return sum(row[what] for row in result["table"][solver].values())
+    return result["table"][solver]["all"][what]
 
 
-def test_the_readme_shows_the_census(census):
+def test_the_readme_says_how_many_solves_there_are():
     text = (FOLDER / "README.md").read_text()
-    assert census["markdown"](FULL) in text
     solves = total(FULL, "eigenshape", "solves")
     assert f"{solves:,} solves of {FULL['operators']} operators" in " ".join(text.split())
 

@@ -11,9 +11,7 @@ FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
 README = (FOLDER / "README.md").read_text()
 
 
-def test_the_readme_shows_the_expected_figures():
-    for n, row in FULL["steps"].items():
-        assert f"| {n} | " + " | ".join(f"{value:.4f}" for value in row.values()) + " |" in README
+def test_the_text_says_the_expected_figures():
     assert f"{FULL['exchanges']} times" in README
     for name, change in FULL["largest change on the way"].items():
         assert f"{100 * change:.0f} % ({name})" in README

@@ -15,18 +15,6 @@ README = (FOLDER / "README.md").read_text()
 OTHER = runpy.run_path(str(FOLDER / "meshes.py"))
 
 
-def test_the_readme_shows_the_expected_figures():
-    for name, row in FULL["errors"].items():
-        cells = (f"{median:.4f} / {worst:.4f}" for median, worst in row.values())
-        assert f"| {name} | " + " | ".join(cells) + " |" in README
-    for name, row in FULL["meshes"].items():
-        numbers = f"{row['n']} | {row['edge / e']:.3f} | {row['area']:.3f} | {row['volume']:.3f}"
-        assert (
-            f"| {name} | {numbers} | {row['longest / shortest edge']:.1f} | {row['crossings']} |"
-            in README
-        )
-
-
 @pytest.mark.long
 @pytest.mark.data
 def test_density_does_no_harm_and_only_the_random_walk_form_bears_much_noise(quick_form):

@@ -14,34 +14,11 @@ README = (FOLDER / "README.md").read_text()
 KINDS = ("poses of one shape", "other individuals", "other species")
 
 
-def test_the_readme_shows_the_cats():
-    for name, row in FULL["differences"].items():
-        assert (
-            f"| {name} | " + " | ".join(f"{value:.4f}" for value in row.values()) + " |" in README
-        )
-
-
-def test_the_readme_shows_the_families():
-    for name, row in FULL["families"].items():
-        shown = f"{row['mean']:.4f} | {row['worst pair']:.4f} | {row['nearest']} | {row['its mean']:.4f}"
-        assert f"| {name} | {shown} | {row['ratio']:.2f} |" in README
+def test_the_text_says_how_families_are_separated():
     separation = FULL["separation"]
-    for name in KINDS:
-        number, *values = separation[name].values()
-        assert (
-            f"| {name} | {number} | " + " | ".join(f"{value:.4f}" for value in values) + " |"
-            in README
-        )
     assert f"threshold of {separation['threshold']:.4f}" in README
     assert f"{100 * separation['right']:.2f} %" in README
     assert f"{separation['AUC, individuals']:.4f}" in README
-
-
-def test_the_readme_shows_the_kernels():
-    for name, row in FULL["kernels"].items():
-        assert (
-            f"| {name} | " + " | ".join(f"{value:.4f}" for value in row.values()) + " |" in README
-        )
 
 
 @pytest.mark.long

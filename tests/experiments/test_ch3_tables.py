@@ -1,18 +1,11 @@
-"""The accuracy table: the README shows the folder's figures, and orders of the quick form are those of theory."""
+"""The accuracy table: orders of the quick form are those of theory."""
 
-import json
 import runpy
 from pathlib import Path
 
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_accuracy"
-FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
-
-
-def test_the_readme_shows_the_accuracy_table():
-    markdown = runpy.run_path(str(FOLDER / "run.py"))["markdown"]
-    assert markdown(FULL) in (FOLDER / "README.md").read_text()
 
 
 def test_no_more_eigenvalues_are_asked_for_than_a_small_solid_has():

@@ -1,7 +1,6 @@
 """Bounds beside what is measured: what the README shows and claims."""
 
 import json
-import runpy
 from pathlib import Path
 
 import pytest
@@ -11,11 +10,7 @@ FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
 README = (FOLDER / "README.md").read_text()
 
 
-def test_the_readme_shows_the_expected_figures(monkeypatch):
-    monkeypatch.syspath_prepend(FOLDER.parent)
-    monkeypatch.syspath_prepend(FOLDER)
-    for table in runpy.run_path(str(FOLDER / "run.py"))["markdown"](FULL).values():
-        assert table in README
+def test_the_text_says_the_expected_figures():
     assert (
         f"{100 * FULL['largest share of our bound for dense samples']:.0f} % of it is used"
         in README

@@ -9,13 +9,8 @@ FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch5_repeatabilit
 FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
 
 
-def test_the_readme_shows_the_expected_figures():
+def test_the_text_says_how_maps_agree():
     text = (FOLDER / "README.md").read_text()
-    for what in ("made", "real"):
-        for name, row in FULL[what].items():
-            assert (
-                f"| {name} | " + " | ".join(f"{value:.1f}" for value in row.values()) + " |" in text
-            )
     for kind, row in FULL["maps"].items():
         assert f"{kind} {100 * row['median']:.1f} % and {100 * row['within 5 %']:.0f} %" in text
 

@@ -17,7 +17,6 @@ import describing  # noqa: E402
 import draws  # noqa: E402
 import run  # noqa: E402
 import scores  # noqa: E402
-import tables  # noqa: E402
 
 
 class Size:
@@ -206,16 +205,6 @@ def test_a_method_may_learn(made, monkeypatch):
         monkeypatch.setattr(run, "make", None)  # what was learnt is kept
     size = Size()
     assert run.ready(size, [shape(0)], made) is size
-
-
-def test_the_readme_shows_the_expected_figures():
-    text = (FOLDER / "README.md").read_text()
-    for protocol in tables.PROTOCOLS:
-        for variant in ("", ", four-legged as one"):
-            for line in tables.table(FULL[protocol + variant]).splitlines()[2:]:
-                assert line in text
-    for line in tables.thesis_table().splitlines():
-        assert line in text
 
 
 @pytest.mark.long

@@ -85,9 +85,3 @@ def test_queries_are_described_as_they_are_or_as_the_method_takes_them():
     outward = es.describe(BALL, method.recipe)
     assert np.array_equal(asking[1].codes, outward.codes)
     assert not np.array_equal(asking[0].codes[0], outward.codes[0])
-
-
-def test_the_readme_shows_the_expected_figures():
-    text = (FOLDER / "README.md").read_text()
-    for line in robustness.table(FULL["rates"]).splitlines():
-        assert line in text

@@ -10,30 +10,7 @@ EXPECTED = json.loads((FOLDER / "expected.json").read_text())
 FULL, OTHER = EXPECTED["full"], EXPECTED["other scenes"]
 
 
-def test_the_readme_shows_the_expected_figures():
-    text = (FOLDER / "README.md").read_text()
-    methods = ("graded", "uncrossed", "thesis", "ARAP", "ARAP (libigl)", "biharmonic", "spectral")
-    for scene, row in FULL.items():
-        assert (
-            f"| {scene} | " + " | ".join(f"{row[m]['edges']:.4f}" for m in methods) + " |" in text
-        )
-        assert (
-            f"| {scene} | " + " | ".join(f"{row[m]['of the box']:.5f}" for m in methods) + " |"
-            in text
-        )
-        cells = [
-            f"{row[m]['least area']:.2f}; {row[m]['flipped']}; {row[m]['crossing']:,}"
-            for m in methods
-        ]
-        assert f"| {scene} | " + " | ".join(cells) + " |" in text
-
-
-def test_the_readme_shows_the_other_scenes_and_what_it_claims_of_them():
-    text = (FOLDER / "README.md").read_text()
-    for scene, row in OTHER.items():
-        errors, ratios = list(row.values())[:4], list(row.values())[4:]
-        cells = [f"{value:.4f}" for value in errors] + [f"{value:.2f}" for value in ratios]
-        assert f"| {scene} | " + " | ".join(cells) + " |" in text
+def test_other_scenes_change_edges_as_little_as_arap_does():
     assert max(row["over ARAP, same held"] for row in OTHER.values()) < 1.015
 
 

@@ -11,18 +11,6 @@ FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
 KEYS = ("commonest", "right", "best of parts", "best of finer parts", "known")
 
 
-def test_the_readme_shows_the_expected_figures():
-    text = (FOLDER / "README.md").read_text()
-    for way in ("one", "all"):
-        means = FULL[way]["mean over classes"]
-        cells = " | ".join(f"{100 * means[key]:.1f}" for key in KEYS)
-        assert f"{cells} |" in text, way
-    for cls, row in FULL["one"]["by class"].items():
-        several = FULL["all"]["by class"][cls]
-        cells = [row["commonest"], row["right"], several["right"], row["known"]]
-        assert f"| {cls} | " + " | ".join(f"{100 * cell:.0f}" for cell in cells) + " |" in text
-
-
 def test_the_docs_give_the_same_figures():
     one, several = (100 * FULL[way]["mean over classes"]["right"] for way in ("one", "all"))
     text = (ROOT / "docs" / "parts.md").read_text()

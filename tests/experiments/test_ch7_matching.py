@@ -10,32 +10,6 @@ EXPECTED = json.loads((FOLDER / "expected.json").read_text())
 FULL, FURTHER, CALIBRATED = EXPECTED["full"], EXPECTED["further"], EXPECTED["calibrate"]
 
 
-def test_the_readme_shows_the_expected_figures():
-    text = (FOLDER / "README.md").read_text()
-    for group in ("lion", "rigid", "tuning"):
-        for kind, row in FULL[group]["match_shapes"].items():
-            today = FULL[group]["nearest pair of match_patches"][kind]["mean"]
-            numbers = f"{row['mean']:.1f} | {row['median']:.1f} | {row['under 5']:.2f}"
-            line = f"| {group} | {kind} | {numbers} | {row['over 20']:.2f} | {today:.1f} |"
-            better = row.get("mean of the better mirror image")
-            line += " – |" if better is None else f" {better:.1f} |"
-            assert line in text, line
-    for kind, row in FURTHER["lion"].items():
-        numbers = f"{row['mean']:.1f} | {row['median']:.1f} | {row['under 5']:.2f}"
-        assert f"| {kind} | {numbers} | {row['over 20']:.2f} |" in text, kind
-    for cls, row in FURTHER["individuals"].items():
-        line = f"| {cls} | {row['wholes']:.2f} | {row['cuts']:.2f} | {row['usual']:.2f} |"
-        assert line in text, line
-    for group, row in CALIBRATED["groups"].items():
-        line = f"| {group} | {row['right']:.2f} |"
-        for way in ("confidence", "left out", "former"):
-            score = row.get(way)
-            line += f" {score['Brier']:.2f} |" if score else " – |"
-        assert line in text, line
-    means = " | ".join(f"{mean:.1f}" for mean in CALIBRATED["mean errors"].values())
-    assert f"| maps of `match_shapes` | {means} |" in text
-
-
 @pytest.mark.long
 @pytest.mark.data
 def test_two_parts_of_lions_are_placed(quick_form):
