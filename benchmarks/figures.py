@@ -29,16 +29,16 @@ PAGES = [
 ]
 MEASURED = re.compile(r"<!-- figures: (\w+) -->\n(.*?)<!-- end -->\n", re.DOTALL)
 # A table of an experiment: the file and a path in it, the key of each row, and the cells with paths below it.
-FILLED = re.compile(r"(<!-- figures: (\S+\.json.*)\n(.*)\n(.*) -->\n\n?)((?:\|.*\n)+)")
-PLACE = re.compile(r"\{(.*?)(?::([+,]*(?:\.\d[efg%])?))?\}")
+FILLED = re.compile(r"( *<!-- figures: (\S+\.json.*)\n *(.*)\n *(.*) -->\n)((?: *\|.*\n)+)")
+PLACE = re.compile(r"\{(.*?)(?::([z+,]*(?:\.\d[efg%])?))?\}")
 # Why a table with numbers may have no file of figures: its comment, `<!-- no figures: WHY -->`, says one of these.
 NO_FIGURES = {
     "numbers are names, sections or parameters",
     "values printed in the thesis",
     "exact values",
 }
-COMMENTED = re.compile(r"<!-- no figures: (.*) -->\n\n?\Z")
-TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
+COMMENTED = re.compile(r"<!-- no figures: (.*) -->\n\Z")
+TABLE = re.compile(r"(?:^ *\|.*\n){3,}", re.MULTILINE)
 NOT_NUMBERS = re.compile(r"`[^`]*`|\]\([^)]*\)")
 NUMBER = re.compile(r"(?<![\w.^])\d")
 
@@ -63,6 +63,7 @@ FIGURES = {
     "threads": Figure("bench_threads.py", ("_threads.py", "sparse", "spectral/solver")),
     "search": Figure("bench_search.py --queries 20 --qdrant 0", ("retrieval/search",)),
     "retrieval": Figure("bench_retrieval.py --repeats 1", DESCRIBING),
+    "calls": Figure("bench_calls.py", ("operators", "matching", "spectral")),
     "kernel": Figure("bench_kernel.py --repeats 1", ("operators",)),
     "deform": Figure("bench_deform.py --repeats 1", ("deformation",)),
     "transport": Figure("bench_transport.py --repeats 1", ("calculus", "geometry")),
@@ -142,15 +143,20 @@ def filled(folder: Path, root: str, keys: str, cells: str, rows: str) -> str:
     file, *path = root.split(">")
     results = look_up(json.loads((folder / file).read_text(encoding="utf-8")), path)
     head, line, *old = rows.splitlines()
-    lines = [head, line]
+    lines, margin = [head, line], line[: line.index("|")]
     for key, row in zip(keys.split(" | "), old, strict=True):
-        kept = [cell.strip() for cell in row.strip("|").split("|")]
+        kept = split_row(row)
         fresh = [
             cell if template == "=" else fill(template, key, results, cell)
             for template, cell in zip(cells.split(" | "), kept, strict=True)
         ]
-        lines.append(f"| {' | '.join(fresh)} |")
+        lines.append(f"{margin}| {' | '.join(fresh)} |")
     return "\n".join(lines) + "\n"
+
+
+def split_row(row: str) -> list[str]:
+    """Return the cells of a row."""
+    return [cell.strip() for cell in row.strip()[1:-1].split("|")]
 
 
 def fill(template: str, key: str, results: Any, cell: str) -> str:
@@ -194,6 +200,12 @@ def complaints(page: Path) -> list[str]:
         for number, (line, fresh) in enumerate(zip(text.splitlines(), anew, strict=False), 1)
         if line != fresh
     ][:3]
+    for _, _, _, cells, rows in FILLED.findall(text):
+        heads, _, *table_rows = map(split_row, rows.splitlines())
+        for place, (head, template) in enumerate(zip(heads, cells.split(" | "), strict=True)):
+            kept = place > 0 and template == "=" and "printed" not in head  # printed in the thesis
+            if kept and any(re.match(r"[-+]?\d", row[place]) for row in table_rows):
+                found.append(f"{name}: numbers without a source in the column {head}")
     rest = FILLED.sub("\n", MEASURED.sub("\n", text))
     for each in TABLE.finditer(rest):
         head, _, *rows = each[0].splitlines()

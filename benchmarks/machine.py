@@ -5,6 +5,7 @@ import platform
 import re
 import resource
 import subprocess
+import sys
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -30,6 +31,15 @@ def describe(packages: list[str]) -> dict[str, object]:
         "blas": sorted({f"{pool['internal_api']} {pool['version']}" for pool in threadpool_info()}),
         "versions": {package: _version(package) for package in packages},
     }
+
+
+def command(output: str) -> str:
+    """Return the command that runs, without the option that says where it writes."""
+    program, *words = sys.argv
+    if output in words:
+        place = words.index(output)
+        del words[place : place + 2]
+    return " ".join(["python", Path(program).resolve().relative_to(ROOT).as_posix(), *words])
 
 
 def commit() -> str:

@@ -5,12 +5,11 @@ import datetime
 import json
 import multiprocessing
 import os
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from machine import commit, describe
+from machine import command, commit, describe
 
 TIE = 1.4
 THREADS = (
@@ -81,12 +80,8 @@ def new_figures(
     packages: list[str], columns: Sequence[str], threads: str, **settings: object
 ) -> dict[str, Any]:
     """Return figures without rows yet: the command, the day, the commit, the machine and the settings."""
-    program, *words = sys.argv
-    if "--json" in words:
-        place = words.index("--json")
-        del words[place : place + 2]
     return {
-        "command": " ".join(["python", f"benchmarks/{Path(program).name}", *words]),
+        "command": command("--json"),
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "commit": commit(),
         "machine": describe(packages) | {"threads": threads},

@@ -1,10 +1,17 @@
-"""Where experiments write, checked before their work begins, and figures as JSON."""
+"""Where experiments write, checked before their work begins, and figures as JSON, with where they come from."""
 
 import argparse
+import datetime
 import json
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+from machine import command, commit, describe  # noqa: E402
 
 
 def output_folder(text: str) -> Path:
@@ -30,13 +37,24 @@ def output_file(text: str) -> Path:
     return path
 
 
-def save_figures(results: object, path: Path | None) -> None:
-    """Write figures as JSON, where there is a path."""
+def save_figures(results: Mapping[str, Any], path: Path | None) -> None:
+    """Write figures as JSON, where there is a path, with the run that they come from: its `"source"`."""
     if path:
-        path.write_text(json.dumps(results, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        figures = {"source": source(), **results}
+        path.write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def give_out(results: object, path: Path | None) -> None:
+def source() -> dict[str, Any]:
+    """Return the command, the day, the commit and the machine of this run."""
+    return {
+        "command": command("--out"),
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "commit": commit(),
+        "machine": describe(["eigenshape", "numpy", "scipy", "numba"]),
+    }
+
+
+def give_out(results: Mapping[str, Any], path: Path | None) -> None:
     """Print figures as JSON, and write them where there is a path."""
     sys.stdout.write(json.dumps(results, indent=2) + "\n")
     save_figures(results, path)

@@ -29,6 +29,8 @@ def quick_form(tmp_path_factory, worker_id):
                     command, cwd=folder, capture_output=True, text=True, check=False
                 )
                 assert done.returncode == 0, done.stderr[-3000:]
-        return json.loads(out.read_text(encoding="utf-8"))
+        figures = json.loads(out.read_text(encoding="utf-8"))
+        assert figures.pop("source")["command"].startswith(f"python experiments/{script} --quick")
+        return figures
 
     return run
