@@ -11,7 +11,7 @@ from typing import Any
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
-from machine import command, commit, describe  # noqa: E402
+from machine import command, commit, describe
 
 
 def output_folder(text: str) -> Path:

@@ -128,6 +128,25 @@ def signed_distances(*, quick: bool) -> dict[str, Any]:
     return found
 
 
+def logarithms(*, quick: bool) -> dict[str, Any]:
+    """Return the largest error of logarithmic maps on the unit sphere, within 1.5 of the source."""
+    found = {}
+    for level in (2,) if quick else (2, 3, 4, 5):
+        ball = es.icosphere(level)
+        source, frame = ball.vertices[0], es.operators.tangent_frames(ball)[0]
+        angles = np.arccos(np.clip(ball.vertices @ source, -1, 1))
+        tangents = ball.vertices - np.outer(np.cos(angles), source)
+        tangents[1:] *= (angles / np.linalg.norm(tangents, axis=1).clip(1e-300))[1:, None]
+        exact, near = tangents @ frame.T, angles < 1.5
+        found[str(ball.n_vertices)] = {
+            method: np.linalg.norm(
+                es.calculus.logarithmic_map(ball, 0, method=method) - exact, axis=1
+            )[near].max()
+            for method in ("affine", "adaptive", "radial")
+        }
+    return found
+
+
 def trace(*, quick: bool) -> dict[str, Any]:
     """Return relative errors of Z(1) of the sphere by quadratic elements, and after Romberg's steps."""
     levels = (2, 3) if quick else (2, 3, 4)
@@ -262,6 +281,7 @@ PARTS: dict[str, Callable[..., dict[str, Any]]] = {
     "curvature": curvature,
     "distances": distances,
     "signed distances": signed_distances,
+    "logarithms": logarithms,
     "trace": trace,
     "exact geometry": exact_geometry,
     "mesh geometry": mesh_geometry,
