@@ -40,6 +40,8 @@ def main() -> int:
                 failed.append(name)
     print("== readability, for looking and not for enforcing", flush=True)
     subprocess.run([sys.executable, "tests/house/readability.py"], check=True)
+    print("== figures that are older than what they time, for looking", flush=True)
+    subprocess.run([sys.executable, "benchmarks/figures.py", "--stale"], check=True)
     print(f"failed: {', '.join(failed)}" if failed else f"passed: {', '.join(checks)}")
     return 1 if failed else 0
 

@@ -250,10 +250,12 @@ def stale() -> list[str]:
         figures = json.loads(path.read_text(encoding="utf-8"))
         since = f"{figures['commit'].split()[0]}..HEAD"
         command = ["git", "log", "--format=%h", since, "--", *figures["times"]]
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-        if done.returncode:
+        try:
+            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+        except (OSError, subprocess.CalledProcessError):
             found.append(f"{path.stem}: age not known, since commit {since[:-6]} is not here")
-        elif commits := done.stdout.split():
+            continue
+        if commits := done.stdout.split():
             found.append(
                 f"{path.stem}, of {figures['date']}, is older than what it times: "
                 f"{len(commits)} commits since {since[:-6]} in {', '.join(figures['times'])}"

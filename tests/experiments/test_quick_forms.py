@@ -9,6 +9,7 @@ from quick_forms import require_expected
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
 SCRIPTS = sorted(path.parent.name + "/run.py" for path in EXPERIMENTS.glob("ch*/run.py"))
 FIGURES = {script: script.replace("run.py", "expected.json") for script in SCRIPTS}
+FIGURES["docs_errors/run.py"] = "docs_errors/expected.json"
 FIGURES["ch3_poses/figure_3_4.py"] = "ch3_poses/expected_figure_3_4.json"
 FIGURES["ch5_retrieval/robustness.py"] = "ch5_retrieval/expected_robustness.json"
 FIGURES["ch5_retrieval/frames.py"] = "ch5_retrieval/expected_frames.json"
@@ -29,6 +30,7 @@ MADE_UP = (  # what needs no real shapes
     "ch4_perturbation/run.py",
     "ch5_repeatability/run.py",
     "ch6_deformation/run.py",
+    "docs_errors/run.py",
 )
 # Figures that count things, of which a near tie may turn one: by how much one more moves a figure.
 ONE_MORE = {

@@ -21,7 +21,7 @@ def test_tables_are_those_of_their_files(page):
 @pytest.mark.parametrize(
     "path", sorted(FIGURES["FOLDER"].glob("*.json")), ids=lambda path: path.stem
 )
-def test_each_file_says_how_it_was_measured(path):
+def test_each_run_says_how_it_was_measured(path):
     figures = json.loads(path.read_text(encoding="utf-8"))
     assert path.stem in FIGURES["FIGURES"]
     assert {"command", "date", "commit", "machine", "times", "rows"} <= figures.keys()
@@ -29,6 +29,18 @@ def test_each_file_says_how_it_was_measured(path):
     assert all((ROOT / place).exists() for place in figures["times"])
     labels = [tuple(row[:2]) for row in figures["table"]]
     assert len(set(labels)) == len(labels) == len(figures["rows"]), "rows of two runs"
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted((ROOT / "experiments").glob("*/expected*.json")),
+    ids=lambda path: path.parent.name,
+)
+def test_each_experiment_says_how_it_was_run(path):
+    source = json.loads(path.read_text(encoding="utf-8"))["source"]
+    # of files older than November 2026 the machine is not known
+    assert source.keys() == {"command", "date", "commit", "machine"}
+    assert source["command"].startswith(f"python experiments/{path.parent.name}/")
 
 
 @pytest.fixture
@@ -47,7 +59,7 @@ def a_page(tmp_path, monkeypatch):
 def test_a_number_without_a_source_is_refused(a_page):
     assert a_page(TABLE) == ["page.md: numbers without a source in the table | shape | CPU s |"]
     assert a_page(TABLE.replace("0.12", "quick, by `es.solve_spectrum(laplacian, 20)`")) == []
-    assert a_page("<!-- no figures: exact values -->\n\n" + TABLE) == []
+    assert a_page("<!-- no figures: exact values -->\n" + TABLE) == []
     (refused,) = a_page("<!-- no figures: everybody knows -->\n" + TABLE)
     assert "'everybody knows' is no reason" in refused
 
@@ -70,7 +82,7 @@ def test_a_table_that_its_file_does_not_write_is_refused(a_page, tmp_path):
         "table": [["sphere", "0.12"]],
     }
     (tmp_path / "x.json").write_text(json.dumps(figures))
-    page = FIGURES["written"]("before\n<!-- figures: x -->\nold\n<!-- end -->\nafter\n")
+    page = FIGURES["written"]("before\n<!-- figures: x -->\nold\n<!-- end -->\nafter\n", tmp_path)
     assert page.startswith(
         "before\n<!-- figures: x -->\n\nMeasured 2026-11-25 by `python benchmarks/bench_x.py`"
     )
@@ -79,11 +91,35 @@ def test_a_table_that_its_file_does_not_write_is_refused(a_page, tmp_path):
     )
     assert a_page(page) == []
     (refused,) = a_page(page.replace("0.12", "0.11"))
-    assert "the table of x differs from its file" in refused
+    assert "'| sphere | 0.11 |' is '| sphere | 0.12 |' in its file" in refused
     (tmp_path / "x.json").unlink()
-    (refused,) = a_page(page)
-    assert "differs" in refused
-    assert "Not measured since" in FIGURES["written"](page)
+    assert "Not measured since" in FIGURES["written"](page, tmp_path)
+    assert a_page(page)
+
+
+def test_numbers_of_an_experiment_are_those_at_their_paths(a_page, tmp_path):
+    results = {"full": {"cut: 1": {"cat": [0.127, 1234]}, "hole": {"cat": [None, "≤ 1e-9"]}}}
+    (tmp_path / "found.json").write_text(json.dumps(results))
+    comment = (
+        "<!-- figures: found.json>full\ncut: 1>cat | hole>cat\n= | {*>*>0:.1%} % | {1:,} -->\n"
+    )
+    head = "| part | share | points |\n|---|---|---|\n"
+    page = comment + head + "| a cut | 12.7 % | 1,234 |\n| a hole | none | ≤ 1e-9 |\n"
+    assert a_page(page) == []
+    assert "'| a cut | 12.7 % | 1,234 |'" in a_page(page.replace("12.7", "12.6"))[0]
+    # what has no number keeps its words, and no number
+    assert "| a hole |  |" in FIGURES["written"](page.replace("none", "8 %"), tmp_path)
+    (refused,) = a_page(page.replace("{1:,}", "="))
+    assert refused == "page.md: numbers without a source in the column points"
+
+
+def test_every_benchmark_that_is_listed_is_shown():
+    shown = {
+        name
+        for page in FIGURES["PAGES"]
+        for name, _ in FIGURES["MEASURED"].findall(page.read_text())
+    }
+    assert shown == FIGURES["FIGURES"].keys()
 
 
 def test_ages_of_figures_are_told_without_a_history_too():
