@@ -16,6 +16,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -226,7 +227,9 @@ def run(name: str) -> None:
     print(f"== {name}: {figure.command}", flush=True)
     FOLDER.mkdir(exist_ok=True)
     command = [sys.executable, str(FOLDER.parent / script), *options, "--json", str(part)]
+    start = time.perf_counter()
     subprocess.run(command, cwd=ROOT, check=True)
+    print(f"== {name}: {time.perf_counter() - start:.0f} s", flush=True)
     times = [os.path.normpath(SOURCE + path) for path in figure.times]
     first = f'{{\n "times": {json.dumps(times)},\n'
     text = part.read_text(encoding="utf-8").replace("{\n", first, 1)
