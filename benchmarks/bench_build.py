@@ -3,7 +3,7 @@
     python benchmarks/bench_build.py --quick                         half a minute
     python benchmarks/bench_build.py --only workers                  of bad, workers, parts and readers
 
-**bad** indexes 1,000 meshes of 60 to 160 vertices by the command line. A hundred of them are bad: 97 are corrupt in
+**bad** indexes 500 meshes of 60 to 160 vertices by the command line. A hundred of them are bad: 97 are corrupt in
 one of ten ways, one kills the process that reads it, one hangs, and one eats memory. **workers** describes creatures of
 3,000 vertices by patches with one worker and with two. CPU is that of all processes. **parts** indexes the meshes of
 each of 64 parts, merges them, and compares what is found, with all scores, to an index that was built at
@@ -42,15 +42,15 @@ PAIR = ("left", "right")  # shapes that the writer replaces together
 class Sizes:
     """How much of everything."""
 
-    n_files: int = 1_000
+    n_files: int = 500
     n_corrupt: int = 97
     timeout: int = 60  # seconds after which a file that hangs is given up
-    n_creatures: int = 40
+    n_creatures: int = 20
     n_creature_vertices: int = 3000
     n_parts: int = 64
-    n_shapes_of_parts: int = 640
+    n_shapes_of_parts: int = 320
     n_processes: int = 4
-    seconds: float = 30.0
+    seconds: float = 20.0
 
 
 QUICK = Sizes(60, 20, 10, 4, 500, 2, 24, 1, 5.0)
@@ -100,7 +100,7 @@ def cpu_of_children() -> float:
 
 
 def index_bad_files(folder: Path, sizes: Sizes) -> list[Figure]:
-    """Index a folder of which one file in a hundred is corrupt or misbehaves."""
+    """Index a folder of which some files are corrupt or misbehave."""
     (folder / "meshes").mkdir()
     n_good = sizes.n_files - sizes.n_corrupt - 3
     good, bad = [f"good{number:05}" for number in range(n_good)], []

@@ -1,9 +1,9 @@
 """Seconds to describe a shape, and to find its like among 300, by several methods (thesis table 5.3).
 
-    python benchmarks/bench_retrieval.py                       4,800 to 1.5 million vertices; a quarter of an hour
+    python benchmarks/bench_retrieval.py                       4,800 to a million vertices; some minutes
     python benchmarks/bench_retrieval.py --quick               2,500 vertices, 30 shapes
 
-Creatures stand for the thesis' models, with as many vertices, split for the two large ones. EVD and LFD are ours too.
+Creatures stand for the thesis' models, with as many vertices, split for the large one. EVD and LFD are ours too.
 Each call has a process of its own, after a small one that loads and compiles. The last row of a method is one query
 by a described scan among 300 shapes: patches and heat ask an index, with six and four views of each shape; patches
 score all, verify thirty, and find correspondences with those that they return.

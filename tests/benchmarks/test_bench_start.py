@@ -1,4 +1,4 @@
-"""The benchmark of starting runs from end to end."""
+"""The benchmarks of starting, of single calls and of kernels run from end to end."""
 
 import pytest
 
@@ -12,3 +12,20 @@ def test_the_script_runs(run_quick):
         assert 0 < row["cpu"] < 60
         assert row["start"] in printed
     assert "| import eigenshape |" in page
+
+
+@pytest.mark.long
+def test_single_calls_are_timed(run_quick):
+    rows, _, page = run_quick("bench_calls.py", "--only", "brackets")
+    assert [row["call"] for row in rows] == ["20 certified pairs", "20 brackets"]
+    assert all(0 < row["cpu"] < 60 for row in rows)
+    assert "| sphere, 3,500 points, smaller | 20 certified pairs |" in page
+
+
+@pytest.mark.long
+def test_all_methods_assemble_the_same_kernel(run_quick):
+    rows, _, _ = run_quick("bench_kernel.py")
+    assert len(rows) == 3
+    for row in rows[1:]:
+        assert row["trace"] == pytest.approx(rows[0]["trace"], rel=1e-12)
+        assert row["entries"] == rows[0]["entries"]
