@@ -17,6 +17,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -230,19 +231,21 @@ def complaints(page: Path) -> list[str]:
 
 def run(name: str) -> None:
     """Measure one set of figures; a run that fails keeps those of the run before."""
-    part, figure = FOLDER / f"{name}.part", FIGURES[name]
+    figure = FIGURES[name]
     script, *options = figure.command.split()
     print(f"== {name}: {figure.command}", flush=True)
-    FOLDER.mkdir(exist_ok=True)
-    command = [sys.executable, str(FOLDER.parent / script), *options, "--json", str(part)]
     start = time.perf_counter()
-    subprocess.run(command, cwd=ROOT, check=True)
-    print(f"== {name}: {time.perf_counter() - start:.0f} s", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "figures.json"
+        command = [sys.executable, str(FOLDER.parent / script), *options, "--json", str(out)]
+        subprocess.run(command, cwd=ROOT, check=True)
+        text = out.read_text(encoding="utf-8")
     times = [os.path.normpath(SOURCE + path) for path in figure.times]
-    first = f'{{\n "times": {json.dumps(times)},\n'
-    text = part.read_text(encoding="utf-8").replace("{\n", first, 1)
-    (FOLDER / f"{name}.json").write_text(text, encoding="utf-8")
-    part.unlink()
+    FOLDER.mkdir(exist_ok=True)
+    (FOLDER / f"{name}.json").write_text(
+        text.replace("{\n", f'{{\n "times": {json.dumps(times)},\n', 1), encoding="utf-8"
+    )
+    print(f"== {name}: {time.perf_counter() - start:.0f} s", flush=True)
 
 
 def write() -> None:
