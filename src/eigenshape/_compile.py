@@ -1,8 +1,10 @@
 """Compiled loops: numba's njit, which keeps its results wherever this machine lets it."""
 
 import gc
+import hashlib
 import multiprocessing
 import os
+import pickle
 import stat
 import sys
 import tempfile
@@ -13,9 +15,23 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite
 import numba
+import numpy as np
 from numba.core import event
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserWideCacheLocator
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    UserWideCacheLocator,
+)
+
+from eigenshape._version import __version__
+
+# What must be the same for a compiled loop to be loaded. The key of a loop adds the CPU and its
+# features, and the stamp of its source adds the time and size of that file.
+MADE_BY = f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__} {__version__}"
+DIGEST_BYTES = 16
 
 _LOOPS: weakref.WeakSet[Any] = (
     weakref.WeakSet()
@@ -119,8 +135,62 @@ class _LoopCacheFiles(CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes = (*CompileResultCacheImpl._locator_classes, _PrivateFolder)
 
 
+class _CheckedFiles(IndexDataCacheFile):  # type: ignore[misc]
+    """The index and the compiled code of one loop, each behind a checksum of it and of `MADE_BY`.
+
+    numba unpickles and runs what it finds: a cut index ends in a traceback, and one flipped bit in
+    compiled code in a segmentation fault. Here a file that does not agree with its checksum counts
+    as absent, so that the loop is compiled again and the file is replaced.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep compiled code with the source and the types that it was made for.
+
+        Two processes that compile one loop for different types can give both results one name.
+        """
+        super().save(key, (self._source_stamp, key, data))
+
+    def load(self, key: Any) -> Any:
+        stamp, kept_key, data = super().load(key) or (None, None, None)
+        return data if (stamp, kept_key) == (self._source_stamp, key) else None
+
+    def _load_index(self) -> dict[Any, str]:
+        stamp, names = self._read(self._index_path) or (None, {})
+        return names if stamp == self._source_stamp else {}
+
+    def _save_index(self, names: dict[Any, str]) -> None:
+        with self._open_for_write(self._index_path) as file:
+            file.write(self._dump((self._source_stamp, names)))
+
+    def _load_data(self, name: str) -> Any:
+        return self._read(self._data_path(name))
+
+    def _dump(self, value: Any) -> bytes:
+        content = super()._dump(value)
+        return _digest(content) + content
+
+    def _read(self, path: str) -> Any:
+        """Return what was kept in a file, or None if it is missing, damaged or of other versions."""
+        try:
+            kept = Path(path).read_bytes()
+        except OSError:
+            return None
+        digest, content = kept[:DIGEST_BYTES], kept[DIGEST_BYTES:]
+        return pickle.loads(content) if digest == _digest(content) else None
+
+
+def _digest(content: bytes) -> bytes:
+    return hashlib.blake2b(MADE_BY.encode() + content, digest_size=DIGEST_BYTES).digest()
+
+
 class _LoopCache(FunctionCache):  # type: ignore[misc]
     _impl_class = _LoopCacheFiles
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file = _CheckedFiles(
+            self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp()
+        )
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep a result; on a full disk it is used all the same, and compiled again next time."""

@@ -9,9 +9,11 @@ import sys
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 from numba.core import event
 
+import eigenshape._compile
 from eigenshape._compile import make_private, njit, temporary_folder
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
@@ -168,6 +170,81 @@ def test_nothing_is_written_about_compiling_where_there_is_no_terminal(tmp_path)
     )
     assert list(tmp_path.rglob("*.nbi"))
     assert done.stderr == b""
+
+
+def double(value):
+    return 2 * value
+
+
+@pytest.fixture
+def loop_folder(tmp_path, monkeypatch):
+    """Where a loop is kept that was compiled for whole and for real numbers."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    loop = njit(double)
+    assert loop(2) == 4
+    assert loop(0.25) == 0.5
+    (folder,) = tmp_path.iterdir()
+    assert sorted(path.suffix for path in folder.iterdir()) == [".nbc", ".nbc", ".nbi"]
+    return folder
+
+
+def n_loaded():
+    """Call the loop as a new process would: return how many of its two forms came from the disk."""
+    loop = njit(double)
+    assert loop(2) == 4
+    assert loop(0.25) == 0.5
+    return sum(loop.stats.cache_hits.values())
+
+
+def flip_a_bit(content, generator):
+    place, bit = generator.integers(len(content)), generator.integers(8)
+    flipped = bytes([content[place] ^ (1 << bit)])
+    return content[:place] + flipped + content[place + 1 :]
+
+
+DAMAGES = {
+    "a flipped bit": flip_a_bit,
+    "cut": lambda content, generator: content[: generator.integers(1, len(content))],
+    "empty": lambda content, generator: b"",
+    "noise": lambda content, generator: generator.bytes(len(content)),
+    "longer": lambda content, generator: content + b"\0",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=list(DAMAGES))
+@pytest.mark.parametrize(("suffix", "n_left"), [(".nbi", 0), (".1.nbc", 1), (".2.nbc", 1)])
+def test_a_damaged_file_of_a_loop_is_compiled_again_and_replaced(
+    loop_folder, damage, suffix, n_left
+):
+    generator = np.random.default_rng(0)
+    assert n_loaded() == 2
+    (path,) = loop_folder.glob(f"*{suffix}")
+    for _ in range(3):
+        path.write_bytes(damage(path.read_bytes(), generator))
+        assert n_loaded() == n_left
+        assert n_loaded() == 2
+
+
+def test_a_loop_of_other_versions_is_compiled_again(loop_folder, monkeypatch):
+    monkeypatch.setattr(eigenshape._compile, "MADE_BY", "another numba")
+    assert n_loaded() == 0
+    assert n_loaded() == 2
+
+
+def test_code_for_other_types_is_not_run_under_a_name_that_two_processes_gave(loop_folder):
+    one, two = sorted(loop_folder.glob("*.nbc"))
+    shutil.copy(one, two)
+    assert n_loaded() == 1
+    assert n_loaded() == 2
+
+
+def test_a_file_of_a_loop_that_cannot_be_read_is_compiled_again(loop_folder):
+    (index,) = loop_folder.glob("*.nbi")
+    index.unlink()
+    index.mkdir()
+    with pytest.warns(UserWarning, match="must be kept in a folder with space left"):
+        eigenshape._compile._warn_once.cache_clear()
+        assert n_loaded() == 0
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders are closed by their owner's number")
