@@ -242,8 +242,8 @@ def test_a_file_of_a_loop_that_cannot_be_read_is_compiled_again(loop_folder):
     (index,) = loop_folder.glob("*.nbi")
     index.unlink()
     index.mkdir()
+    eigenshape._compile._warn_once.cache_clear()
     with pytest.warns(UserWarning, match="must be kept in a folder with space left"):
-        eigenshape._compile._warn_once.cache_clear()
         assert n_loaded() == 0
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Complex, Float
 
-from eigenshape._arrays import real_numbers, require_finite_rows, whole_number
+from eigenshape._arrays import real_numbers, require_finite_rows, step_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike, Integer
@@ -179,7 +179,7 @@ def map_to_sphere(
     1.0
     """
     mesh = as_mesh(mesh)
-    most = whole_number(n_steps, "n_steps", 1)
+    most = step_number(n_steps, "n_steps")
     require_sound(mesh)
     require_oriented(mesh)
     euler, (n_components, _) = euler_characteristic(mesh), vertex_components(mesh)

@@ -11,6 +11,9 @@ from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import SparseMatrix, factor_equations
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 
+# Each order multiplies the condition number by that of the operator, 1e3 to 1e6.
+MOST_ORDER = 8
+
 
 def minimize_quadratic(
     matrix: SparseMatrix,
@@ -77,7 +80,7 @@ def polyharmonic_matrix(laplacian: Laplacian, order: Integer = 2) -> sp.csr_arra
     laplacian : Laplacian
         With diagonal (lumped) mass.
     order : int
-        k, at least 1.
+        k, from 1 to 8.
 
     Returns
     -------
@@ -87,7 +90,7 @@ def polyharmonic_matrix(laplacian: Laplacian, order: Integer = 2) -> sp.csr_arra
     Raises
     ------
     InvalidParameterError
-        If k is below 1, the mass is not diagonal and k is above 1, or the operator has
+        If k is not in 1..8, the mass is not diagonal and k is above 1, or the operator has
         `correct="log"`.
 
     Examples
@@ -99,7 +102,7 @@ def polyharmonic_matrix(laplacian: Laplacian, order: Integer = 2) -> sp.csr_arra
     """
     require_type(laplacian, Laplacian, "laplacian")
     require_matrix(laplacian)
-    count = whole_number(order, "order", 1)
+    count = whole_number(order, "order", 1, MOST_ORDER, "the matrix has no accuracy left beyond")
     stiffness, mass = laplacian.stiffness, laplacian.mass
     diagonal = mass.diagonal()
     if count > 1 and mass.count_nonzero() > np.count_nonzero(diagonal):

@@ -11,8 +11,8 @@ from eigenshape._arrays import (
     point_functions,
     positive_values,
     real_numbers,
+    step_number,
     vertex_values,
-    whole_number,
 )
 from eigenshape._errors import InvalidShapeError
 from eigenshape._progress import Progress, silent
@@ -358,7 +358,7 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     Raises
     ------
     InvalidParameterError
-        If t is not positive, n_steps is below 1, an array has another length or a number is not
+        If t is not positive, n_steps is not in 1..1,000,000, an array has another length or a number is not
         finite, or a point is fixed at two values; or as in `heat_solver`.
 
     See Also
@@ -379,7 +379,7 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     [0.0, 0.25, 0.5, 0.75, 1.0]
     """
     require_type(laplacian, Laplacian, "laplacian")
-    count = whole_number(n_steps, "n_steps", 1)
+    count = step_number(n_steps, "n_steps")
     (time,) = positive_values(t, "t")
     current = point_functions(start, "start", laplacian.n_points)
     solver = heat_solver(laplacian, time / count, fixed)

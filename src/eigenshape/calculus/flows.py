@@ -3,7 +3,7 @@
 import numpy as np
 import scipy.sparse as sp
 
-from eigenshape._arrays import finite_values, positive_values, whole_number
+from eigenshape._arrays import finite_values, positive_values, step_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike, Integer
@@ -66,7 +66,7 @@ def mean_curvature_flow(
     Raises
     ------
     InvalidParameterError
-        If t is not positive, n_steps is below 1, or a fixed vertex is out of range.
+        If t is not positive, n_steps is not in 1..1,000,000, or a fixed vertex is out of range.
     InvalidShapeError
         If a face has no area or occurs twice, or a vertex has no face; or if the surface has
         collapsed at some step.
@@ -87,7 +87,7 @@ def mean_curvature_flow(
     """
     mesh = as_mesh(mesh)
     (time,) = positive_values(t, "t")
-    count = whole_number(n_steps, "n_steps", 1)
+    count = step_number(n_steps, "n_steps")
     points, scale = size_one(mesh.vertices)
     step = time / count / scale / scale
     held = require_points(boundary_vertices(mesh) if fixed is None else fixed, mesh.n_vertices)
@@ -151,7 +151,7 @@ def taubin_smooth(
     Raises
     ------
     InvalidParameterError
-        If n_steps is below 1, λ is not in 0..1, μ is not below -λ, or a fixed point is out of
+        If n_steps is not in 1..1,000,000, λ is not in 0..1, μ is not below -λ, or a fixed point is out of
         range.
 
     See Also
@@ -170,7 +170,7 @@ def taubin_smooth(
     True
     """
     mesh = as_simplicial(mesh)
-    count = whole_number(n_steps, "n_steps", 1)
+    count = step_number(n_steps, "n_steps")
     (weight,) = finite_values(shrink, "shrink")
     (back,) = finite_values(inflate, "inflate")
     if not 0 < weight <= 1 or not back < -weight:

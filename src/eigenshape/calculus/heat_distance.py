@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import positive_values, whole_numbers
+from eigenshape._arrays import ReadOnly, positive_values, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr
@@ -35,7 +35,7 @@ SOURCES_AT_ONCE = 8
 
 
 @dataclass(frozen=True, eq=False)
-class HeatGeodesics:
+class HeatGeodesics(ReadOnly):
     """A shape that is ready for geodesic distances by heat: two factors, used for all sources.
 
     `prepare_heat_geodesics` makes it. All lengths inside are divided by `scale`.

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import real_numbers, require_finite_rows
+from eigenshape._arrays import ReadOnly, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr, short_repr
@@ -35,7 +35,7 @@ SPARE_FIELDS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class HodgeDecomposition:
+class HodgeDecomposition(ReadOnly):
     """A field as the sum of three fields that are orthogonal to each other.
 
     Attributes

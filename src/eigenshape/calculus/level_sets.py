@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import finite_values, freeze, point_functions, vertex_values
+from eigenshape._arrays import ReadOnly, finite_values, freeze, point_functions, vertex_values
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -16,7 +16,7 @@ from eigenshape.geometry.simplicial import Mesh
 
 
 @dataclass(frozen=True, eq=False)
-class LevelSet:
+class LevelSet(ReadOnly):
     """The points where a piecewise linear function has a value, as segments or triangles.
 
     Attributes

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import freeze, point_functions, real_numbers, require_finite_rows
+from eigenshape._arrays import ReadOnly, freeze, point_functions, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
@@ -35,7 +35,7 @@ SparseMatrix: TypeAlias = sp.sparray | sp.spmatrix
 
 
 @dataclass(frozen=True, eq=False)
-class LinearSolver:
+class LinearSolver(ReadOnly):
     """A symmetric system A x = b on points, factored once for many right-hand sides.
 
     Some points may be fixed at values, and linear constraints C x = d may hold; then x is the

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
@@ -22,7 +22,7 @@ SAME = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
-class GeodesicPath:
+class GeodesicPath(ReadOnly):
     """A polyline on a surface.
 
     Attributes

@@ -5,7 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from eigenshape._arrays import finite_values, positive_values, real_numbers, require_finite_rows
+from eigenshape._arrays import (
+    ReadOnly,
+    finite_values,
+    positive_values,
+    real_numbers,
+    require_finite_rows,
+)
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr
@@ -28,7 +34,7 @@ from eigenshape.sparse.symmetric_factor import SymmetricFactor
 
 
 @dataclass(frozen=True, eq=False)
-class VectorHeat:
+class VectorHeat(ReadOnly):
     """A surface that is ready for transport by heat: three factors, used for all sources.
 
     `prepare_vector_heat` makes it. All lengths inside are divided by `scale`.

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import describe_value, require_type
-from eigenshape._arrays import whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -42,7 +42,7 @@ FREE_DEPTH = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Binding:
+class Binding(ReadOnly):
     """Regions of a rig that handles can move.
 
     Attributes

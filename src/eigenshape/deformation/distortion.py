@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.deformation.rigidity import edge_weights, fit_turns
@@ -16,7 +17,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 
 
 @dataclass(frozen=True, eq=False)
-class Distortion:
+class Distortion(ReadOnly):
     """Changes of edges and faces in a deformation.
 
     Attributes

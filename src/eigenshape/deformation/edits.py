@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import describe_value, require_each, require_type
-from eigenshape._arrays import whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.deformation.binding import bind
@@ -52,7 +52,7 @@ def mesh_fingerprint(mesh: TriangleMesh) -> MeshFingerprint:
 
 
 @dataclass(frozen=True, eq=False)
-class Move:
+class Move(ReadOnly):
     """A region and the handle that moves it.
 
     Parameters
@@ -85,7 +85,7 @@ class Move:
 
 
 @dataclass(frozen=True, eq=False)
-class Edit:
+class Edit(ReadOnly):
     """One edit of a shape: regions that move together, and the region that stays.
 
     Parameters

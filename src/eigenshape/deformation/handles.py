@@ -8,7 +8,7 @@ from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import finite_values, freeze
+from eigenshape._arrays import ReadOnly, finite_values, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
@@ -19,7 +19,7 @@ PARALLEL = 1e-12
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Rotation:
+class Rotation(ReadOnly):
     """A rotation about an axis through a pivot, by any angle.
 
     Parameters
@@ -90,7 +90,7 @@ class Rotation:
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Translation:
+class Translation(ReadOnly):
     """A translation by a vector.
 
     Parameters

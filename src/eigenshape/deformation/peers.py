@@ -12,7 +12,9 @@ from scipy.linalg import lu_factor, lu_solve
 from scipy.spatial.transform import Rotation
 
 from eigenshape._arguments import require_type
+from eigenshape._arrays import step_number
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import Integer
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.graded_bend import move_by_shares, quaternions
 from eigenshape.deformation.handles import Handle, require_handles
@@ -28,7 +30,7 @@ FIXED_WEIGHT = 100.0
 
 
 def as_rigid_as_possible(
-    binding: Binding, handles: Sequence[Handle], *, n_rounds: int = 100
+    binding: Binding, handles: Sequence[Handle], *, n_rounds: Integer = 100
 ) -> Points:
     """Bend as rigidly as possible, from the undeformed shape (Sorkine and Alexa 2007).
 
@@ -50,7 +52,7 @@ def as_rigid_as_possible(
     Raises
     ------
     InvalidParameterError
-        If there is not one handle for each region.
+        If there is not one handle for each region, or n_rounds is not in 1..1,000,000.
 
     Examples
     --------
@@ -67,9 +69,8 @@ def as_rigid_as_possible(
     rest = binding.rig.mesh.vertices
     start = move_by_shares(binding, handles)
     start[binding.part.free] = rest[binding.part.free]
-    return relax(
-        binding.rig.edges, binding.part, rest, start, quaternions(np.zeros_like(rest)), n_rounds
-    )
+    most, turns = step_number(n_rounds, "n_rounds"), quaternions(np.zeros_like(rest))
+    return relax(binding.rig.edges, binding.part, rest, start, turns, most)
 
 
 @one_blas_thread()
@@ -93,7 +94,7 @@ def biharmonic_blend(binding: Binding, handles: Sequence[Handle]) -> Points:
     Raises
     ------
     InvalidParameterError
-        If there is not one handle for each region.
+        If there is not one handle for each region, or n_rounds is not in 1..1,000,000.
 
     Examples
     --------
@@ -126,7 +127,7 @@ def biharmonic_blend(binding: Binding, handles: Sequence[Handle]) -> Points:
 
 @one_blas_thread()
 def spectral_rigid(
-    binding: Binding, handles: Sequence[Handle], *, n_modes: int = 100, n_rounds: int = 20
+    binding: Binding, handles: Sequence[Handle], *, n_modes: int = 100, n_rounds: Integer = 20
 ) -> Points:
     """Bend the skeleton of the lowest modes as rigidly as possible (after Rong and others 2008).
 
@@ -151,7 +152,7 @@ def spectral_rigid(
     Raises
     ------
     InvalidParameterError
-        If there is not one handle for each region.
+        If there is not one handle for each region, or n_rounds is not in 1..1,000,000.
 
     Examples
     --------
@@ -165,7 +166,7 @@ def spectral_rigid(
     """
     require_type(binding, Binding, "binding")
     require_handles(handles, len(binding.regions))
-    rig = binding.rig
+    rig, count = binding.rig, step_number(n_rounds, "n_rounds")
     modes, rest = rig.eigenvectors[:, : min(n_modes, rig.n_modes)], rig.mesh.vertices
     skeleton = eigen_skeleton(rig, modes.shape[1])
     details, fixed = rest - skeleton, np.setdiff1d(np.arange(len(rest)), binding.part.free)
@@ -177,7 +178,7 @@ def spectral_rigid(
     everyone, turns = np.arange(len(rest)), quaternions(np.zeros_like(rest))
     sums = np.empty_like(rest)
     moved = skeleton
-    for _ in range(n_rounds):
+    for _ in range(count):
         turn_edges(everyone, *links, skeleton, turns, sums)
         change = _turn(turns[fixed], details[fixed]) - details[fixed]
         right = modes.T @ sums + weight * modes[fixed].T @ (goal - change)

@@ -10,7 +10,14 @@ from scipy.spatial import cKDTree
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import describe_value
-from eigenshape._arrays import as_array, freeze, positive_values, real_numbers, whole_numbers
+from eigenshape._arrays import (
+    ReadOnly,
+    as_array,
+    freeze,
+    positive_values,
+    real_numbers,
+    whole_numbers,
+)
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
@@ -21,7 +28,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class BoxRegion:
+class BoxRegion(ReadOnly):
     """The vertices inside a box with sides parallel to the axes.
 
     Parameters
@@ -73,7 +80,7 @@ class BoxRegion:
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class BrushRegion:
+class BrushRegion(ReadOnly):
     """The vertices within a geodesic distance of the vertex nearest to a point.
 
     Parameters

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.linalg import cho_solve
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, freeze, whole_number
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
@@ -28,7 +28,7 @@ N_MODES = 300
 
 
 @dataclass(frozen=True, eq=False)
-class EigenRig:
+class EigenRig(ReadOnly):
     """A shape, its lowest modes and the matrices that deformation needs.
 
     Attributes

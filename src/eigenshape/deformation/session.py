@@ -1,7 +1,10 @@
 """A session: edits of one shape one after the other, with undo and redo."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import wraps
+from threading import RLock
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -23,13 +26,27 @@ from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, ske
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _one_at_a_time(change: F) -> F:
+    """Let each change of a session end before another thread begins the next one."""
+
+    @wraps(change)
+    def change_alone(self: "DeformationSession", *args: Any, **kwargs: Any) -> Any:
+        with self._lock:
+            return change(self, *args, **kwargs)
+
+    return cast("F", change_alone)
+
 
 class DeformationSession:
     """Edit a rigged shape step by step.
 
     `drag` starts an edit, `preview` shows it, `commit` applies it, and `undo` and `redo` restore
-    earlier and later poses exactly. A session is the one mutable object of the library; use it
-    from one thread.
+    earlier and later poses exactly. A session is the one mutable object of the library. Threads may
+    share it: changes are made one after the other, and `edits` lists them in that order. A drag and
+    its commit are two changes; `apply` makes an edit in one.
 
     Parameters
     ----------
@@ -65,11 +82,20 @@ class DeformationSession:
     def __init__(self, rig: EigenRig, *, mode: Mode = "graded") -> None:
         require_type(rig, EigenRig, "rig")
         self._mode: Mode = require_mode(mode)
+        self._lock = RLock()
         self._poses = [rig]
         self._edits: list[Edit] = []
         # Number of edits in the present pose; later edits were undone and can be redone.
         self._place = 0
         self._pending: tuple[Edit, Binding, SkeletonResponse] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        with self._lock:
+            lists = {"_poses": list(self._poses), "_edits": list(self._edits)}
+            return vars(self) | lists | {"_lock": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _lock=RLock())
 
     def __repr__(self) -> str:
         mesh, n_edits = self.mesh, self._place
@@ -154,6 +180,7 @@ class DeformationSession:
         require_handle(handle)
         return self.drag_all([Move(region, handle)], fixed=fixed, n_modes=n_modes)
 
+    @_one_at_a_time
     def drag_all(
         self,
         moves: Iterable[Move],
@@ -246,6 +273,7 @@ class DeformationSession:
         edit, binding, _ = self._require_drag()
         return move_by_shares(binding, [move.handle for move in edit.moves])
 
+    @_one_at_a_time
     def commit(self, *, mode: Mode | None = None) -> TriangleMesh:
         """Apply the present drag, and forget the edits that were undone.
 
@@ -270,6 +298,7 @@ class DeformationSession:
         self._advance(edit, pose_rig(self.rig, bent.vertices))
         return self.mesh
 
+    @_one_at_a_time
     def apply(self, edit: Edit) -> TriangleMesh:
         """Apply an edit in its own mode, and drop the present drag.
 
@@ -293,10 +322,12 @@ class DeformationSession:
         self._place += 1
         self._pending = None
 
+    @_one_at_a_time
     def cancel(self) -> None:
         """Drop the present drag, if there is one."""
         self._pending = None
 
+    @_one_at_a_time
     def undo(self) -> TriangleMesh:
         """Return to the pose before the last edit, with exactly the same vertices.
 
@@ -311,6 +342,7 @@ class DeformationSession:
         self._pending = None
         return self.mesh
 
+    @_one_at_a_time
     def redo(self) -> TriangleMesh:
         """Return to the pose after the edit that was undone last, with exactly the same vertices.
 

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
@@ -15,7 +16,7 @@ from eigenshape.deformation.rig import eigen_skeleton, project_on_modes
 
 
 @dataclass(frozen=True, eq=False)
-class SkeletonResponse:
+class SkeletonResponse(ReadOnly):
     """The eigen-skeleton, and how it responds to the motions of handles.
 
     The response is linear: each drag costs four numbers per vertex and region, so a viewer can

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
@@ -30,7 +31,7 @@ Details = Literal["blended", "frames", "handle"]
 
 
 @dataclass(frozen=True, eq=False)
-class DetailedSkeleton:
+class DetailedSkeleton(ReadOnly):
     """An eigen-skeleton that handles can move, and the details of the shape on it.
 
     Attributes

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import freeze, vertex_values
+from eigenshape._arrays import ReadOnly, freeze, vertex_values
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.loops import extended_loops
@@ -21,7 +21,7 @@ N_NEIGHBORS = 10
 
 
 @dataclass(frozen=True, eq=False)
-class PersistencePairs:
+class PersistencePairs(ReadOnly):
     """Pairs of vertices at which a class of homology begins and ends.
 
     Pairs are sorted by falling persistence, then by the vertex of birth.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_values, freeze, whole_number
+from eigenshape._arrays import ReadOnly, finite_values, freeze, whole_number
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape.features.boundaries import CONCAVITY, move_boundaries, smooth_boundaries
@@ -31,7 +31,7 @@ N_MODES = 25
 
 
 @dataclass(frozen=True, eq=False)
-class PartDecomposition:
+class PartDecomposition(ReadOnly):
     """The parts of a surface and the intermediate results of `find_parts`.
 
     Attributes

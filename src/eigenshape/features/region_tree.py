@@ -7,11 +7,12 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 
 
 @dataclass(frozen=True, eq=False)
-class RegionTree:
+class RegionTree(ReadOnly):
     """What `MergeTree` and `PartTree` have in common, and all that `segment` needs to cut either.
 
     Regions are sorted by falling persistence, so that every cut keeps the first few of them.

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
@@ -17,7 +17,7 @@ Tree = MergeTree | PartTree
 
 
 @dataclass(frozen=True, eq=False)
-class FeaturePoints:
+class FeaturePoints(ReadOnly):
     """The maxima that remain after a cut, sorted by falling persistence, then by falling height.
 
     Attributes
@@ -52,7 +52,7 @@ class FeaturePoints:
 
 
 @dataclass(frozen=True, eq=False)
-class Segmentation:
+class Segmentation(ReadOnly):
     """A partition of a surface into regions, one around each feature point.
 
     Attributes

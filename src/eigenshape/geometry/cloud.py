@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, freeze, whole_number
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike, Integer
@@ -14,7 +14,7 @@ from eigenshape.geometry.simplicial import Mesh
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class PointCloud:
+class PointCloud(ReadOnly):
     """Points in R^d that sample a manifold of dimension m.
 
     Parameters

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -100,7 +100,7 @@ def gaussian_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
 
 
 @dataclass(frozen=True, eq=False)
-class PrincipalCurvatures:
+class PrincipalCurvatures(ReadOnly):
     """The principal curvatures of a surface at its vertices, and their directions.
 
     Attributes

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, freeze
+from eigenshape._arrays import ReadOnly, finite_rows, freeze
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -17,7 +17,7 @@ Support = list[int]
 
 
 @dataclass(frozen=True, eq=False)
-class EnclosingBall:
+class EnclosingBall(ReadOnly):
     """A ball in R^d, as found by `enclosing_ball`.
 
     Attributes

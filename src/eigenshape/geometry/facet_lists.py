@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._text import html_repr, short_repr
 
 # The corners of a facet are packed into one integer while that stays below this bound: sorting
@@ -15,7 +15,7 @@ PACKED_BELOW = 2**63
 
 
 @dataclass(frozen=True, eq=False)
-class FacetTable:
+class FacetTable(ReadOnly):
     """The facets of a mesh without duplicates, and where each simplex has them.
 
     The facets of triangles are edges, those of tetrahedra are triangles, those of segments are

@@ -7,10 +7,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import positive_values, whole_numbers
+from eigenshape._arrays import positive_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidShapeError
 from eigenshape._threads import map_in_threads
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.geodesic_loops import spread_wave, spread_waves
 from eigenshape.geometry.simplices import in_length, scaled_corners
@@ -244,7 +244,7 @@ def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
 
 
 def farthest_points(
-    mesh: MeshLike, count: int, *, reach: float = np.inf
+    mesh: MeshLike, count: Integer, *, reach: float = np.inf
 ) -> tuple[Int[np.ndarray, " c"], Float[np.ndarray, "c n"], Int[np.ndarray, " n"]]:
     """Choose vertices of a surface, each as far as possible from those chosen before.
 
@@ -256,7 +256,7 @@ def farthest_points(
     mesh : MeshLike
         A surface, in any R^d.
     count : int
-        Number c of vertices to choose.
+        Number c of vertices to choose, at most n.
     reach : float
         Largest distance that is needed in `distances`, in length. A smaller reach takes less time.
 
@@ -272,6 +272,8 @@ def farthest_points(
 
     Raises
     ------
+    InvalidParameterError
+        If count is not in 1..n.
     InvalidShapeError
         If the mesh does not have dimension 2.
 
@@ -289,6 +291,7 @@ def farthest_points(
     """
     mesh = as_simplicial(mesh)
     wave, n = geodesic_waves(mesh), mesh.n_points
+    count = whole_number(count, "count", 1, n)
     chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
     least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
     first = int(wave(0).argmax())

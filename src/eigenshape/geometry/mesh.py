@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import finite_rows, freeze, index_rows
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
@@ -14,7 +14,7 @@ from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_witho
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class TriangleMesh:
+class TriangleMesh(ReadOnly):
     """A triangle mesh in R³.
 
     The constructor checks the structure: coordinates are finite, also those of vertices without a

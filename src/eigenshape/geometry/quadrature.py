@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, freeze, positive_values, whole_number
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike, Integer
@@ -15,7 +15,7 @@ from eigenshape.geometry.simplices import dual_volumes
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Quadrature:
+class Quadrature(ReadOnly):
     """Points of an m-dimensional shape in R^d with positive weights.
 
     Parameters

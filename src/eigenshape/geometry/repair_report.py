@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.simplices import MEASURES
@@ -18,7 +19,7 @@ PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "simplex": "simpli
 
 
 @dataclass(frozen=True, eq=False)
-class RepairedMesh(Generic[MeshT]):
+class RepairedMesh(ReadOnly, Generic[MeshT]):
     """A mesh after one or more repairs, and a report of what they changed.
 
     Attributes
@@ -50,7 +51,7 @@ class RepairedMesh(Generic[MeshT]):
 
 
 @dataclass(frozen=True, eq=False)
-class RepairedCloud:
+class RepairedCloud(ReadOnly):
     """A point cloud after one or more repairs, and a report of what they changed.
 
     Attributes

@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import finite_rows, freeze, index_rows
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
@@ -16,7 +16,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class SimplicialMesh:
+class SimplicialMesh(ReadOnly):
     """A mesh of m-simplices in R^d: segments, triangles, tetrahedra and so on.
 
     The constructor checks the structure, as that of `TriangleMesh` does. It accepts simplices

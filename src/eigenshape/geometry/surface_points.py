@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -19,7 +19,7 @@ MOST_POINTS = 10**8
 
 
 @dataclass(frozen=True, eq=False)
-class SurfacePoints:
+class SurfacePoints(ReadOnly):
     """Points on a mesh of dimension m, as drawn by `sample_surface`.
 
     Attributes

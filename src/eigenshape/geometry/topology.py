@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
@@ -19,7 +20,7 @@ HASH_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 
 
 @dataclass(frozen=True, eq=False)
-class EdgeTable:
+class EdgeTable(ReadOnly):
     """The edges of a triangle mesh without duplicates, and the edges of each face.
 
     This is the `FacetTable` of a triangle mesh, under the names used for surfaces.

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
@@ -29,7 +29,7 @@ LEAST_SCORE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class FusedScan:
+class FusedScan(ReadOnly):
     """Several scans as one surface.
 
     Attributes

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, freeze
+from eigenshape._arrays import ReadOnly, finite_rows, freeze
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -50,7 +50,7 @@ SAME_TURN, SAME_PLACE = 0.2, 0.1  # radians, and sides of the box
 
 
 @dataclass(frozen=True, eq=False)
-class Registration:
+class Registration(ReadOnly):
     """A motion that places one scan on another: x ↦ R x + t.
 
     Attributes

@@ -7,14 +7,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.typing import DTypeLike, NDArray
 
-from eigenshape._arrays import as_array
+from eigenshape._arrays import ReadOnly, as_array
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 
 
 @dataclass(frozen=True, eq=False)
-class ShapeMatch:
+class ShapeMatch(ReadOnly):
     """Where each vertex of a part lies on a whole.
 
     Attributes

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool
 
+from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.sparse.frozen import freeze_sparse
@@ -66,7 +67,7 @@ class GaussianKernel:
 
 
 @dataclass(frozen=True, eq=False)
-class Laplacian:
+class Laplacian(ReadOnly):
     """A discrete Laplace operator L = B⁻¹W, given by its stiffness and mass matrices.
 
     The matrices are copied, and the copies are read-only.

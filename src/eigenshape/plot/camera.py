@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import real_numbers
+from eigenshape._arrays import ReadOnly, real_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
@@ -67,7 +67,7 @@ LESS = 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class Camera:
+class Camera(ReadOnly):
     """A parallel projection onto a square picture.
 
     Attributes

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -30,7 +31,7 @@ Image = Float[np.ndarray, "h w 4"]
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
+class Drawing(ReadOnly):
     """A picture and the places of the vertices in it.
 
     Attributes

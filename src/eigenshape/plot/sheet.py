@@ -8,6 +8,7 @@ from jaxtyping import Int
 from matplotlib.axes import Axes
 
 from eigenshape._arguments import require_each, require_type
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
@@ -23,7 +24,7 @@ QUIET = "#808080"
 
 
 @dataclass(frozen=True, eq=False)
-class Panel:
+class Panel(ReadOnly):
     """A shape on a contact sheet.
 
     Attributes
@@ -68,6 +69,7 @@ class Panel:
     _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.mesh is not None:
             require_type(self.mesh, TriangleMesh, "mesh")
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -75,7 +75,7 @@ class DepthCamera:
 
 
 @dataclass(frozen=True, eq=False)
-class DepthScan:
+class DepthScan(ReadOnly):
     """A simulated scan of a depth camera.
 
     Attributes

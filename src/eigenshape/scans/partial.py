@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import real_numbers, whole_number
+from eigenshape._arrays import ReadOnly, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import face_areas, mean_normals, scale_to_unit
@@ -25,10 +25,11 @@ SLACK = 1.5
 # Slopes are limited to this value. A larger one would keep vertices seen from their edge that
 # another part of the surface hides.
 STEEPEST_SURFACE = 10.0
+MOST_VIEWS = 1000  # of one shape; a view takes about 0.1 s
 
 
 @dataclass(frozen=True, eq=False)
-class MeshPart:
+class MeshPart(ReadOnly):
     """A part of a mesh, and the indices of its vertices and faces in the whole mesh.
 
     Attributes
@@ -132,6 +133,11 @@ def viewpoint(number: int) -> Float[np.ndarray, "3"]:
     height, around = 2 * u - 1, 2 * np.pi * v
     radius = np.sqrt(1 - height**2)
     return np.array([radius * np.cos(around), height, radius * np.sin(around)])
+
+
+def view_number(value: Integer, name: str) -> int:
+    """Return `value` as an int from 0 to 1000, a number of viewpoints."""
+    return whole_number(value, name, 0, MOST_VIEWS, "each view is a scan that is described")
 
 
 def views_of(mesh: TriangleMesh, n_views: int) -> list[MeshPart]:

@@ -20,6 +20,7 @@ from eigenshape.operators.choices import Condition
 N_GAUSS_NODES = 600
 # The integral of exp(-u) ends here: exp(-60) is 1e-26, far below rounding.
 NEGLIGIBLE_EXPONENT = 60.0
+MOST_EIGENVALUES = 10**7  # of shapes that have a formula: 80 MB, and some times as much meanwhile
 MOST_HARMONICS = 10**5  # up to degree 316, which N_GAUSS_NODES is made for
 # Frequencies of a flat torus are looked for up to this number along each period: (2·1000 + 1)²
 # pairs of them take 64 MB.
@@ -35,7 +36,7 @@ def sphere_eigenvalues(k: Integer, dim: Integer = 2) -> Float[np.ndarray, " k"]:
     Parameters
     ----------
     k : int
-        Number of eigenvalues, at least 1.
+        Number of eigenvalues, 1 to 10,000,000.
     dim : int
         Dimension m of the sphere, 1 to 20; 1 for a circle.
 
@@ -47,7 +48,7 @@ def sphere_eigenvalues(k: Integer, dim: Integer = 2) -> Float[np.ndarray, " k"]:
     Raises
     ------
     InvalidParameterError
-        If `k` is less than 1, or `dim` is not in 1..20.
+        If `k` is out of range, or `dim` is not in 1..20.
 
     See Also
     --------
@@ -59,7 +60,7 @@ def sphere_eigenvalues(k: Integer, dim: Integer = 2) -> Float[np.ndarray, " k"]:
     >>> es.shapes.sphere_eigenvalues(5).tolist()
     [0.0, 2.0, 2.0, 2.0, 6.0]
     """
-    count, m = whole_number(k, "k", 1, None), whole_number(dim, "dim", 1, 20)
+    count, m = whole_number(k, "k", 1, MOST_EIGENVALUES), whole_number(dim, "dim", 1, 20)
     values: list[float] = []
     degree = 0
     while len(values) < count:
@@ -129,7 +130,7 @@ def projective_plane_eigenvalues(k: Integer) -> Float[np.ndarray, " k"]:
     Parameters
     ----------
     k : int
-        Number of eigenvalues, at least 1.
+        Number of eigenvalues, 1 to 10,000,000.
 
     Returns
     -------
@@ -139,7 +140,7 @@ def projective_plane_eigenvalues(k: Integer) -> Float[np.ndarray, " k"]:
     Raises
     ------
     InvalidParameterError
-        If `k` is less than 1.
+        If `k` is out of range.
 
     See Also
     --------
@@ -151,7 +152,7 @@ def projective_plane_eigenvalues(k: Integer) -> Float[np.ndarray, " k"]:
     >>> es.shapes.projective_plane_eigenvalues(7).tolist()
     [0.0, 6.0, 6.0, 6.0, 6.0, 6.0, 20.0]
     """
-    count = whole_number(k, "k", 1, None)
+    count = whole_number(k, "k", 1, MOST_EIGENVALUES)
     degrees = 2 * np.arange(isqrt(count) + 1)  # up to even l there are (l + 1)(l + 2) / 2
     return np.repeat(degrees * (degrees + 1.0), 2 * degrees + 1)[:count]
 
@@ -167,7 +168,7 @@ def box_eigenvalues(
     Parameters
     ----------
     k : int
-        Number of eigenvalues, at least 1.
+        Number of eigenvalues, 1 to 10,000,000.
     sides : sequence of float
         Lengths of the sides; their number is the dimension.
     condition : "neumann" or "dirichlet"
@@ -193,7 +194,10 @@ def box_eigenvalues(
     >>> (es.shapes.box_eigenvalues(4, [1, 1]) / 3.141592653589793**2).round(6).tolist()
     [0.0, 1.0, 1.0, 2.0]
     """
-    count, lengths = whole_number(k, "k", 1, None), positive_values(list(sides), "sides")
+    count, lengths = (
+        whole_number(k, "k", 1, MOST_EIGENVALUES),
+        positive_values(list(sides), "sides"),
+    )
     first = int(_require_condition(condition) == "dirichlet")
     frequencies = [(np.arange(first, first + count) / length) ** 2 for length in lengths]
     sums = frequencies[0]
@@ -221,7 +225,7 @@ def flat_torus_eigenvalues(k: Integer, periods: ArrayLike) -> Float[np.ndarray, 
     Parameters
     ----------
     k : int
-        Number of eigenvalues, at least 1.
+        Number of eigenvalues, 1 to 10,000,000.
     periods : (2, 2) float
         The two periods of the torus, as rows, in length.
 
@@ -243,7 +247,10 @@ def flat_torus_eigenvalues(k: Integer, periods: ArrayLike) -> Float[np.ndarray, 
     >>> (values / (2 * 3.141592653589793) ** 2).round(6).tolist()
     [0.0, 1.0, 1.0, 1.0, 1.0]
     """
-    count, rows = whole_number(k, "k", 1, None), real_numbers(periods, "periods").astype(np.float64)
+    count, rows = (
+        whole_number(k, "k", 1, MOST_EIGENVALUES),
+        real_numbers(periods, "periods").astype(np.float64),
+    )
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
         raise InvalidParameterError(
             f"periods must be a finite 2 x 2 matrix; they are {rows.tolist()}."

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.spectral.archive import read_archive, write_archive
@@ -23,7 +23,7 @@ APPROXIMATE_NULL = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class Spectrum(ReadOnly):
     """Eigenvalues and eigenvectors of a Laplacian, with the certificate that none is missing.
 
     These are the k lowest eigenpairs, or all eigenpairs in an interval.

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, positive_values, whole_number
+from eigenshape._arrays import ReadOnly, freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -24,7 +24,7 @@ Points = Float[np.ndarray, "_ d"]
 
 
 @dataclass(frozen=True, eq=False)
-class AnchorNodes:
+class AnchorNodes(ReadOnly):
     """A (δ, δ)-sample of a surface, chosen among its vertices.
 
     Attributes

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import Integer
@@ -26,7 +26,7 @@ LEAST_RELATIVE_VALUE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class CheegerEstimate:
+class CheegerEstimate(ReadOnly):
     """Bounds for the isoperimetric constant μ of a surface.
 
     μ is the smallest ratio of the length of a cut to the smaller of the two areas that it

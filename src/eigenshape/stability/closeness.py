@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, freeze
+from eigenshape._arrays import ReadOnly, finite_rows, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -22,7 +22,7 @@ Limit = Literal["nothing", "displacement", "Jacobian", "ball", "volume"]
 
 
 @dataclass(frozen=True, eq=False)
-class Closeness:
+class Closeness(ReadOnly):
     """The quantities in conditions C1 and C2 of δ-closeness (thesis 4.1).
 
     Attributes

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, freeze, positive_values
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -21,7 +21,7 @@ from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 
 
 @dataclass(frozen=True, eq=False)
-class MaximumMatching:
+class MaximumMatching(ReadOnly):
     """A largest matching of the rows of a bipartite graph with its columns.
 
     Attributes
@@ -66,7 +66,7 @@ class MaximumMatching:
 
 
 @dataclass(frozen=True, eq=False)
-class BottleneckMatching:
+class BottleneckMatching(ReadOnly):
     """The one-to-one correspondence of two point sets with the smallest largest distance.
 
     Attributes

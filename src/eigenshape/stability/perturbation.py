@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import face_labels, freeze
+from eigenshape._arrays import ReadOnly, face_labels, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -20,7 +20,7 @@ Labels = Int[np.ndarray, " _"]
 
 
 @dataclass(frozen=True, eq=False)
-class Perturbation:
+class Perturbation(ReadOnly):
     """A shape M, a changed shape N, and the map Φ between them (thesis 4.1).
 
     Outside the anomalous regions, the faces of the two correspond in order, corner by corner, and Φ

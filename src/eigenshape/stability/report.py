@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, whole_number, whole_numbers
+from eigenshape._arrays import ReadOnly, positive_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr, short_repr
@@ -38,7 +38,7 @@ MOST_SAMPLES = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityReport:
+class StabilityReport(ReadOnly):
     """Result of `compare_shapes`.
 
     Attributes

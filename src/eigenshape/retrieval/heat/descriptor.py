@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._text import html_repr, short_repr
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 
 
 @dataclass(frozen=True, eq=False)
-class HeatDescriptor:
+class HeatDescriptor(ReadOnly):
     """A shape described by m feature points with q numbers each.
 
     Parameters

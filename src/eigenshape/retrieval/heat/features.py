@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, vertex_values
+from eigenshape._arrays import ReadOnly, freeze, vertex_values
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import map_in_threads
@@ -39,7 +39,7 @@ N_VIEWS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class HeatFeatures:
+class HeatFeatures(ReadOnly):
     """Feature points of a mesh, with everything that was computed to find and describe them.
 
     Attributes

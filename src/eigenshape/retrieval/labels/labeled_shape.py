@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import face_labels, freeze
+from eigenshape._arrays import ReadOnly, face_labels, freeze
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
@@ -14,7 +14,7 @@ from eigenshape.retrieval.labels.label_points import LabelPoints, label_points
 
 
 @dataclass(frozen=True, eq=False)
-class LabeledShape:
+class LabeledShape(ReadOnly):
     """A shape with a label on each face, from which `transfer_labels` copies.
 
     The shape is described when its labels are first transferred, and the description is kept, so

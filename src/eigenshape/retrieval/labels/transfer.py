@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_each
-from eigenshape._arrays import freeze, point_functions
+from eigenshape._arrays import ReadOnly, freeze, point_functions
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
@@ -51,7 +51,7 @@ LEAST_PIECE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class LabelTransfer:
+class LabelTransfer(ReadOnly):
     """Labels that a shape was given, and how reliable they are.
 
     Attributes

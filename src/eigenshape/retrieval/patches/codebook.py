@@ -11,7 +11,7 @@ from jaxtyping import Float, Float32, Int8
 from scipy.special import logsumexp
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.patches import Patches
@@ -34,7 +34,7 @@ NO_COHORT = freeze(np.empty((0, 1, 1, 1), dtype=np.int8))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PatchCodebook:
+class PatchCodebook(ReadOnly):
     """A mixture of w Gaussians over whitened patches, for each of b base radii.
 
     Two codebooks are equal if all their numbers are. `train_codebook` makes one from patches.

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Int, Int8
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -23,6 +23,7 @@ from eigenshape.retrieval.patches.codebook import (
 from eigenshape.retrieval.patches.cohort import isolation
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
 from eigenshape.retrieval.patches.patches import Patches
+from eigenshape.scans.partial import view_number
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class PatchRecipe:
     n_frames: int = 0
 
     def __post_init__(self) -> None:
-        whole_number(self.n_frames, "n_frames", 0)
+        view_number(self.n_frames, "n_frames")
         if not 0 < self.clip < inf:
             raise InvalidParameterError(
                 f"clip must be positive and finite; it is {self.clip}. The default is {CLIP}."
@@ -81,7 +82,7 @@ class PatchRecipe:
 
 
 @dataclass(frozen=True, eq=False)
-class PatchDescriptor:
+class PatchDescriptor(ReadOnly):
     """A shape described by patches, and w partial views of it if it is closed.
 
     Attributes

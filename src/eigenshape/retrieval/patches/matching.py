@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -44,7 +44,7 @@ SIZE_STEP = float(RADII[1] / RADII[0])  # 1.25
 
 
 @dataclass(frozen=True, eq=False)
-class PatchPoints:
+class PatchPoints(ReadOnly):
     """Points of a shape with what matching needs; part of a `PatchDescriptor`.
 
     Attributes
@@ -81,7 +81,7 @@ class PatchPoints:
 
 
 @dataclass(frozen=True, eq=False)
-class PatchMatch:
+class PatchMatch(ReadOnly):
     """Points of two shapes that correspond.
 
     Attributes

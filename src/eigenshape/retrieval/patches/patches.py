@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from scipy.sparse.csgraph import shortest_path
 
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import map_in_threads, one_blas_thread
@@ -31,7 +31,7 @@ from eigenshape.retrieval.patches.patch_loops import (
     describe_discs_of,
 )
 from eigenshape.scans.depth_camera import simulate_scan
-from eigenshape.scans.partial import view_of, viewpoint
+from eigenshape.scans.partial import view_number, view_of, viewpoint
 
 N_SAMPLES = 150  # points of a surface; time and stored bytes grow with their square
 # Viewpoints from which a closed shape is described beside the whole. Each costs one more
@@ -48,7 +48,7 @@ LEAST_WEIGHT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Patches:
+class Patches(ReadOnly):
     """Geodesic discs around m points of a shape in a unit box, each described at r radii.
 
     Attributes
@@ -130,7 +130,7 @@ def extract_patches(
     Raises
     ------
     InvalidParameterError
-        If n_samples is not positive, or n_views or n_frames is negative.
+        If n_samples is not positive, or n_views or n_frames is not in 0..1000.
     InvalidShapeError
         If a face has no area or occurs twice, a vertex has no face, the mesh is a soup (faces lie
         edge on edge without sharing vertices), or neighboring faces disagree and `clean` is False.
@@ -148,8 +148,8 @@ def extract_patches(
     """
     mesh = as_mesh(mesh)
     count = whole_number(n_samples, "n_samples", 1)
-    n_viewpoints = whole_number(n_views, "n_views", 0)
-    n_shots = whole_number(n_frames, "n_frames", 0)
+    n_viewpoints = view_number(n_views, "n_views")
+    n_shots = view_number(n_frames, "n_frames")
     require_describable(mesh)
     whole = np.arange(mesh.n_vertices)
     if mesh.n_vertices > MOST_VERTICES:

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float32, Int, Int8, Int64
 from numpy.lib.format import read_array, read_array_header_1_0, read_magic
 
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._text import html_repr, short_repr
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.distance import SIZE_PRICE
@@ -53,7 +53,7 @@ class Rows(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class CoarseRows:
+class CoarseRows(ReadOnly):
     """Short rows of the whole shapes, for a scan of all of them.
 
     Attributes

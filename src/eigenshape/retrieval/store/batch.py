@@ -11,7 +11,6 @@ from time import monotonic
 from typing import SupportsIndex
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._workers import Item as Item  # noqa: PLC0414 - the room lists it from here
@@ -33,6 +32,7 @@ from eigenshape.retrieval.store.records import Record
 from eigenshape.retrieval.store.thumbnails import draw_thumbnail
 from eigenshape.retrieval.store.upkeep import find_damaged
 from eigenshape.retrieval.store.writing import DescribedShape, describe_to_store
+from eigenshape.scans.partial import view_number
 
 Read = Callable[[Path], MeshLike | RepairedMesh[TriangleMesh]]
 ReadRepaired = Callable[[Path], tuple[TriangleMesh, tuple[str, ...]]]
@@ -151,7 +151,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     Raises
     ------
     InvalidParameterError
-        If two items have the same name, `n_views` is negative, a repair is unknown, or `learn` is
+        If two items have the same name, `n_views` is not in 0..1000, a repair is unknown, or `learn` is
         given with recipes.
     StoreError
         If the index cannot be written.
@@ -181,7 +181,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
             "An index either learns a codebook or is given recipes; both were asked for. "
             "Pass learn=False."
         )
-    views = None if n_views is None else whole_number(n_views, "n_views", 0)
+    views = None if n_views is None else view_number(n_views, "n_views")
     read_item = partial(_read_repaired, read, require_repairs(repairs))
     _require_different_names(items)
     callback = callback or _ignore

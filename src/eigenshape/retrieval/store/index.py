@@ -188,6 +188,8 @@ class ShapeIndex:
 
         Raises
         ------
+        InvalidParameterError
+            If `engine` cannot be called.
         StoreError
             If the index cannot be read.
 
@@ -306,6 +308,8 @@ class ShapeIndex:
         ------
         InvalidShapeError
             As `describe`.
+        InvalidParameterError
+            If `n_views` is not in 0..1000.
         StoreError
             If the name is in the index and `replace` is False, or another process is writing.
 

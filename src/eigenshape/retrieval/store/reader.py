@@ -11,9 +11,9 @@ from typing import Any, SupportsIndex
 import numpy as np
 from jaxtyping import Bool
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import whole_number
-from eigenshape._errors import StoreError
+from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._text import html_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
@@ -42,6 +42,7 @@ class IndexReader:
 
     Made by `ShapeIndex.reader`. Any number of threads may ask it at the same time. What other
     processes add or remove is seen after `refresh`, and a query sees one state from begin to end.
+    A pickle holds the folder and the engine alone: another process opens the index as it is then.
 
     Examples
     --------
@@ -57,11 +58,16 @@ class IndexReader:
     _repr_html_ = html_repr
 
     def __init__(self, folder: Path, engine: EngineMaker | None = None) -> None:
+        if engine is not None:
+            _require_maker(engine)
         self._lock = RLock()
         self._engine = engine
         self._scans: dict[PatchRecipe, _Scan] = {}
         self._state: IndexState | None = open_state(folder)
         warn_of_damage(str(folder), self._state.damages)
+
+    def __reduce__(self) -> tuple[type["IndexReader"], tuple[Path, EngineMaker | None]]:
+        return IndexReader, (self.state.folder, self._engine)
 
     def __enter__(self) -> "IndexReader":
         return self
@@ -225,9 +231,19 @@ class IndexReader:
             is_new = kept is None or kept.coarse.numbers is not coarse.numbers
             if self._engine is not None and is_new:
                 engine = self._engine(coarse)
+                require_type(engine, Engine, "the engine that was made")
             supplier = None if engine is None else supply_from(engine, coarse)
             found = self._scans[recipe] = _Scan(snapshot.state, coarse, engine, supplier)
             return found
+
+
+def _require_maker(engine: object) -> None:
+    """Raise an error unless an argument can be called, and is no class of something else."""
+    if not callable(engine) or (isinstance(engine, type) and not issubclass(engine, Engine)):
+        raise InvalidParameterError(
+            "engine must be a function that takes CoarseRows and returns an engine; it is "
+            f"{describe_value(engine)}. Pass es.retrieval.FaissEngine, or lambda coarse: engine."
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from typing import Any, overload
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.search.candidates import Method
@@ -60,7 +61,7 @@ class Record:
 
 
 @dataclass(frozen=True, eq=False)
-class Match:
+class Match(ReadOnly):
     """A shape that `ShapeIndex.query` found.
 
     Attributes

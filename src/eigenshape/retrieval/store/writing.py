@@ -8,7 +8,6 @@ from typing import Any, SupportsIndex
 import numpy as np
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.mesh import TriangleMesh
@@ -17,6 +16,7 @@ from eigenshape.retrieval.patches.cohort import ISOLATION_STEP
 from eigenshape.retrieval.store.change import Change
 from eigenshape.retrieval.store.filters import RESERVED
 from eigenshape.retrieval.store.records import Record
+from eigenshape.scans.partial import view_number
 
 LARGEST_THUMBNAIL = 8192  # bytes, so that a shape takes less than 60 KB
 
@@ -78,7 +78,7 @@ def describe_to_store(
 ) -> list[Descriptor]:
     """Describe a mesh as an index keeps it: the whole, and what viewpoints see if it is closed."""
     kind = kind_of(recipe)
-    count = kind.n_views if n_views is None else whole_number(n_views, "n_views", 0)
+    count = kind.n_views if n_views is None else view_number(n_views, "n_views")
     descriptors: list[Descriptor] = kind.describe_to_store(mesh, recipe, count)
     return descriptors
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
@@ -31,7 +31,7 @@ NO_POINTS = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
-class Brackets:
+class Brackets(ReadOnly):
     """Guaranteed lower and upper bounds for the k lowest eigenvalues of a mesh.
 
     The eigenvalues are those of the Laplace operator of the shape made of flat simplices.

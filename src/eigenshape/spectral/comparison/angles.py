@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, whole_numbers
+from eigenshape._arrays import ReadOnly, freeze, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -28,7 +28,7 @@ Vectors = Float[np.ndarray, "n p"]
 
 
 @dataclass(frozen=True, eq=False)
-class EigenspaceAngles:
+class EigenspaceAngles(ReadOnly):
     """How far the eigenspaces of a shape rotate when it is deformed into another.
 
     Attributes

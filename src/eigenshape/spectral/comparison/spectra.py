@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import finite_values, freeze
+from eigenshape._arrays import ReadOnly, finite_values, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -15,7 +15,7 @@ from eigenshape.spectral.spectrum import NULL, Spectrum, require_lowest
 
 
 @dataclass(frozen=True, eq=False)
-class SpectrumComparison:
+class SpectrumComparison(ReadOnly):
     """The k lowest eigenvalues of two shapes, compared by number.
 
     Attributes

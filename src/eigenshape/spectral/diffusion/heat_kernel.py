@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import freeze, whole_numbers
+from eigenshape._arrays import ReadOnly, freeze, whole_numbers
 from eigenshape._memory import require_memory
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -89,7 +89,7 @@ def _points(value: ArrayLike, name: str, n: int) -> Int[np.ndarray, " a"]:
 
 
 @dataclass(frozen=True, eq=False)
-class HeatTrace:
+class HeatTrace(ReadOnly):
     """The heat trace of an operator at some times, with a bound of what is missing.
 
     Attributes

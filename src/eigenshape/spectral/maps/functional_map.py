@@ -7,7 +7,7 @@ import scipy.linalg as sl
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import as_array, freeze, real_numbers, whole_number
+from eigenshape._arrays import ReadOnly, as_array, freeze, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -24,7 +24,7 @@ LOST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class FunctionalMap:
+class FunctionalMap(ReadOnly):
     """A map between shapes, given by its action on functions (Ovsjanikov and others 2012).
 
     Functions are represented by coefficients in φ_i √A, orthonormal in B/A with A the area of the

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, positive_values, whole_number
+from eigenshape._arrays import ReadOnly, freeze, positive_values, whole_number
 from eigenshape._progress import Progress, silent
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -48,7 +48,7 @@ SINGLE_ROUNDING = 1e-6  # relative error of single precision sums, added to ever
 
 
 @dataclass(frozen=True, eq=False)
-class ApproximateSignature:
+class ApproximateSignature(ReadOnly):
     """Heat kernel signatures with an estimate of their error.
 
     Attributes

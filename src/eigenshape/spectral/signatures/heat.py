@@ -14,6 +14,7 @@ from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
 # Relative difference between steps of log t up to which times count as a geometric sequence; the
 # rounding of numpy.geomspace stays far below it.
 EQUAL_STEPS = 1e-9
+MOST_TIMES = 1_000_000  # a signature holds each for each point
 N_TIMES = 100  # times by default, as in Sun, Ovsjanikov and Guibas 2009
 
 
@@ -56,7 +57,7 @@ def default_times(spectrum: Spectrum, n_times: Integer = N_TIMES) -> Float[np.nd
     Raises
     ------
     InvalidParameterError
-        If `n_times` is less than 2, or no eigenvalue is above 0.
+        If `n_times` is not in 2..1,000,000, or no eigenvalue is above 0.
 
     Examples
     --------
@@ -67,7 +68,8 @@ def default_times(spectrum: Spectrum, n_times: Integer = N_TIMES) -> Float[np.nd
     """
     require_type(spectrum, Spectrum, "spectrum")
     values = positive_eigenvalues(spectrum)
-    return 4 * np.log(10) / np.geomspace(values[-1], values[0], whole_number(n_times, "n_times", 2))
+    count = whole_number(n_times, "n_times", 2, MOST_TIMES)
+    return 4 * np.log(10) / np.geomspace(values[-1], values[0], count)
 
 
 @one_blas_thread()

@@ -12,6 +12,7 @@ from eigenshape.spectral.spectrum import Spectrum
 
 # All three from Aubry, Schlickewei and Cremers 2011, section 4.
 N_ENERGIES = 100
+MOST_ENERGIES = 1_000_000  # a signature holds each for each point
 BAND_STEPS = 7.0  # standard deviation of the bands, in steps between energies
 # Distance of the first and last energy from the ends of the spectrum, in σ.
 MARGIN = 2.0
@@ -43,7 +44,7 @@ def default_energies(
     Raises
     ------
     InvalidParameterError
-        If `n_energies` is less than 2, or no two different eigenvalues are above 0.
+        If `n_energies` is not in 2..1,000,000, or no two different eigenvalues are above 0.
 
     Examples
     --------
@@ -54,7 +55,7 @@ def default_energies(
     4
     """
     require_type(spectrum, Spectrum, "spectrum")
-    count = whole_number(n_energies, "n_energies", 2)
+    count = whole_number(n_energies, "n_energies", 2, MOST_ENERGIES)
     ends = np.log(positive_eigenvalues(spectrum)[[0, -1]])
     sigma = BAND_STEPS * float(ends[1] - ends[0]) / (count - 1 + 2 * MARGIN * BAND_STEPS)
     positive_values(sigma, "the range of logarithms of eigenvalues")

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._arguments import describe_value, require_each, require_type
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import (
     FileFormatError,
     InvalidParameterError,
@@ -51,7 +51,7 @@ Callback = Callable[[int, int, str, str | None], None]
 
 
 @dataclass(frozen=True, eq=False)
-class OperatorBundle:
+class OperatorBundle(ReadOnly):
     """The operators of one shape that networks on surfaces take, such as DiffusionNet.
 
     In the order of the function `get_operators` of DiffusionNet: frames, mass vector, L, evals,

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import describe_value
-from eigenshape._arrays import freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import FileFormatError
 from eigenshape._memory import available_memory
 from eigenshape._progress import Progress, silent
@@ -58,7 +58,7 @@ SYMBOLS_PER_FACE = 6
 
 
 @dataclass(frozen=True, eq=False)
-class CompressedMesh:
+class CompressedMesh(ReadOnly):
     """A mesh as a short string of bytes, and what it cost.
 
     Attributes

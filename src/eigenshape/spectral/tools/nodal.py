@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, vertex_values
+from eigenshape._arrays import ReadOnly, freeze, vertex_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -23,7 +23,7 @@ ZERO_SHARE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class NodalDomains:
+class NodalDomains(ReadOnly):
     """The nodal domains of a function on the vertices of a mesh.
 
     Attributes
