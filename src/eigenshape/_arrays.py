@@ -22,8 +22,7 @@ INDEXED = {"faces": "vertices", "simplices": "points"}
 SHARE_OF_ARRAYS = 0.5
 BYTES_OF_ENTRY = 17  # memory per entry meanwhile: two copies of 8 bytes and one bool
 
-# Steps of a loop: a step of the fastest one, on a shape of some thousand points, takes 0.1 ms, so
-# that these take minutes.
+# Steps of a loop at most. One takes 0.1 ms or more, so that a number mistyped would run for days.
 MOST_STEPS = 1_000_000
 MOST_COORDINATES = 3  # of a row that messages show as a vector: those of a point in space
 
@@ -309,23 +308,26 @@ def whole_number(
 ) -> int:
     """Return `value` as an int from `low` to `high`; without `high` there is no upper bound.
 
-    `reason` says why there is an upper bound, if the name does not.
+    `reason` says why there is an upper bound, where the number alone does not.
     """
     try:
         number = operator.index(value)
     except TypeError as err:
         raise InvalidParameterError(f"{name} must be a whole number; it is {value!r}.") from err
-    if high is None and number < low:
+    if number < low and (high is None or reason):
         raise InvalidParameterError(f"{name} must be at least {low}; it is {number}.")
+    if high is not None and number > high and reason:
+        raise InvalidParameterError(
+            f"{name} must be at most {high}, because {reason}; it is {number}."
+        )
     if high is not None and not low <= number <= high:
-        because = f", because {reason}" if reason else ""
-        raise InvalidParameterError(f"{name} must lie in {low}..{high}{because}; it is {number}.")
+        raise InvalidParameterError(f"{name} must lie in {low}..{high}; it is {number}.")
     return number
 
 
 def step_number(value: Integer, name: str) -> int:
     """Return `value` as an int from 1 to a million, the number of steps of a loop."""
-    return whole_number(value, name, 1, MOST_STEPS, "more steps would take hours on any shape")
+    return whole_number(value, name, 1, MOST_STEPS, "no shape needs more steps")
 
 
 def whole_numbers(value: ArrayLike, name: str, low: int, high: int) -> NDArray[np.int64]:

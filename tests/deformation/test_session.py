@@ -1,3 +1,6 @@
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from bent_shapes import lump, lump_rig
@@ -195,3 +198,22 @@ def test_replay_on_a_finer_mesh_is_close_to_the_coarse_result():
     assert finer.n_vertices == 642
     assert away.max() < 0.05 * diagonal
     assert np.median(away) < 0.01 * diagonal
+
+
+def test_what_four_threads_did_is_what_replay_does(session):
+    def change(number):
+        for step in range(4):
+            lift = Translation([0, 0.02 * (number + 1), 0.01 * step])
+            session.apply(Edit((Move(HEAD, lift),)))
+            session.undo() if step == 1 else session.drag(TAIL, PULL)
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-4)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            list(pool.map(change, range(4)))
+    finally:
+        sys.setswitchinterval(interval)
+    assert len(session.edits) == 12
+    again = replay(lump_rig(), session.edits)
+    np.testing.assert_array_equal(session.mesh.vertices, again.mesh.vertices)

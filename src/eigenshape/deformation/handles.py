@@ -58,7 +58,7 @@ class Rotation(ReadOnly):
     _repr_html_ = html_repr
 
     def __init__(self, pivot: ArrayLike, axis: ArrayLike, angle: float) -> None:
-        direction = vector(axis, "axis")
+        direction = as_vector(axis, "axis")
         largest = np.abs(direction).max()
         if largest == 0:
             raise InvalidParameterError("axis must have a direction; it is [0, 0, 0].")
@@ -67,7 +67,7 @@ class Rotation(ReadOnly):
         if abs(length - 1) > 4 * np.finfo(float).eps:
             direction = direction / largest
             direction = direction / np.linalg.norm(direction)
-        object.__setattr__(self, "pivot", freeze(vector(pivot, "pivot")))
+        object.__setattr__(self, "pivot", freeze(as_vector(pivot, "pivot")))
         object.__setattr__(self, "axis", freeze(direction))
         object.__setattr__(self, "angle", float(finite_values(angle, "angle")[0]))
 
@@ -119,8 +119,8 @@ class Translation(ReadOnly):
 
     _repr_html_ = html_repr
 
-    def __init__(self, vector_: ArrayLike) -> None:
-        object.__setattr__(self, "vector", freeze(vector(vector_, "vector")))
+    def __init__(self, vector: ArrayLike) -> None:
+        object.__setattr__(self, "vector", freeze(as_vector(vector, "vector")))
 
     @property
     def turn(self) -> Float[np.ndarray, " 3"]:
@@ -187,8 +187,8 @@ def rotation_from_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Ro
     >>> es.deformation.rotation_from_drag([0, 0, 0], [1, 0, 0], [0, 2, 0]).axis
     array([0., 0., 1.])
     """
-    center = vector(pivot, "pivot")
-    before, after = vector(start, "start") - center, vector(end, "end") - center
+    center = as_vector(pivot, "pivot")
+    before, after = as_vector(start, "start") - center, as_vector(end, "end") - center
     for arm, name in ((before, "start"), (after, "end")):
         if not arm.any():
             raise InvalidParameterError(
@@ -207,7 +207,7 @@ def rotation_from_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Ro
     return Rotation(center, axis, float(np.arctan2(across, along)))
 
 
-def vector(value: ArrayLike, name: str) -> Float[np.ndarray, " 3"]:
+def as_vector(value: ArrayLike, name: str) -> Float[np.ndarray, " 3"]:
     """Return `value` as three finite numbers.
 
     Raises

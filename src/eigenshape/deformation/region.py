@@ -21,7 +21,7 @@ from eigenshape._arrays import (
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
-from eigenshape.deformation.handles import vector
+from eigenshape.deformation.handles import as_vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.geodesic import geodesic_distance_to_set
 from eigenshape.geometry.mesh import TriangleMesh
@@ -114,7 +114,7 @@ class BrushRegion(ReadOnly):
     _repr_html_ = html_repr
 
     def __init__(self, center: ArrayLike, radius: float) -> None:
-        object.__setattr__(self, "center", freeze(vector(center, "center")))
+        object.__setattr__(self, "center", freeze(as_vector(center, "center")))
         object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, real_numbers
+from eigenshape._arrays import ReadOnly, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
@@ -64,6 +64,7 @@ SOLE = 0.02
 WIDER = 4.0
 # A shape is shown from behind if its front has less than this share of the curvature seen there.
 LESS = 0.8
+MOST_PIXELS = 10_000  # of a side: some gigabytes while the picture is drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,12 @@ class Camera(ReadOnly):
     rotation : (3, 3) float
         Orthonormal rows, which point right, down and towards the viewer.
     size : int
-        Width and height of the picture in pixels.
+        Width and height of the picture in pixels, at most 10,000.
+
+    Raises
+    ------
+    InvalidParameterError
+        If size is not in 1..10,000.
 
     See Also
     --------
@@ -93,6 +99,10 @@ class Camera(ReadOnly):
     size: int
 
     _repr_html_ = html_repr
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        whole_number(self.size, "size", 1, MOST_PIXELS)
 
 
 def three_quarter_view(mesh: MeshLike, *, up: Up = "auto", size: int = 600) -> Camera:

@@ -60,7 +60,7 @@ def sphere_eigenvalues(k: Integer, dim: Integer = 2) -> Float[np.ndarray, " k"]:
     >>> es.shapes.sphere_eigenvalues(5).tolist()
     [0.0, 2.0, 2.0, 2.0, 6.0]
     """
-    count, m = whole_number(k, "k", 1, MOST_EIGENVALUES), whole_number(dim, "dim", 1, 20)
+    count, m = _eigenvalue_number(k), whole_number(dim, "dim", 1, 20)
     values: list[float] = []
     degree = 0
     while len(values) < count:
@@ -152,7 +152,7 @@ def projective_plane_eigenvalues(k: Integer) -> Float[np.ndarray, " k"]:
     >>> es.shapes.projective_plane_eigenvalues(7).tolist()
     [0.0, 6.0, 6.0, 6.0, 6.0, 6.0, 20.0]
     """
-    count = whole_number(k, "k", 1, MOST_EIGENVALUES)
+    count = _eigenvalue_number(k)
     degrees = 2 * np.arange(isqrt(count) + 1)  # up to even l there are (l + 1)(l + 2) / 2
     return np.repeat(degrees * (degrees + 1.0), 2 * degrees + 1)[:count]
 
@@ -195,7 +195,7 @@ def box_eigenvalues(
     [0.0, 1.0, 1.0, 2.0]
     """
     count, lengths = (
-        whole_number(k, "k", 1, MOST_EIGENVALUES),
+        _eigenvalue_number(k),
         positive_values(list(sides), "sides"),
     )
     first = int(_require_condition(condition) == "dirichlet")
@@ -248,7 +248,7 @@ def flat_torus_eigenvalues(k: Integer, periods: ArrayLike) -> Float[np.ndarray, 
     [0.0, 1.0, 1.0, 1.0, 1.0]
     """
     count, rows = (
-        whole_number(k, "k", 1, MOST_EIGENVALUES),
+        _eigenvalue_number(k),
         real_numbers(periods, "periods").astype(np.float64),
     )
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
@@ -379,3 +379,7 @@ def _require_condition(condition: str) -> str:
             f"condition must be 'neumann' or 'dirichlet'; it is {condition!r}."
         )
     return condition
+
+
+def _eigenvalue_number(k: Integer) -> int:
+    return whole_number(k, "k", 1, MOST_EIGENVALUES, "more eigenvalues would fill the memory")

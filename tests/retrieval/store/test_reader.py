@@ -1,5 +1,6 @@
 """One state for many queries and threads; filters."""
 
+import pickle
 import sqlite3
 import threading
 import warnings
@@ -11,8 +12,10 @@ import pytest
 from describers import RECIPE, descriptor
 
 import eigenshape as es
+from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape.retrieval import DescribedShape
 from eigenshape.retrieval.store import snapshot
+from eigenshape.retrieval.store.reader import require_maker
 
 
 @pytest.fixture
@@ -275,3 +278,24 @@ def test_a_temporary_index_is_deleted_with_its_last_reference():
     assert index.query(descriptor(1))[0].name == "one"
     del index
     assert not folder.exists()
+
+
+@pytest.mark.parametrize("engine", ["faiss", 3, int, np.eye(3)], ids=str)
+def test_what_makes_no_engine_is_refused_before_any_query(engine):
+    with pytest.raises(InvalidParameterError, match="engine must be a function that takes Coarse"):
+        require_maker(engine)
+
+
+def test_a_reader_refuses_what_makes_no_engine_when_it_is_opened(index):
+    with pytest.raises(InvalidParameterError, match=r"it is a type\. Pass es\.retrieval"):
+        index.reader(int)
+
+
+def test_a_reader_that_is_pickled_opens_the_index_again(index):
+    with index.reader() as reader:
+        index.remove("s0")
+        with pickle.loads(pickle.dumps(reader)) as another:
+            assert (len(reader), len(another)) == (10, 9)
+            assert another.query(descriptor(1), n_matches=1)[0].name == "s1"
+    with pytest.raises(StoreError, match="it was closed"):
+        pickle.dumps(reader)

@@ -7,6 +7,7 @@ import pytest
 from search_cases import RECIPE, mixtures
 
 import eigenshape as es
+from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search import candidates
 from eigenshape.retrieval.store import snapshot
@@ -97,6 +98,15 @@ def test_an_engine_chooses_what_is_compared(index, points):
         found = reader.query(query, n_matches=1)
         assert found.method == "candidates"
         assert names(found) == names(index.query(query, n_matches=1, exact=True))
+
+
+def test_what_a_maker_returns_must_be_an_engine(index, points):
+    (query,) = described(points, 5, 1)
+    with (
+        index.reader(lambda coarse: len(coarse.rows)) as reader,
+        pytest.raises(InvalidParameterError, match="engine that was made must be an? .*Engine"),
+    ):
+        reader.query(query)
 
 
 def test_an_engine_serves_as_long_as_few_shapes_change(index, points):

@@ -59,7 +59,7 @@ class IndexReader:
 
     def __init__(self, folder: Path, engine: EngineMaker | None = None) -> None:
         if engine is not None:
-            _require_maker(engine)
+            require_maker(engine)
         self._lock = RLock()
         self._engine = engine
         self._scans: dict[PatchRecipe, _Scan] = {}
@@ -237,15 +237,6 @@ class IndexReader:
             return found
 
 
-def _require_maker(engine: object) -> None:
-    """Raise an error unless an argument can be called, and is no class of something else."""
-    if not callable(engine) or (isinstance(engine, type) and not issubclass(engine, Engine)):
-        raise InvalidParameterError(
-            "engine must be a function that takes CoarseRows and returns an engine; it is "
-            f"{describe_value(engine)}. Pass es.retrieval.FaissEngine, or lambda coarse: engine."
-        )
-
-
 @dataclass(frozen=True, eq=False)
 class _Scan:
     """What a reader keeps to choose candidates from one state of an index."""
@@ -260,3 +251,17 @@ def choose_recipe(recipes: list[AnyRecipe]) -> AnyRecipe:
     """Return the first recipe of patches, else the first recipe, else that of an empty index."""
     patches = [recipe for recipe in recipes if isinstance(recipe, PatchRecipe)]
     return next(iter([*patches, *recipes])) if recipes else PatchRecipe()
+
+
+def require_maker(engine: object) -> None:
+    """Raise an error unless an argument can be called, and is no class of something else.
+
+    Raises
+    ------
+    InvalidParameterError
+    """
+    if not callable(engine) or (isinstance(engine, type) and not issubclass(engine, Engine)):
+        raise InvalidParameterError(
+            "engine must be a function that takes CoarseRows and returns an engine; it is "
+            f"{describe_value(engine)}. Pass es.retrieval.FaissEngine, or lambda coarse: engine."
+        )

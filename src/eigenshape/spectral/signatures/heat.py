@@ -68,7 +68,7 @@ def default_times(spectrum: Spectrum, n_times: Integer = N_TIMES) -> Float[np.nd
     """
     require_type(spectrum, Spectrum, "spectrum")
     values = positive_eigenvalues(spectrum)
-    count = whole_number(n_times, "n_times", 2, MOST_TIMES)
+    count = whole_number(n_times, "n_times", 2, MOST_TIMES, "each takes a number for each point")
     return 4 * np.log(10) / np.geomspace(values[-1], values[0], count)
 
 

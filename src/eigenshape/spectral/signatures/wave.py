@@ -55,7 +55,9 @@ def default_energies(
     4
     """
     require_type(spectrum, Spectrum, "spectrum")
-    count = whole_number(n_energies, "n_energies", 2, MOST_ENERGIES)
+    count = whole_number(
+        n_energies, "n_energies", 2, MOST_ENERGIES, "each takes a number for each point"
+    )
     ends = np.log(positive_eigenvalues(spectrum)[[0, -1]])
     sigma = BAND_STEPS * float(ends[1] - ends[0]) / (count - 1 + 2 * MARGIN * BAND_STEPS)
     positive_values(sigma, "the range of logarithms of eigenvalues")

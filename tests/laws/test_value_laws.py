@@ -1,0 +1,188 @@
+"""Nobody can change a value: neither the one that was made, nor any copy or pickle of it."""
+
+import copy
+import dataclasses
+import inspect
+import pickle
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from public_names import public_things
+from test_thread_laws import digest
+from thread_calls import CALLS, Shared
+
+import eigenshape as es
+
+CLASSES = {
+    name: thing
+    for name, thing in public_things().items()
+    if inspect.isclass(thing) and not issubclass(thing, Exception)
+}
+# Calls whose answers hold the values that `Shared` has none of.
+CALLED = [
+    "DepthCamera",
+    "ShapeIndex",
+    "approximate_heat_signature",
+    "bottleneck_matching",
+    "bounding_rate",
+    "bracket_eigenvalues",
+    "build_laplacian",
+    "check_laplacian",
+    "cheeger_estimate",
+    "cloud_quadrature",
+    "collapse_needles",
+    "cut_by_planes",
+    "decompose_field",
+    "detect_watermark",
+    "draw",
+    "drop_duplicate_points",
+    "edge_table",
+    "enclosing_ball",
+    "facet_table",
+    "find_heat_features",
+    "find_items",
+    "geodesic_path",
+    "heat_trace",
+    "match_patches",
+    "maximum_matching",
+    "measure_distortion",
+    "nodal_domains",
+    "part_tree",
+    "principal_curvatures",
+    "weyl_bound",
+]
+MADE: dict[str, Callable[[Shared], Any]] = {
+    "BandPass": lambda v: es.spectral.BandPass(1.0, 2.0),
+    "BatchReport": lambda v: es.retrieval.BatchReport(("a",), (), (("b", "no mesh"),), ()),
+    "BoxRegion": lambda v: es.deformation.BoxRegion([-1, -1, -1], [1, 1, 1]),
+    "BrushRegion": lambda v: es.deformation.BrushRegion([0, 0, 1], 0.5),
+    "Damage": lambda v: es.retrieval.Damage("rows", "cut", None, 0, 8),
+    "DeformationSession": lambda v: es.deformation.replay(v.rig, [v.edit]),
+    "DepthCamera": lambda v: es.scans.DepthCamera(resolution=40),
+    "DescribedShape": lambda v: es.retrieval.DescribedShape("a", [v.by_heat[0]]),
+    "FusedScan": lambda v: es.matching.fuse_scans([v.fish_scan]),
+    "HeatFilter": lambda v: es.spectral.HeatFilter(0.1),
+    "IndexReport": lambda v: v.index.verify(),
+    "LowPass": lambda v: es.spectral.LowPass(2.0),
+    "Operator": lambda v: es.operators.OPERATORS["cotangent"],
+    "Panel": lambda v: es.plot.Panel(v.ball, "a", np.zeros(v.ball.n_faces, int), np.arange(3)),
+    "PartDecomposition": lambda v: es.find_parts(v.animal),
+    "SpectralClusterer": lambda v: es.spectral.SpectralClusterer(3),
+    "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3),
+    "StabilityPlan": lambda v: es.stability.StabilityPlan(k=5),
+    "Workers": lambda v: es.retrieval.Workers(2),
+}
+HANDLES = {
+    "FaissEngine": "holds memory of FAISS",
+    "QdrantEngine": "holds a connection to a database",
+}
+
+
+def parts(value: Any) -> Iterator[Any]:
+    """Yield a value, and all that stands in its public fields, in theirs, and so on."""
+    yield value
+    inner: list[Any] = []
+    if isinstance(value, list | tuple):
+        inner += value
+    elif isinstance(value, dict):
+        inner += value.values()
+    if dataclasses.is_dataclass(value):
+        inner += [
+            getattr(value, field.name)
+            for field in dataclasses.fields(value)
+            if type(value).__name__ in CLASSES
+        ]
+    for each in inner:
+        yield from parts(each)
+
+
+def writable(value: Any) -> list[str]:
+    """Return the fields whose arrays can be written to, of public values in a value."""
+    found = []
+    for part in parts(value):
+        if dataclasses.is_dataclass(part) and type(part).__name__ in CLASSES:
+            found += [
+                f"{type(part).__name__}.{name}"
+                for name, entry in vars(part).items()
+                for array in arrays(entry)
+                if array.flags.writeable
+            ]
+    return sorted(set(found))
+
+
+def arrays(entry: Any) -> Iterator[np.ndarray]:
+    """Yield the arrays of an entry of a value."""
+    if isinstance(entry, np.ndarray):
+        yield entry
+    elif isinstance(entry, tuple):
+        for each in entry:
+            yield from arrays(each)
+    elif sp.issparse(entry):
+        yield from (entry.data, entry.indices, entry.indptr)
+
+
+@pytest.fixture(scope="module")
+def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Return one value of each public class, by its name."""
+    shared = Shared(Path(tmp_path_factory.mktemp("values")))
+    made = {name: make(shared) for name, make in MADE.items()}
+    found: dict[str, Any] = {}
+    for source in [*vars(shared).values(), *(CALLS[name](shared) for name in CALLED)]:
+        for part in parts(source):
+            found.setdefault(type(part).__name__, part)
+    return {name: value for name, value in (found | made).items() if name in CLASSES}
+
+
+def test_there_is_a_value_of_every_public_class(values: dict[str, Any]) -> None:
+    assert CLASSES.keys() - values.keys() <= HANDLES.keys()
+
+
+def restore(value: Any) -> Any:
+    return pickle.loads(pickle.dumps(value))
+
+
+@pytest.mark.parametrize("name", sorted(CLASSES.keys() - HANDLES.keys()))
+def test_a_copy_of_a_value_is_equal_works_and_cannot_be_changed(
+    name: str, values: dict[str, Any]
+) -> None:
+    value = values[name]
+    copies = [restore(value), copy.deepcopy(value), copy.copy(value)]
+    if dataclasses.is_dataclass(value):
+        assert not writable(value)
+        if all(field.init for field in dataclasses.fields(value)):
+            copies.append(dataclasses.replace(value))
+        # The digest takes all numbers, and what properties and `explain` say.
+        if name != "Operator":  # holds a function
+            assert {digest(each) for each in copies} == {digest(value)}
+    for each in copies:
+        assert type(each) is type(value)
+        assert not writable(each)
+
+
+def test_a_value_takes_a_copy_of_an_array_that_can_be_written_to(values: dict[str, Any]) -> None:
+    spectrum, mine = values["Spectrum"], values["Spectrum"].eigenvalues.copy()
+    changed = dataclasses.replace(spectrum, eigenvalues=mine)
+    mine[:] = 0
+    np.testing.assert_array_equal(changed.eigenvalues, spectrum.eigenvalues)
+    with pytest.raises(ValueError, match="read-only"):
+        changed.eigenvalues[0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        restore(spectrum).mass.data[0] = 1.0
+
+
+def test_copies_of_a_reader_and_of_a_session_go_their_own_ways(values: dict[str, Any]) -> None:
+    session = values["DeformationSession"]
+    other = copy.copy(session)
+    other.undo()
+    assert (len(session.edits), len(other.edits)) == (1, 0)
+    np.testing.assert_array_equal(restore(session).mesh.vertices, session.mesh.vertices)
+    reader, descriptor = values["IndexReader"], values["HeatDescriptor"]
+    with restore(reader) as another:
+        found = another.query(descriptor, n_matches=2)
+    assert [each.name for each in found] == [
+        each.name for each in reader.query(descriptor, n_matches=2)
+    ]
