@@ -7,6 +7,7 @@ import pytest
 from eigenshape._arrays import (
     finite_values,
     positive_values,
+    step_number,
     vertex_values,
     whole_number,
     whole_numbers,
@@ -54,6 +55,15 @@ def test_vertex_values_are_one_finite_number_a_vertex():
         vertex_values([1, 2], "field", 3)
     with pytest.raises(InvalidParameterError, match="field must be finite; entry 1 is nan"):
         vertex_values([1, np.nan], "field", 2)
+
+
+def test_a_bound_with_a_reason_is_named_with_it():
+    assert step_number(np.int16(3), "n_steps") == 3
+    with pytest.raises(InvalidParameterError, match="n_steps must be at least 1; it is 0"):
+        step_number(0, "n_steps")
+    message = "n_steps must be at most 1000000, because no shape needs more steps; it is 1000001"
+    with pytest.raises(InvalidParameterError, match=message):
+        step_number(1_000_001, "n_steps")
 
 
 @pytest.mark.parametrize(

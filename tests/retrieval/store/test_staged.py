@@ -102,10 +102,8 @@ def test_an_engine_chooses_what_is_compared(index, points):
 
 def test_what_a_maker_returns_must_be_an_engine(index, points):
     (query,) = described(points, 5, 1)
-    with (
-        index.reader(lambda coarse: len(coarse.rows)) as reader,
-        pytest.raises(InvalidParameterError, match="engine that was made must be an? .*Engine"),
-    ):
+    reader = index.reader(lambda coarse: len(coarse.rows))
+    with reader, pytest.raises(InvalidParameterError, match="the engine that was made must be"):
         reader.query(query)
 
 
