@@ -57,8 +57,8 @@ def functional_map(  # noqa: PLR0913 - what is given, and the weight of each ter
 
     Minimizes over maps C that keep constants
 
-    Σ_p |C a_p - b_p|² / α + μ Σ_ij (λ'_i - λ_j)² C_ij²
-    + ν Σ_f |C M_f - M'_f C|² / β + ω Σ_f |C S_f - S'_f C|² / γ
+    Σ_p |C a_p - b_p|² / α + μ Σ_ij (λ'_i - λ_j)² C_ij² +
+    ν Σ_f |C M_f - M'_f C|² / β + ω Σ_f |C S_f - S'_f C|² / γ:
 
     - a_p and b_p are coefficients on source and target: of unit masses at the points of a pair,
       times (|a_p| |b_p|)^-½, and of descriptors f and f', made to have mean 0 and norm 1
@@ -155,7 +155,8 @@ def functional_map(  # noqa: PLR0913 - what is given, and the weight of each ter
         raise InvalidParameterError(
             'A map needs pairs, descriptors or both; there are none. Pass descriptors="waves".'
         )
-    if meshes is not None and descriptors is None:
+    faces = None if meshes is None else _faces_of_both(meshes, source, target)
+    if faces is not None and descriptors is None:
         raise InvalidParameterError(
             'meshes serve the orientation of descriptors; there are none. Pass descriptors="waves".'
         )
@@ -184,15 +185,10 @@ def functional_map(  # noqa: PLR0913 - what is given, and the weight of each ter
         if weights[1]:
             both = product_operators(source, one, k), product_operators(target, two, k)
             terms.append((weights[1], *both))
-        if meshes is not None and weights[2]:
-            first, second = _faces_of_both(meshes, source, target)
-            terms.append(
-                (
-                    weights[2],
-                    orientation_operators(source, one, first, k),
-                    orientation_operators(target, two, second, k),
-                )
-            )
+        if faces is not None and weights[2]:
+            turns = orientation_operators(source, one, faces[0], k)
+            turns_there = orientation_operators(target, two, faces[1], k)
+            terms.append((weights[2], turns, turns_there))
     penalties = weights[0] * _commutators(source, target, k) ** 2
     if not terms:
         return FunctionalMap(_solve_rows(ours, theirs, penalties), source, target)
