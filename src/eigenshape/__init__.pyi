@@ -57,7 +57,7 @@ from .shapes.creatures import make_creature as make_creature
 from .shapes.surfaces import icosphere as icosphere
 from .spectral.bounds.brackets import bracket_eigenvalues as bracket_eigenvalues
 from .spectral.laws.operator_laws import check_operator as check_operator
-from .spectral.maps.functional_map import functional_map as functional_map
+from .spectral.maps.map_fit import functional_map as functional_map
 from .spectral.signatures.heat import heat_kernel_signature as heat_kernel_signature
 from .spectral.signatures.wave import wave_kernel_signature as wave_kernel_signature
 from .spectral.solve import solve_spectrum as solve_spectrum

@@ -1,5 +1,6 @@
 """Reading regular files only, and replacing files atomically."""
 
+import os
 import secrets
 import shutil
 import stat
@@ -8,7 +9,28 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from eigenshape._errors import FileFormatError
+from eigenshape._arguments import describe_value
+from eigenshape._errors import FileFormatError, InvalidParameterError
+
+
+def as_path(value: object, name: str = "path") -> Path:
+    """Return a path that the system can open.
+
+    Raises
+    ------
+    InvalidParameterError
+        If it is no text, or holds a NUL, which ends a name for the system.
+    """
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(text, str):
+        raise InvalidParameterError(
+            f"{name} must be a str or a pathlib.Path; the value is {describe_value(value)}."
+        )
+    if "\0" in text:
+        raise InvalidParameterError(
+            f"{name} must not hold the character NUL; {text!r} does, at place {text.index(chr(0))}."
+        )
+    return Path(text)
 
 
 def read_regular(path: Path, what: str = "a mesh") -> bytes:

@@ -88,3 +88,19 @@ def test_wrong_arguments_are_named():
     flipped[0] = flipped[0, ::-1]
     with pytest.raises(es.InvalidShapeError, match="Neighboring faces must be turned the same way"):
         flatten_conformally(es.TriangleMesh(SHEET.vertices, flipped))
+
+
+@pytest.mark.long
+@pytest.mark.data
+def test_a_camel_maps_to_the_sphere(data):
+    """Its legs become 1e-13 of the sphere; the determinants of such triangles need differences."""
+    camel = es.read_mesh(data / "classics" / "camel.off")
+    sphere = map_to_sphere(camel)
+    distortion, areas = angle_distortion(camel, sphere), es.geometry.face_areas(camel)
+    assert areas @ (distortion < 1.5) > 0.75 * areas.sum()
+
+
+def test_limbs_that_become_points_are_refused(monkeypatch):
+    monkeypatch.setattr(conformal, "ROUNDING", 0.05)
+    with pytest.raises(es.ConvergenceError, match="triangles become points, the first is face"):
+        map_to_sphere(es.make_creature("biped", n_vertices=600))

@@ -193,3 +193,16 @@ def test_wrong_arguments_are_named():
     pair = es.cotangent_laplacian(es.geometry.disjoint_union(BALL, BALL))
     with pytest.raises(es.InvalidParameterError, match="Each component must have a fixed point"):
         solve_harmonic(pair, [0], [1.0])
+
+
+def test_a_solution_that_overflows_is_refused():
+    ball = es.icosphere(1)
+    source = 2 * ball.vertices[:, 2]
+    huge = es.cotangent_laplacian(es.TriangleMesh(1e150 * ball.vertices, ball.faces))
+    found = es.calculus.solve_poisson(huge, source)
+    expected = es.calculus.solve_poisson(es.cotangent_laplacian(ball), source)
+    np.testing.assert_allclose(found / 1e150 / 1e150, expected, rtol=1e-9, atol=1e-12)
+    with pytest.raises(
+        es.InvalidParameterError, match="must fit into floating-point numbers; at po"
+    ):
+        es.calculus.solve_poisson(huge, 1e8 * source)

@@ -79,3 +79,15 @@ def test_wrong_arguments_are_named():
     for steps in ({"shrink": 0.0}, {"shrink": 0.5, "inflate": -0.4}, {"inflate": 0.3}):
         with pytest.raises(es.InvalidParameterError, match="inflate below -shrink"):
             taubin_smooth(BALL, **steps)
+
+
+def test_modes_do_not_grow_beyond_twice():
+    ball = es.icosphere(2)
+    with pytest.raises(es.InvalidParameterError, match="n_steps can be at most 1053; it is 100000"):
+        taubin_smooth(ball, 100_000)
+    with pytest.raises(
+        es.InvalidParameterError, match="one grows 4 times, so n_steps can be at most 0"
+    ):
+        taubin_smooth(ball, 10, shrink=1.0, inflate=-1.5)
+    most = taubin_smooth(ball, 1053)
+    assert np.abs(most.vertices).max() < 2.5

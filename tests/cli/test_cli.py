@@ -167,7 +167,7 @@ def test_features(zoo, tmp_path):
     lengths = [row["persistence"] for row in run_json("features", path, "-n", 999)["features"][1:]]
     widest = int(np.argmax(np.subtract(lengths, [*lengths[1:], 0])))
     assert len(run_json("features", path, "--largest-gap")["features"]) == widest + 2
-    refused = run("features", path, "--largest-gap", "--persistence", 1, code=1)
+    refused = run("features", path, "--largest-gap", "--persistence", 1, code=2)
     assert "at most one of --n-parts, --persistence, --largest-gap" in " ".join(
         refused.stderr.split()
     )
@@ -236,6 +236,16 @@ def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
     [
         (("info", "nowhere.ply"), "No such file"),
         (("info", "mesh.abc"), "mesh.abc must be of a"),
+        (("query", "nowhere", "{sphere}"), "must be an index"),
+    ],
+)
+def test_errors_are_one_line_and_exit_code_1(sphere, arguments, message):
+    refused(*(text.format(sphere=sphere) for text in arguments), message=message, code=1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
         (("spectrum", "{sphere}", "-k", "0"), "k must lie in 1..162; it is 0"),
         (("spectrum", "{sphere}", "-k", "163"), "k must lie in 1..162; it is 163"),
         (("spectrum", "{sphere}", "--picture", "plot.bmp"), "A picture must end in"),
@@ -247,15 +257,32 @@ def test_query_finds_the_kind_and_draws_it(zoo, database, tmp_path):
             ("info", "{sphere}", "--repair", "everything"),
             "Names of --repair must be among auto, weld",
         ),
-        (("query", "nowhere", "{sphere}"), "must be an index"),
+        (
+            (
+                "deform",
+                "{sphere}",
+                "--region",
+                "none.txt",
+                "--move",
+                "0,1,0",
+                "-o",
+                "{folder}/a.ply",
+            ),
+            "A region is one of these",
+        ),
         (("index", "add", "{folder}/db", "{folder}"), "There must be meshes"),
         (("demo", "--kind", "unicorn"), "--kind takes ant"),
     ],
 )
-def test_errors_are_one_line_and_exit_code_1(sphere, tmp_path, arguments, message):
+def test_wrong_options_are_one_line_and_exit_code_2(sphere, tmp_path, arguments, message):
     empty = tmp_path / "empty"
     empty.mkdir()
-    done = run(*(text.format(sphere=sphere, folder=empty) for text in arguments), code=1)
+    words = [text.format(sphere=sphere, folder=empty) for text in arguments]
+    refused(*words, message=message, code=2)
+
+
+def refused(*arguments, message, code):
+    done = run(*arguments, code=code)
     assert done.stderr.startswith("error: ")
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
@@ -264,7 +291,7 @@ def test_errors_are_one_line_and_exit_code_1(sphere, tmp_path, arguments, messag
 def test_two_files_of_one_name_are_refused(zoo, tmp_path):
     path = tmp_path / "fish0.ply"
     path.write_bytes((zoo / "fish" / "fish0.ply").read_bytes())
-    done = run("index", "add", tmp_path / "db", zoo / "fish" / "fish0.ply", path, code=1)
+    done = run("index", "add", tmp_path / "db", zoo / "fish" / "fish0.ply", path, code=2)
     assert "Names of shapes must differ; 'fish0' is the name of both " in done.stderr
 
 

@@ -44,7 +44,7 @@ def test_bad_files_and_paths_are_named(ball, tmp_path):
         "must begin with the bytes"
         in run("decompress", ball, "-o", tmp_path / "x.ply", code=1).stderr
     )
-    wrong = run("compress", ball, "-o", tmp_path / "ball.zip", code=1).stderr
+    wrong = run("compress", ball, "-o", tmp_path / "ball.zip", code=2).stderr
     assert "must be written to a file that ends in .esz" in " ".join(wrong.split())
     missing = run("decompress", tmp_path / "no.esz", "-o", tmp_path / "x.ply", code=1).stderr
     assert "no.esz" in missing

@@ -80,7 +80,7 @@ def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
     listed.write_text("\n".join(map(str, head)))
     run("deform", giraffe, "--region", listed, "--move", "0,0.05,0", "--save-edits", edits)
     write_mesh(subdivide(mesh), finer)
-    refused = " ".join(run("deform", finer, "--edits", edits, "-o", bent, code=1).stderr.split())
+    refused = " ".join(run("deform", finer, "--edits", edits, "-o", bent, code=2).stderr.split())
     assert (
         "edits.json: Edits name vertices of the mesh on which they were made; that has 900 vertices"
         in refused
@@ -100,7 +100,7 @@ def test_edits_of_another_mesh_are_refused_or_carried(giraffe, tmp_path):
             "deform",
             finer,
             *("--edits-mesh", giraffe, "--region", "y>70%", "--move", "0,0.1,0"),
-            code=1,
+            code=2,
         ).stderr.split()
     )
     assert "--edits-mesh is used together with --edits" in alone
@@ -197,14 +197,14 @@ def test_words_for_handles(giraffe):
     ],
 )
 def test_what_is_wrong_is_named(giraffe, words, message):
-    done = run("deform", giraffe, *words, code=1)
+    done = run("deform", giraffe, *words, code=2)
     assert message in " ".join(done.stderr.split())
 
 
 def test_a_list_that_is_none_is_named(giraffe, tmp_path):
     listed = tmp_path / "some.txt"
     listed.write_text("3\nx\n")
-    done = run("deform", giraffe, "--region", listed, "--move", "0,1,0", code=1)
+    done = run("deform", giraffe, "--region", listed, "--move", "0,1,0", code=2)
     assert "has one vertex index a line" in " ".join(done.stderr.split())
 
 

@@ -92,13 +92,13 @@ def test_filters_choose_shapes(index, filters, names):
 
 @pytest.mark.parametrize("text", ["label", "=cat", "height=", "height=1..2..3", "height=a..b"])
 def test_a_filter_that_is_none_is_refused(index, text):
-    done = run("index", "ls", index, "--filter", text, code=1)
+    done = run("index", "ls", index, "--filter", text, code=2)
     assert repr(text) in done.stderr
 
 
 def test_two_filters_of_one_key_are_refused_and_none_is_forgotten(index):
     filters = ("--filter", "label=bird", "--filter", "label=fish")
-    assert "label=one,other" in run("index", "rm", index, *filters, code=1).stderr
+    assert "label=one,other" in run("index", "rm", index, *filters, code=2).stderr
 
 
 def test_rm_takes_names_or_a_filter(index):
@@ -106,7 +106,7 @@ def test_rm_takes_names_or_a_filter(index):
     assert run_json("index", "rm", index, "--filter", "height=2")["removed"] == ["bird/a"]
     assert [record["name"] for record in run_json("index", "ls", index)] == ["bird/b"]
     assert "'fish/a' is not" in run("index", "rm", index, "fish/a", code=1).stderr
-    assert "give one of the two" in run("index", "rm", index, code=1).stderr
+    assert "give one of the two" in run("index", "rm", index, code=2).stderr
 
 
 def test_stats_count_shapes_classes_and_bytes(index):
@@ -176,7 +176,7 @@ def test_a_merge_names_shapes_that_queries_do_not_find(index, tmp_path):
 
 @pytest.mark.parametrize("text", ["3", "0/2", "3/2", "1/0", "a/b"])
 def test_a_part_that_is_none_is_refused(meshes, tmp_path, text):
-    done = run("index", "add", tmp_path / "index", meshes, "--part", text, code=1)
+    done = run("index", "add", tmp_path / "index", meshes, "--part", text, code=2)
     assert repr(text) in done.stderr
 
 
@@ -212,7 +212,7 @@ def test_a_folder_and_a_shape_of_the_index_are_queries_too(meshes, index, tmp_pa
     assert (shown.count("Most similar shapes"), shown.count("score: ")) == (4, 1)
     alike = run_json("query", index, "fish/a", "-n", 1)["matches"]
     assert [match["name"] for match in alike] == ["fish/b"]
-    assert "nobody is none of them" in run("query", index, "nobody", code=1).stderr
+    assert "nobody is none of them" in run("query", index, "nobody", code=2).stderr
     only = run_json("query", index, "fish/a", "--filter", "label=bird")["matches"]
     assert {match["label"] for match in only} == {"bird"}
 
@@ -281,7 +281,7 @@ def test_an_explanation_is_drawn(meshes, index, tmp_path):
     from_above = tmp_path / "above.png"
     run("query", index, meshes / "fish" / "b.ply", "--explain", from_above, "--view", "top")
     assert from_above.read_bytes() != picture.read_bytes()
-    done = run("query", index, "fish/a", "--explain", picture, code=1)
+    done = run("query", index, "fish/a", "--explain", picture, code=2)
     assert "Leave --picture and --explain out" in done.stderr
 
 
@@ -293,7 +293,7 @@ def test_a_folder_that_is_not_there_makes_no_index(tmp_path):
 
 def test_a_codebook_is_for_patches_and_is_a_codebook(meshes, index, tmp_path):
     asked = ("index", "add", tmp_path / "new", meshes, "--codebook")
-    assert "is for --method patches" in run(*asked, index, *LIGHT, code=1).stderr
+    assert "is for --method patches" in run(*asked, index, *LIGHT, code=2).stderr
     assert "has none" in run(*asked, index, code=1).stderr
     assert "is none" in run(*asked, meshes / "table.csv", code=1).stderr
     learned = tmp_path / "book.npz"
@@ -306,16 +306,16 @@ def test_a_codebook_is_for_patches_and_is_a_codebook(meshes, index, tmp_path):
 def test_all_shapes_of_an_index_have_as_many_frames(meshes, tmp_path):
     new = tmp_path / "new"
     asked = ("index", "add", new, meshes / "fish" / "a.ply", "--views", 0, "--workers", 1)
-    assert "is for --method patches" in run(*asked, "--frames", 2, *LIGHT, code=1).stderr
+    assert "is for --method patches" in run(*asked, "--frames", 2, *LIGHT, code=2).stderr
     assert len(run_json(*asked, "--frames", 2)["added"]) == 1
     recipe = ShapeIndex.open(new).default_recipe()
     assert recipe.n_frames == 2
     assert len(ShapeIndex.open(new).descriptors("a", recipe)[0].codes) == 3
-    assert "has 2 frames a shape" in run(*asked, "--frames", 1, code=1).stderr
+    assert "has 2 frames a shape" in run(*asked, "--frames", 1, code=2).stderr
     assert run_json(*asked)["skipped"] == ["a"]
 
 
 def test_an_unreachable_cluster_is_named(meshes, tmp_path):
     pytest.importorskip("distributed")
     asked = ("index", "add", tmp_path / "new", meshes, "--scheduler", "nonsense://here:1")
-    assert "--scheduler takes the address of a Dask scheduler" in run(*asked, code=1).stderr
+    assert "--scheduler takes the address of a Dask scheduler" in run(*asked, code=2).stderr

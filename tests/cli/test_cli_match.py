@@ -60,12 +60,12 @@ def test_a_scale_is_a_word_or_a_number(folder):
     arguments = "match", folder / "scan.ply", folder / "posed.ply", "--scale"
     assert json.loads(run(*arguments, "0.9", "--json").stdout)["scale"] == 0.9
     assert "--scale takes known, unknown or a number; it is 'big'" in run(
-        *arguments, "big", code=1
+        *arguments, "big", code=2
     ).output.replace("\n", " ")
 
 
 def test_a_map_is_written_to_known_files_only(folder):
-    done = run("match", folder / "scan.ply", folder / "posed.ply", "-o", folder / "map.xls", code=1)
+    done = run("match", folder / "scan.ply", folder / "posed.ply", "-o", folder / "map.xls", code=2)
     assert "must be written to a file that ends in .csv, .npz, .txt" in done.output
 
 

@@ -89,7 +89,7 @@ def test_a_bad_option_is_refused_before_any_file_is_looked_at(tmp_path, argument
     folder.mkdir()
     done = run(
         *(text.format(missing=tmp_path / "missing.ply", folder=folder) for text in arguments),
-        code=1,
+        code=2,
     )
     assert done.stderr.startswith("error: ")
     assert message in done.stderr
@@ -126,7 +126,7 @@ def test_index_names_the_broken_file_takes_the_rest_and_knows_it_again(fish, tmp
         "matches"
     ]
     assert [match["name"] for match in best] == ["fish"]
-    done = run("query", tmp_path / "db", tmp_path / "none.ply", code=1)
+    done = run("query", tmp_path / "db", tmp_path / "none.ply", code=2)
     assert done.stderr.startswith("error: ")
     assert "none.ply" in done.stderr
 

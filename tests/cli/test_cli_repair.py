@@ -99,7 +99,7 @@ def test_without_repairs_it_converts(tmp_path):
 def test_what_is_wrong_is_named_and_nothing_written(tmp_path, options, message):
     write_mesh(BALL, tmp_path / "a.ply")
     done = run(
-        "repair", tmp_path / "a.ply", *(word.format(folder=tmp_path) for word in options), code=1
+        "repair", tmp_path / "a.ply", *(word.format(folder=tmp_path) for word in options), code=2
     )
     assert message in " ".join(done.stderr.split())
     assert [path.name for path in tmp_path.iterdir()] == ["a.ply"]

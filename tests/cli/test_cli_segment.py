@@ -140,7 +140,7 @@ def test_segment_prints_a_table(biped):
 )
 def test_segment_refuses_before_it_works(biped, tmp_path, arguments, message):
     filled = [str(word).format(missing=tmp_path / "missing", mesh=biped) for word in arguments]
-    done = run(*filled, code=1)
+    done = run(*filled, code=2)
     assert message in " ".join(done.stderr.split())
     assert done.stdout == ""
 

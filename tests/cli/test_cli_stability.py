@@ -100,12 +100,12 @@ def test_what_cannot_be_compared_is_named(folder, tmp_path):
         "number of one vertex; line 1" in run("stability", one, one, "--map", wrong, code=1).stderr
     )
     wrong.write_text("0\n1\n")
-    assert "there are 2 for 450" in run("stability", one, one, "--map", wrong, code=1).stderr
+    assert "there are 2 for 450" in run("stability", one, one, "--map", wrong, code=2).stderr
     points = tmp_path / "points.xyz"
     np.savetxt(points, np.random.default_rng(0).random((300, 3)))
     assert (
         "--scale is for triangle meshes"
-        in run("stability", points, one, "--scale", "area", code=1).stderr
+        in run("stability", points, one, "--scale", "area", code=2).stderr
     )
-    assert "A picture must end" in run("stability", one, one, "--picture", "a.gif", code=1).stderr
+    assert "A picture must end" in run("stability", one, one, "--picture", "a.gif", code=2).stderr
     assert run("stability", one, code=2)

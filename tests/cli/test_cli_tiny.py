@@ -34,7 +34,7 @@ def test_all_pairs_are_computed_where_there_are_fewer_than_usual(tiny):
     assert len(run_json("spectrum", tiny, "--operator", "robust")["eigenvalues"]) == n
     assert len(run_json("spectrum", tiny, "--brackets")["eigenvalues"]) == n
     assert len(run_json("spectrum", tiny, "--accuracy", "1e-2")["eigenvalues"]) == n
-    assert f"k must lie in 1..{n}; it is 20" in run("spectrum", tiny, "-k", 20, code=1).stderr
+    assert f"k must lie in 1..{n}; it is 20" in run("spectrum", tiny, "-k", 20, code=2).stderr
 
 
 def test_inner_points_alone_count_where_the_boundary_is_held(tmp_path):

@@ -167,3 +167,8 @@ def test_no_option_has_two_long_names():
     for verb, parameter in ALL:
         long = [text for text in parameter.opts if text.startswith("--")]
         assert len(long) <= 1, (verb, parameter.opts)
+
+
+@pytest.mark.parametrize("verb", ["", "info", "index ls"])
+def test_flags_take_no_value(verb):
+    assert "<bool>" not in printed(*verb.split())

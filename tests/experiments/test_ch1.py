@@ -1,9 +1,13 @@
 """Figures 1.1 and 1.2: what the READMEs show and claim."""
 
 import json
+import runpy
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+import eigenshape as es
 
 EXPERIMENTS = Path(__file__).resolve().parents[2] / "experiments"
 
@@ -20,6 +24,14 @@ def test_reconstructions_of_the_horse():
     assert (np.diff(means) < 0).all()
     assert means[-1] < 0.002
     assert all(found["exact to 1e-10"].values())
+
+
+@pytest.mark.data
+def test_the_horse_is_turned_outward():
+    """The file's faces point inward, which made shares of the volume negative."""
+    script = str(EXPERIMENTS / "ch1_projection" / "run.py")
+    horse = runpy.run_path(script)["load_shape"](quick=False)
+    assert es.geometry.enclosed_volume(horse) > 0
 
 
 def test_eigenfunctions_of_the_head():

@@ -510,9 +510,16 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.operators.functional_laplacian(es.geometry.mesh_quadrature(v.animal), 0.01)
         @ v.animal.vertices[:, 0]
     ),
-    "functional_map": lambda v: es.functional_map(
-        v.spectrum, v.spectrum2, [[0, 0], [99, 99]], n_modes=8
-    ),
+    "functional_map": lambda v: [
+        es.functional_map(v.spectrum, v.spectrum2, [[0, 0], [99, 99]], n_modes=8),
+        es.functional_map(
+            v.spectrum,
+            v.spectrum2,
+            n_modes=8,
+            descriptors="waves",
+            meshes=(v.animal, v.pose),
+        ),
+    ],
     "gaussian_curvature": lambda v: es.geometry.gaussian_curvature(v.animal),
     "gaussian_laplacian": lambda v: es.operators.gaussian_laplacian(v.cloud.points, 0.02, 2),
     "geodesic_balls": lambda v: es.geometry.geodesic_balls(v.ball, 0.5),
@@ -637,7 +644,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_shape": lambda v: es.read_shape(v.folder / "square.mesh"),
     "reconstruct": lambda v: es.spectral.reconstruct(v.many_coefficients, v.many_spectrum),
     "recover_geometry": lambda v: es.spectral.recover_geometry(es.shapes.sphere_eigenvalues(300)),
-    "refine_map": lambda v: es.spectral.refine_map(v.many_map, 8),
+    "refine_map": lambda v: [
+        es.spectral.refine_map(v.many_map, 8, bijective=each) for each in (False, True)
+    ],
     "reflection_free_signature": lambda v: es.spectral.reflection_free_signature(
         v.many_spectrum, v.many_spectrum, [0.3]
     ),

@@ -7,13 +7,16 @@ import eigenshape as es
 
 zoomout = pytest.importorskip("pyFM.refine.zoomout")
 convert = pytest.importorskip("pyFM.spectral.convert")
+functional = pytest.importorskip("pyFM.functional")
+energies = pytest.importorskip("pyFM.optimize")
+trimesh = pytest.importorskip("pyFM.mesh")
 
 N_MODES = 50
 
 
 @pytest.fixture(scope="module", params=["hand", pytest.param("cat", marks=pytest.mark.data)])
-def poses(request):
-    """Two shapes whose vertices have the same numbers, their spectra, and five of these numbers."""
+def meshes(request):
+    """Two shapes of area 1 whose vertices have the same numbers."""
     if request.param == "hand":
         mesh = es.make_creature("hand", 1, n_vertices=1200)
         meshes = (
@@ -27,6 +30,12 @@ def poses(request):
         meshes = tuple(
             es.read_mesh(folder / f"sumner_cat-{name}.ply") for name in ("reference", "05")
         )
+    return [es.geometry.normalize_area(mesh) for mesh in meshes]
+
+
+@pytest.fixture(scope="module")
+def poses(meshes):
+    """Their spectra, and six of these numbers."""
     spectra = [es.solve_spectrum(es.cotangent_laplacian(mesh), N_MODES) for mesh in meshes]
     return *spectra, es.geometry.farthest_points(meshes[0], 6)[0]
 
@@ -60,3 +69,64 @@ def test_a_point_map_and_its_matrix_are_theirs(poses):
         expected,
         atol=1e-9,
     )
+
+
+def fitted_by_them(meshes, spectra, descriptors, k):
+    """Their model with our eigenpairs and descriptors, and the weights of its terms in our units."""
+    theirs = []
+    for mesh, spectrum in zip(meshes, spectra, strict=True):
+        theirs.append(trimesh.TriMesh(np.array(mesh.vertices), np.array(mesh.faces)))
+        theirs[-1].process(k)
+        theirs[-1].eigenvalues = spectrum.eigenvalues
+        theirs[-1].eigenvectors = spectrum.eigenvectors
+    model = functional.FunctionalMapping(*theirs)
+    model.add_descriptors(*descriptors)
+    model._set_k(k)
+    ours, others = (
+        mesh.project(values, k=k)
+        for mesh, values in ((model.mesh1, model.descr1), (model.mesh2, model.descr2))
+    )
+    products, turns = model._compute_descr_op(), model._compute_orientation_op()
+    one, two = (spectrum.eigenvalues[:k] for spectrum in spectra)
+    gaps = (two[:, None] - one) ** 2
+    weights = (
+        k / np.sum(ours**2),
+        0.1 / max(one[-1], two[-1]) ** 2,
+        k / np.sum(products[0] ** 2),
+        k / np.sum(turns[0] ** 2),
+    )
+    return model, weights, (ours, others, products, turns, gaps)
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_descriptors_products_and_orientation_give_their_map(meshes, poses, turned):
+    """Their L-BFGS stops where our linear system has its solution, and nothing below it is found."""
+    source, target, _ = poses
+    k = 12
+    descriptors = [
+        values - spectrum.mass.sum(axis=1) @ values
+        for spectrum in (source, target)
+        for values in [es.wave_kernel_signature(spectrum)[:, ::10]]
+    ]
+    model, weights, terms = fitted_by_them(meshes, (source, target), descriptors, k)
+    if not turned:
+        weights = (*weights[:3], 0.0)
+    found = es.functional_map(
+        source,
+        target,
+        n_modes=k,
+        descriptors=descriptors,
+        meshes=meshes if turned else None,
+    ).matrix
+
+    energy, slope = energies.energy_and_grad_std(found.ravel(), *weights, *terms)
+    assert np.abs(slope).max() < 1e-9 * energy
+    # their weights are divided by sizes of the terms, which are taken out here
+    sizes = energies.weights.canonical_taus(*terms)
+    names = ("w_descr", "w_lap", "w_dcomm", "w_orient")
+    scaled = {name: w * size for name, w, size in zip(names, weights, sizes, strict=True)}
+    model.fit(
+        K=(k, k), use_resolvent_laplacian=False, optinit="identity", factr=1, pgtol=1e-12, **scaled
+    )
+    np.testing.assert_allclose(found, model.FM_12, atol=1e-4)
+    assert energy <= energies.energy_func_std(model.FM_12, *weights, *terms) * (1 + 1e-12)

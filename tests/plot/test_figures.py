@@ -194,3 +194,32 @@ def test_figures_take_lists_and_refuse_what_does_not_fit_the_mesh():
 
     with pytest.raises(InvalidParameterError, match="values must be finite; entry 1 is nan"):
         value_colors([0.0, np.nan])
+
+
+def test_vertices_without_a_value_are_gray_and_the_bar_says_so():
+    mesh = icosphere(2)
+    values = mesh.vertices[:, 0].copy()
+    values[values > 0.5] = np.nan
+    figure = figure_field(mesh, values, "x")
+    assert figure.axes[-1].get_ylabel() == "x (gray: no value)"
+    picture = figure.axes[0].images[0].get_array()
+    drawn = picture[picture[..., 3] > 0.99][:, :3]
+    gray = np.ptp(drawn, axis=1) < 0.02
+    assert 0.02 < gray.mean() < 0.5
+    known = np.where(np.isnan(values), 0.0, values)
+    drawn = figure_field(mesh, known, "x").axes[0].images[0].get_array()
+    drawn = drawn[drawn[..., 3] > 0.99][:, :3]
+    assert (np.ptp(drawn, axis=1) < 0.02).mean() < 0.02
+
+
+def test_limits_are_those_of_the_color_bar():
+    mesh = icosphere(1)
+    bar = figure_field(mesh, mesh.vertices[:, 0], limits=(-0.5, 2)).axes[-1]
+    assert bar.get_ylim() == (-0.5, 2)
+    assert figure_field(mesh, np.full(42, 3.0), limits=(0, 1)).axes[-1].get_ylim() == (0, 1)
+    with pytest.raises(InvalidParameterError, match=r"limits must be two numbers, the lower one"):
+        figure_field(mesh, mesh.vertices[:, 0], limits=(2, 1))
+    with pytest.raises(InvalidParameterError, match="values must hold a number; all are NaN"):
+        figure_field(mesh, np.full(42, np.nan))
+    with pytest.raises(InvalidParameterError, match="values must be finite"):
+        figure_field(mesh, np.full(42, np.inf))

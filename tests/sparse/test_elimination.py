@@ -148,3 +148,19 @@ def test_nothing_depends_on_the_run():
     )
     one, two = (factorize_symmetric(analyze_pattern(matrix), matrix.data) for _ in range(2))
     np.testing.assert_array_equal(one.panels, two.panels)
+
+
+def test_the_bound_of_rounding_is_that_of_the_factor_in_any_unit():
+    """Above the diagonal, panels of a large front keep numbers of the matrix, which are not of L."""
+    factor = np.random.default_rng(0).standard_normal((3 * WIDE, 3 * WIDE))
+    matrix = factor @ factor.T + 8 * np.eye(3 * WIDE)
+    elimination = analyze_pattern(sp.csc_array(matrix))
+    ordered = matrix[np.ix_(elimination.order, elimination.order)]
+    lower = np.linalg.cholesky(ordered)
+    sizes = (np.abs(lower) @ np.abs(lower.T)).sum(axis=1)
+    lengths = np.arange(1, 3 * WIDE + 1)
+    for unit in (1.0, 2.0**40):
+        found = factorize_symmetric(elimination, sp.csc_array(unit * matrix).data).rounding()
+        share = found[elimination.order] / (unit * np.finfo(np.float64).eps * sizes)
+        assert (share <= lengths + 5).all()
+        assert (share >= 4).all()

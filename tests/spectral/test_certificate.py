@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import eigenshape as es
 from eigenshape.spectral.certificate import Certificate
 
 WHOLE = Certificate(
@@ -43,3 +44,19 @@ def test_an_incomplete_spectrum_says_so_first():
 
 def test_all_eigenvalues_need_no_factor():
     assert "all that a matrix with 30 rows has" in replace(WHOLE, shift=np.inf).explain()
+
+
+def test_neighbors_count_as_equal_to_a_resolution_that_is_named():
+    """Their own bounds may tell them apart, so they are not called equal."""
+    split = es.TriangleMesh(
+        es.icosphere(3).vertices * [1.0, 1.0 + 1e-6, 1.0 - 1e-6], es.icosphere(3).faces
+    )
+    spectrum = es.solve_spectrum(es.cotangent_laplacian(split), 4)
+    apart = np.diff(spectrum.eigenvalues[1:])
+    assert (apart > 2 * spectrum.residuals.max()).all()
+    assert spectrum.certificate.clusters == (1, 3)
+    text = spectrum.certificate.explain()
+    assert (
+        f"Neighbors closer than {spectrum.certificate.resolution:.1e} (1/length²) count as" in text
+    )
+    assert "Some are equal" not in text

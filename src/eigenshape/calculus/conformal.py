@@ -21,6 +21,7 @@ from eigenshape.geometry.topology import (
     vertex_components,
 )
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.robust import robust_laplacian
 
 # Multiple of the mass that makes the conformal energy of a flat mesh definite, relative to the
 # largest entries of both. It changes the map by as much.
@@ -37,6 +38,8 @@ FLOW_STEP = 0.5
 PATIENCE, IMPROVEMENT = 10, 0.01
 # Radii within this of each other count as a sphere, whose radius is 1.
 ROUND = 0.3
+# Height of a triangle on the unit sphere, below which rounding decides how it lies.
+ROUNDING = 4 * np.finfo(np.float64).eps
 
 
 def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
@@ -131,13 +134,18 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
 
 
 def map_to_sphere(
-    mesh: MeshLike, *, n_steps: Integer = 500, progress: Progress | None = None
+    mesh: MeshLike,
+    *,
+    n_steps: Integer = 500,
+    progress: Progress | None = None,
 ) -> Float[np.ndarray, "n 3"]:
     """Map a closed surface of genus 0 to the unit sphere with little change of angles.
 
     Conformalized mean curvature flow until the surface is round (Kazhdan, Solomon and Ben-Chen
-    2012), then division by the radius. Parts that stick out, such as limbs, become very small; the
-    map is nearly conformal where the sphere's triangles stay well shaped.
+    2012), then division by the radius. The flow takes the Laplacian of intrinsic Delaunay
+    triangles, whose weights are positive, so that it turns no triangle over. Parts that stick out
+    become very small: a limb by exp(-length/radius), for the legs of a camel to 1e-13. The map is
+    nearly conformal where the sphere's triangles stay well shaped.
 
     Parameters
     ----------
@@ -152,7 +160,8 @@ def map_to_sphere(
     Returns
     -------
     (n, 3) float
-        Unit vectors, with the orientation of the surface; no triangle is turned over.
+        Unit vectors, with the orientation of the surface; no triangle is turned over, up to
+        rounding: one of height below 1e-15 may be.
 
     Raises
     ------
@@ -160,8 +169,8 @@ def map_to_sphere(
         If the mesh is not closed, connected and of genus 0, faces have no area or are repeated, or
         neighboring faces have opposite orientations.
     ConvergenceError
-        If the surface does not become round, triangles are turned over on the sphere, or faces are
-        too thin for the equations of the flow to be solved.
+        If the surface does not become round, triangles are turned over on the sphere or collapse
+        there, or faces are too thin for the equations of the flow to be solved.
 
     See Also
     --------
@@ -190,7 +199,7 @@ def map_to_sphere(
             f"components and Euler characteristic {euler} (a sphere has 2)."
         )
     points, _ = scale_to_unit(mesh)
-    stiffness = cotangent_laplacian(TriangleMesh(points, mesh.faces)).stiffness
+    stiffness = robust_laplacian(TriangleMesh(points, mesh.faces), mollify=0.0).stiffness
     sphere, least, n_idle = points, np.inf, 0
     report_progress = progress or silent
     for number in range(most):
@@ -219,13 +228,24 @@ def map_to_sphere(
             "mesh."
         )
     a, b, c = sphere[mesh.faces].transpose(1, 0, 2)
-    inward = np.flatnonzero(np.einsum("fi,fi->f", a, np.cross(b, c)) <= 0)
-    if len(inward) == mesh.n_faces:  # a surface that faces inward
-        return sphere
-    if inward.size:
+    heights = np.einsum("fi,fi->f", a, np.cross(b - a, c - a))
+    # Places on the sphere are rounded by about 1e-16, which decides how triangles lie whose height
+    # is less.
+    sides = np.linalg.norm([b - a, c - b, a - c], axis=2).max(axis=0)
+    pointlike = np.flatnonzero(sides <= ROUNDING)
+    if pointlike.size:
+        raise ConvergenceError(
+            "Where angles are kept, the ends of long limbs become smaller than rounding on the "
+            f"sphere; {pointlike.size} of {mesh.n_faces} triangles become points, the first is face "
+            f"{pointlike[0]}. Cut these limbs off."
+        )
+    if np.median(heights) < 0:  # a surface that faces inward
+        heights = -heights
+    turned = np.flatnonzero(heights < -ROUNDING * sides)
+    if turned.size:
         raise ConvergenceError(
             "A map to the sphere must not turn triangles over; it turns "
-            f"{inward.size} of {mesh.n_faces}, the first is face {inward[0]}. Use a finer mesh "
+            f"{turned.size} of {mesh.n_faces}, the first is face {turned[0]}. Use a finer mesh "
             'where limbs are thin, or try repair(mesh, ["collapse_needles"]).'
         )
     return sphere

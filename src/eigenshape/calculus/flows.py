@@ -20,6 +20,9 @@ from eigenshape.operators.graph import edge_graph
 # Steps of Taubin's filter, without unit: λ and μ of his paper's examples (0.33, -0.34) are weaker;
 # these give the pass band 1/λ + 1/μ = 0.1 that he recommends, with λ = 0.5.
 SHRINK, INFLATE = 0.5, -1 / 1.9
+# A mode inside the pass band grows a little in each step of Taubin's filter, by 1.0007 with these
+# weights: beyond this the shape is distorted more than noise would do.
+LARGEST_GROWTH = 2.0
 # A surface of less than this share of its first size counts as a point: with implicit steps it
 # shrinks on and on without ever becoming one.
 COLLAPSED = 1e-6
@@ -151,8 +154,8 @@ def taubin_smooth(
     Raises
     ------
     InvalidParameterError
-        If n_steps is not in 1..1,000,000, λ is not in 0..1, μ is not below -λ, or a fixed point is out of
-        range.
+        If n_steps is not in 1..1,000,000, λ is not in 0..1, μ is not below -λ, a mode would grow more
+        than 2 times in all steps, or a fixed point is out of range.
 
     See Also
     --------
@@ -176,6 +179,16 @@ def taubin_smooth(
     if not 0 < weight <= 1 or not back < -weight:
         raise InvalidParameterError(
             f"shrink must lie in 0..1 and inflate below -shrink; they are {weight} and {back}."
+        )
+    # Largest size of (1 - λk)(1 - μk): at its vertex, or at the highest mode k = 2.
+    vertex = (weight + back) / (2 * weight * back)
+    gain = max(abs((1 - weight * k) * (1 - back * k)) for k in (min(vertex, 2.0), 2.0))
+    if count * np.log(gain) > np.log(LARGEST_GROWTH):
+        most = int(np.log(LARGEST_GROWTH) / np.log(gain))
+        raise InvalidParameterError(
+            f"No mode may grow more than {LARGEST_GROWTH:g} times; in each step one grows {gain:.6g} "
+            f"times, so n_steps can be at most {most}; it is {count}. Take fewer steps, or inflate "
+            "nearer to -shrink."
         )
     moving = np.ones(mesh.n_points, dtype=bool)
     moving[require_points([] if fixed is None else fixed, mesh.n_points)] = False

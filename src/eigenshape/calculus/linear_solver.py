@@ -114,7 +114,7 @@ class LinearSolver(ReadOnly):
         InvalidParameterError
             If an array has another length or a number is not finite, a point that is fixed twice
             has two values, the right-hand side does not sum to 0 on a component where nothing is
-            fixed, or no x meets all constraints.
+            fixed, no x meets all constraints, or x is too large for floating-point numbers.
         """
         load = _columns(right, "right", self.n_points, "point")
         given = _columns(values, "values", len(self._given), "fixed point")
@@ -135,6 +135,12 @@ class LinearSolver(ReadOnly):
                 found = self._without_means(found)
             else:
                 found = self._constraints.correct(self, found, load, wanted)
+        bad = np.flatnonzero(~np.isfinite(found).all(axis=1))
+        if bad.size:
+            raise InvalidParameterError(
+                f"A solution must fit into floating-point numbers; at point {bad[0]} it does not "
+                f"({bad.size} such). Scale the shape to a size near 1 first, or the right-hand side."
+            )
         flat = max(np.ndim(each) for each in (right, values, targets)) < 2
         return found[:, 0] if flat else found
 
@@ -196,7 +202,8 @@ class LinearSolver(ReadOnly):
         inside = self.floating >= 0
         if not inside.any():
             return found
-        weights = self._weights[:, None]
+        # Relative weights: those of a large shape times its values would overflow.
+        weights = self._weights[:, None] / self._weights.max()
         means = self.floating_sums(weights * found) / self.floating_sums(weights)
         found[inside] -= means[self.floating[inside]]
         return found

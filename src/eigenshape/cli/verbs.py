@@ -9,7 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from eigenshape._errors import EigenshapeError
+from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape._text import printable
 from eigenshape.cli.console import err, escape_text
 from eigenshape.cli.interrupt import interruptible
@@ -70,7 +70,11 @@ UsageError: Any = typer.BadParameter.__base__
 
 
 class Verb(TyperCommand):
-    """A verb: errors of the library and of the system become one line and exit code 1, Ctrl-C 130."""
+    """A verb: errors become one line. Exit codes: 2 for a wrong option, 1 for other errors, 130 for Ctrl-C."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return options and arguments, as help lists them."""
+        return _flags_without_type(super().get_params(ctx))
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the options and arguments of the verb."""
@@ -89,7 +93,7 @@ class Verb(TyperCommand):
             if isinstance(error, OSError) and error.filename is not None:
                 text = f"{error.filename}: {error.strerror}"  # without the number of the error
             err.print(f"[bold red]error:[/] {escape_text(text)}")
-            raise typer.Exit(1) from error
+            raise typer.Exit(2 if isinstance(error, InvalidParameterError) else 1) from error
         except KeyboardInterrupt as error:
             err.print("stopped; what was finished is kept")
             raise typer.Exit(130) from error
@@ -104,6 +108,10 @@ class Verbs(TyperGroup):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.commands = {name: TyperCommand(name, help=line) for name, line in self.lines.items()}
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the options before the verb, as help lists them."""
+        return _flags_without_type(super().get_params(ctx))
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the options before the verb."""
@@ -159,6 +167,14 @@ def load_verb(name: str) -> Any:
     *group, verb = name.split()
     verbs = (IndexVerbs if group else Verbs)(name=name)
     return verbs.load(verb)
+
+
+def _flags_without_type(params: list[Any]) -> list[Any]:
+    """Let help print `--json`, not `--json <bool>`: a flag takes no value."""
+    for param in params:
+        if getattr(param, "is_flag", False):
+            param.display_type_rich = lambda ctx: None
+    return params
 
 
 @contextmanager

@@ -235,8 +235,12 @@ def require_boundary(
     rim = region_boundary(mesh, mask)
     if len(rim):
         return rim
-    whole = f"holds {mask.sum()} of {len(mask)} vertices, whole components"
-    what = whole if mask.any() else "holds no vertex"
+    what = f"holds {mask.sum()} of {len(mask)} vertices, whole components"
+    if not mask.any():
+        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        spans = zip("xyz", low, high, strict=True)
+        where = ", ".join(f"{start:.4g} to {end:.4g} in {axis}" for axis, start, end in spans)
+        what = f"holds no vertex, and the shape lies from {where}"
     raise InvalidParameterError(
         f"A region must have a boundary on the shape, where it bends; region {number} {what}. "
         "To move a whole component, transform its vertices."

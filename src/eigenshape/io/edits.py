@@ -6,7 +6,7 @@ from pathlib import Path
 
 from eigenshape._arguments import require_each
 from eigenshape._errors import FileFormatError
-from eigenshape._files import read_regular, replacing
+from eigenshape._files import as_path, read_regular, replacing
 from eigenshape.deformation.edits import Edit, edits_from_json, edits_to_json
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 
@@ -47,7 +47,7 @@ def write_edits(edits: Sequence[Edit], mesh: MeshLike, path: str | Path) -> None
     require_each(edits, Edit, "edits")
     mesh = as_mesh(mesh)
     text = json.dumps(edits_to_json(edits, mesh), indent=1) + "\n"
-    with replacing(Path(path)) as file:
+    with replacing(as_path(path)) as file:
         file.write(text.encode())
 
 
@@ -88,9 +88,9 @@ def read_edits(path: str | Path, mesh: MeshLike) -> list[Edit]:
     >>> len(es.io.read_edits(path, mesh))
     1
     """
-    mesh = as_mesh(mesh)
+    mesh, path = as_mesh(mesh), as_path(path)
     try:
-        content = json.loads(read_regular(Path(path), "edits"))
+        content = json.loads(read_regular(path, "edits"))
     except (ValueError, RecursionError) as err:
         raise FileFormatError(f"A file of edits must hold JSON; {path} does not: {err}.") from err
     return edits_from_json(content, mesh)

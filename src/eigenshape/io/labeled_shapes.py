@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from eigenshape._errors import FileFormatError
+from eigenshape._files import as_path
 from eigenshape.io.labels import read_labels
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.parsing import MESH_FORMATS
@@ -72,7 +73,7 @@ def read_labeled_shape(path: str | Path, labels: str | Path | None = None) -> La
     >>> set(es.io.read_labeled_shape(folder / "ball.off").labels.tolist())
     {3}
     """
-    path = Path(path)
+    path = as_path(path)
     found = find_labels(path) if labels is None else Path(labels)
     return LabeledShape(read_mesh(path), read_labels(found))
 
@@ -116,7 +117,7 @@ def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
     >>> found.labels.shape == (other.n_faces,)
     True
     """
-    folder = Path(folder)
+    folder = as_path(folder, "folder")
     paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in MESH_FORMATS)
     if not paths:
         raise FileFormatError(
@@ -151,7 +152,7 @@ def read_label_names(folder: str | Path) -> list[str]:
     >>> es.io.read_label_names(folder)
     ['torso', 'leg']
     """
-    path = Path(folder) / NAMES_FILE
+    path = as_path(folder, "folder") / NAMES_FILE
     if not path.exists():
         return []
     return [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]

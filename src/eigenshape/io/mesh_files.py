@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Int, UInt8
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape._files import read_regular, replace_file
+from eigenshape._files import as_path, read_regular, replace_file
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io import glb, obj, off, ply, stl
@@ -79,7 +79,7 @@ def read_mesh(
     >>> mesh.faces.tolist()
     [[0, 1, 2], [0, 2, 3]]
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = suffix_of(path, file_format, MESH_FORMATS)
     require_kind(cells)
     data = read_regular(path)
@@ -165,7 +165,7 @@ def write_mesh(
     True
     """
     mesh = as_mesh(mesh)
-    path = Path(path)
+    path = as_path(path)
     suffix = suffix_of(path, None, WRITTEN)
     write = _writer(suffix, suffix in BINARY if binary is None else binary)
     if colors is not None:

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidShapeError
-from eigenshape._files import read_regular, replace_file
+from eigenshape._files import as_path, read_regular, replace_file
 from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
@@ -91,7 +91,7 @@ def read_shape(
     >>> curve.dim, curve.simplices.tolist()
     (1, [[0, 1], [1, 2]])
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = suffix_of(path, file_format, SHAPE_FORMATS)
     require_kind(cells)
     data = read_regular(path)
@@ -195,7 +195,7 @@ def write_points(cloud: PointCloud, path: str | Path) -> None:
     True
     """
     require_type(cloud, PointCloud, "cloud")
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
     if suffix not in WRITERS:
         raise FileFormatError(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from eigenshape._files import read_regular
+from eigenshape._files import as_path, read_regular
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair, suggest_repairs
@@ -63,7 +63,7 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
     >>> ball.report
     ('reconstruct_surface made 2,000 vertices and 3,996 faces of 642 points',)
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = suffix_of(path, file_format, SHAPE_FORMATS)
     data = read_regular(path)
     with naming(path):

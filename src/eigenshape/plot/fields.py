@@ -9,7 +9,13 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import face_labels, finite_values, vertex_values, whole_numbers
+from eigenshape._arrays import (
+    face_labels,
+    finite_values,
+    real_numbers,
+    vertex_values,
+    whole_numbers,
+)
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -20,6 +26,7 @@ from eigenshape.plot.render import Drawing, draw, palette
 from eigenshape.spectral.spectrum import Spectrum
 
 PANEL = 3.2  # inches; width of one drawing
+NO_VALUE = "0.72"  # gray of vertices without a value, as of faces without a part
 DOT = 46.0  # square points; area of the mark of a vertex
 
 
@@ -126,15 +133,18 @@ def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each cho
     view: View = "auto",
     up: Up = "auto",
     color_map: str = "viridis",
+    limits: tuple[float, float] | None = None,
 ) -> Figure:
     """Draw one function on a mesh, with a color bar.
+
+    Vertices without a value are gray, and the color bar says so.
 
     Parameters
     ----------
     mesh : MeshLike
         With n vertices.
     values : (n,) float
-        The function, one value for each vertex.
+        The function, one value for each vertex; NaN where there is none.
     label : str
         Text beside the color bar, such as the name of the function and its unit.
     camera : Camera, optional
@@ -145,6 +155,9 @@ def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each cho
         The upward direction, as in `aim_camera`.
     color_map : str
         Name of a color map of matplotlib.
+    limits : (float, float), optional
+        Values at the ends of the color bar, so that several pictures have the same colors; values
+        beyond them have the colors of the ends. The default is the lowest and the highest value.
 
     Returns
     -------
@@ -153,7 +166,8 @@ def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each cho
     Raises
     ------
     InvalidParameterError
-        If `values` does not hold one finite number per vertex, or the view is not valid.
+        If `values` does not hold one number per vertex, one is infinite or all are NaN, `limits` is
+        not two ascending numbers, or the view is not valid.
 
     See Also
     --------
@@ -171,11 +185,24 @@ def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each cho
     mesh = as_mesh(mesh)
     figure = Figure(figsize=(2 * PANEL + 1.2, 2 * PANEL), layout="constrained")
     axes = figure.subplots()
-    field = vertex_values(values, "values", mesh.n_vertices)
-    scale, colors = Normalize(float(field.min()), float(field.max())), mpl.colormaps[color_map]
+    field = real_numbers(values, "values").astype(np.float64)
+    missing = np.isnan(field)
+    if field.size and missing.all():
+        raise InvalidParameterError("values must hold a number; all are NaN.")
+    known = vertex_values(np.where(missing, 0.0, field), "values", mesh.n_vertices)[~missing]
+    ends = finite_values([known.min(), known.max()] if limits is None else [*limits], "limits")
+    if len(ends) != 2 or ends[0] > ends[1]:
+        raise InvalidParameterError(
+            f"limits must be two numbers, the lower one first; they are {ends.tolist()}."
+        )
+    scale, colors = Normalize(*ends), mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
     camera = choose_camera(mesh, camera, view, up)
-    show(axes, draw(mesh, camera, vertex_colors=map_colors(field, scale, colors)))
-    figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8).set_label(label)
+    shown = map_colors(np.ma.masked_array(field, missing), scale, colors)
+    show(axes, draw(mesh, camera, vertex_colors=shown))
+    below, above = bool((known < ends[0]).any()), bool((known > ends[1]).any())
+    extend = {(1, 1): "both", (1, 0): "min", (0, 1): "max", (0, 0): "neither"}[below, above]
+    bar = figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8, extend=extend)
+    bar.set_label(f"{label} (gray: no value)".strip() if missing.any() else label)
     return figure
 
 

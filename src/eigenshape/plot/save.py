@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
-from eigenshape._files import replacing
+from eigenshape._files import as_path, replacing
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -20,7 +20,7 @@ def require_picture_path(path: str | Path) -> Path:
     InvalidParameterError
         If the path does not end in .png, .svg or .pdf, or its folder does not exist.
     """
-    path = Path(path)
+    path = as_path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InvalidParameterError(
             f"A picture must end in {', '.join(SUFFIXES)}; {path} ends in {path.suffix!r}."

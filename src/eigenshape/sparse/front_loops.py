@@ -203,14 +203,15 @@ def add_sizes(first, begins, rows, places, panels, pivots, weights, sizes, terms
             columns = min(WIDE, first[s + 1] - mine)
             top = begins[s] + mine - first[s]
             height = begins[s + 1] - top
+            # Above the diagonal, panels of large fronts keep numbers that are not of L.
             for i in range(height):
-                for j in range(columns):
+                for j in range(min(columns, i + 1)):
                     weights[mine + j] += abs(panels[at + i * columns + j])
             for j in range(columns):
                 weights[mine + j] *= abs(pivots[mine + j])
             for i in range(height):
                 total = 0.0
-                for j in range(columns):
+                for j in range(min(columns, i + 1)):
                     total += abs(panels[at + i * columns + j]) * weights[mine + j]
                 sizes[rows[top + i]] += total
                 terms[rows[top + i]] += min(columns, i + 1)

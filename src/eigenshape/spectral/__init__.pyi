@@ -22,8 +22,8 @@ from .laws.report import OperatorReport as OperatorReport
 from .laws.report import SkippedLaw as SkippedLaw
 from .maps.functional_map import FunctionalMap as FunctionalMap
 from .maps.functional_map import compose_maps as compose_maps
-from .maps.functional_map import functional_map as functional_map
 from .maps.functional_map import transfer_function as transfer_function
+from .maps.map_fit import functional_map as functional_map
 from .maps.point_maps import map_from_points as map_from_points
 from .maps.point_maps import point_map as point_map
 from .maps.point_maps import refine_map as refine_map

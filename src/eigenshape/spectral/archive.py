@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from eigenshape._errors import FileFormatError
-from eigenshape._files import replacing, require_regular
+from eigenshape._files import as_path, replacing, require_regular
 from eigenshape.spectral.certificate import Certificate
 
 # Version of the file format; a file of another version is refused.
@@ -35,7 +35,7 @@ def write_archive(
     head = json.dumps(
         {"eigenshape_spectrum": FORMAT, "key": key, "certificate": asdict(certificate)}
     )
-    with replacing(Path(path)) as file:
+    with replacing(as_path(path)) as file:
         np.savez(file, **{**parts, **arrays, "head": np.array(head)})
 
 
@@ -48,9 +48,9 @@ def read_archive(path: str | Path, key: str | None) -> dict[str, Any]:
         If the file is no spectrum, is cut off, its parts do not fit one another or hold what no
         spectrum holds, or it has another key than the given one.
     """
-    require_regular(Path(path))
+    require_regular(as_path(path))
     try:
-        with Path(path).open("rb") as file:
+        with as_path(path).open("rb") as file:
             require_uncompressed(path, file, "a spectrum")
             with np.load(file, allow_pickle=False) as archive:
                 certificate = _certificate(path, json.loads(str(archive["head"])), key)

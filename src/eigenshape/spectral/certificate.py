@@ -157,7 +157,10 @@ class Certificate:
         largest = max(self.clusters, default=1)
         if largest == 1:
             return ""
-        return f" Some are equal: there are {len(self.clusters)} different ones, and the largest cluster has {largest}."
+        return (
+            f" Neighbors closer than {self.resolution:.1e} (1/length²) count as equal here: there are "
+            f"{len(self.clusters)} different ones, and the largest cluster has {largest}."
+        )
 
     def _split(self) -> str:
         if self.n_split == 0:
@@ -167,8 +170,8 @@ class Certificate:
         last = "The last one belongs" if cut == 1 else f"The last {cut} belong"
         return (
             f"{last} to a cluster of {whole[1] - whole[0]} eigenvalues "
-            f"(equal to {self.resolution:.1e}, 1/length²) of which {self.n_split} were not asked for, so which "
-            f"eigenvectors stand for it is one choice among many; {_whole_clusters(*whole)} keeps it whole."
+            f"(neighbors closer than {self.resolution:.1e}, 1/length²) of which {self.n_split} were not asked for, so "
+            f"which eigenvectors stand for it is one choice among many; {_whole_clusters(*whole)} keeps it whole."
         )
 
 

@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._files import as_path
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
@@ -173,6 +174,7 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
 
     key = ""
     if cache is not None:
+        cache = as_path(cache, "cache")
         # Only the free part of the operator is hashed and kept: it determines the spectrum.
         key = content_key(operator, request)
         kept = load_kept(cache, key)

@@ -73,8 +73,9 @@ def test_one_cluster_is_everything():
 def test_bad_input_is_named():
     graph, groups = planted((8, 12, 20), 0, noise=0.0)
     spectrum = spectrum_of(graph, 8)
-    with pytest.raises(es.InvalidParameterError, match="at least the number of components, 3"):
-        es.spectral.spectral_clusters(spectrum, 2)
+    for few in (1, 2):
+        with pytest.raises(es.InvalidParameterError, match="at least the number of components, 3"):
+            es.spectral.spectral_clusters(spectrum, few)
     with pytest.raises(es.InvalidParameterError, match=r"n_clusters must lie in 1\.\.8; it is 9"):
         es.spectral.spectral_clusters(spectrum, 9)
     with pytest.raises(es.InvalidParameterError, match='"k-means" or "normalized-cut"'):
@@ -185,3 +186,12 @@ def test_the_cut_of_an_operator_with_corrected_eigenvalues_is_refused():
     laplacian = es.mesh_laplacian(ball, correct="log")
     with pytest.raises(es.InvalidParameterError, match="must be given by its matrices alone"):
         es.spectral.normalized_cut(laplacian, np.zeros(ball.n_vertices, dtype=int))
+
+
+def test_estimators_name_a_shape_that_is_given_for_points():
+    ball = es.icosphere(1)
+    for estimator in (es.spectral.SpectralEmbedder, es.spectral.SpectralClusterer):
+        with pytest.raises(
+            es.InvalidParameterError, match=r"takes \(n, d\) data points; X is a Tri"
+        ):
+            estimator().fit(ball)

@@ -16,7 +16,7 @@ from eigenshape.spectral.solve import solve_spectrum
 N_VALUES = 20
 
 
-def shape_dna(mesh: MeshLike, *, n_values: SupportsIndex | None = None) -> Float[np.ndarray, " k"]:
+def shape_dna(mesh: MeshLike, n_values: SupportsIndex | None = None) -> Float[np.ndarray, " k"]:
     """Describe a shape by the lowest eigenvalues of its cotangent Laplacian, without the first.
 
     Entry i is A λ_i / i, with A the area, so that the size of the shape does not matter. Of the

@@ -11,6 +11,7 @@ from typing import Any, SupportsIndex
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import StoreError
+from eigenshape._files import as_path
 from eigenshape._text import html_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
@@ -104,7 +105,7 @@ class ShapeIndex:
             index = cls(Path(tempfile.mkdtemp(prefix="eigenshape-", dir=place)))
             weakref.finalize(index, rmtree, index.folder, ignore_errors=True)
         else:
-            index = cls(Path(folder))
+            index = cls(as_path(folder, "folder"))
         store.create(index.folder)
         return index
 
@@ -125,7 +126,7 @@ class ShapeIndex:
         StoreError
             If the folder is no index, its format is another one, or its database cannot be read.
         """
-        index = cls(Path(folder))
+        index = cls(as_path(folder, "folder"))
         len(index)
         return index
 

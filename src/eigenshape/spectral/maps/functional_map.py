@@ -3,21 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as sl
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, as_array, freeze, real_numbers, whole_number
+from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
 
-N_MODES = 20  # of each shape by default, for exact pairs; inexact ones need fewer
-# Weight of the commutativity penalty relative to the pairs. A larger weight draws the map towards
-# the identity of the spectra, a smaller one lets a few pairs determine many entries.
-COMMUTING = 0.1
 # Share of the constant function that the first mode may lack. The eigenvectors of the approximate
 # solver lack some of it; with a fixed boundary or in an interval most of it is missing.
 LOST = 1e-3
@@ -47,7 +42,7 @@ class FunctionalMap(ReadOnly):
 
     See Also
     --------
-    functional_map : Compute a map from pairs of points.
+    functional_map : Compute a map from pairs of points, or from descriptors.
 
     Examples
     --------
@@ -141,116 +136,9 @@ def unit_modes(spectrum: Spectrum, k: int) -> Float[np.ndarray, "n k"]:
     return spectrum.eigenvectors[:, :k] * np.sqrt(point_areas(spectrum).sum())
 
 
-@one_blas_thread()
-def functional_map(
-    source: Spectrum, target: Spectrum, pairs: ArrayLike, *, n_modes: Integer = N_MODES
-) -> FunctionalMap:
-    """Compute a functional map between two shapes from a few pairs of corresponding points.
-
-    Minimizes Σ_p w_p |C a_p - b_p|² + μ Σ_ij (λ'_i - λ_j)² C_ij² over maps C that keep constants,
-    with a_p and b_p the coefficients of unit masses at the points of pair p, w_p = 1/(|a_p| |b_p|),
-    and λ × area for λ (Ovsjanikov and others 2012, section 4). A few pairs are enough: the
-    commutativity penalty determines the rest. In a comparison on nine pairs of poses of a horse, a
-    cat and a lion (5,000 to 8,400 vertices, six pairs chosen by hand), wave functions at the points
-    instead of unit masses were no better, and heat was worse.
-
-    The shapes should be nearly isometric; maps of parts of shapes are not supported. If all pairs
-    are mirrored, as those of `es.retrieval.match_patches` may be, the map is mirrored too.
-
-    Parameters
-    ----------
-    source, target : Spectrum
-        Of connected shapes of any size.
-    pairs : (p, 2) int
-        A vertex of the source and the corresponding vertex of the target in each row; at least one
-        pair, and more if the shape is symmetric.
-    n_modes : int
-        Number of modes of each shape. Use 10 for inexact pairs, such as those of `match_patches`,
-        and 20 for exact ones. `refine_map` extends the map to more modes.
-
-    Returns
-    -------
-    FunctionalMap
-
-    Raises
-    ------
-    InvalidParameterError
-        If there is no pair, a pair names no vertex, or a spectrum has too few modes or does not
-        begin with one constant function.
-
-    See Also
-    --------
-    es.spectral.refine_map : Extend a map to more modes.
-    es.spectral.point_map : Convert a map to corresponding vertices.
-    es.spectral.transfer_function : Transfer functions by a map.
-
-    Examples
-    --------
-    A shape and a larger copy of it, with three pairs:
-
-    >>> import eigenshape as es
-    >>> mesh = es.make_creature("quadruped", n_vertices=500)
-    >>> copy = es.TriangleMesh(3 * mesh.vertices, mesh.faces)
-    >>> source, target = (es.solve_spectrum(es.cotangent_laplacian(m), 20) for m in (mesh, copy))
-    >>> pairs = [[0, 0], [100, 100], [200, 200]]
-    >>> mapping = es.functional_map(source, target, pairs, n_modes=8)
-    >>> mapping.matrix.shape
-    (8, 8)
-    >>> refined = es.spectral.refine_map(mapping, 20)
-    >>> partners = es.spectral.point_map(refined)
-    >>> bool((partners == range(len(mesh.vertices))).mean() > 0.9)
-    True
-    """
-    require_type(source, Spectrum, "source")
-    require_type(target, Spectrum, "target")
-    k = modes_of_both(source, target, n_modes)
-    ends = _as_pairs(pairs, len(source.eigenvectors), len(target.eigenvectors))
-    ours, theirs = unit_modes(source, k)[ends[:, 0]], unit_modes(target, k)[ends[:, 1]]
-    weights = (np.linalg.norm(ours, axis=1) * np.linalg.norm(theirs, axis=1))[:, None] ** -0.5
-    return FunctionalMap(
-        _least_squares(weights * ours, weights * theirs, _commutators(source, target, k)),
-        source,
-        target,
-    )
-
-
-def _commutators(source: Spectrum, target: Spectrum, k: int) -> Float[np.ndarray, "k k"]:
-    """Return λ'_i - λ_j, relative to the largest eigenvalue."""
-    ours, theirs = (
-        spectrum.eigenvalues[:k] * point_areas(spectrum).sum() for spectrum in (source, target)
-    )
-    return (theirs[:, None] - ours) / max(ours[-1], theirs[-1])
-
-
-def _least_squares(
-    ours: Float[np.ndarray, "p k"],
-    theirs: Float[np.ndarray, "p k"],
-    commutators: Float[np.ndarray, "k k"],
-) -> Float[np.ndarray, "k k"]:
-    """Solve for each row of the map with its first column that of the identity."""
-    matrix = np.eye(len(commutators))
-    scale = np.sqrt(COMMUTING * np.sum(ours**2) / len(commutators))
-    for i, row in enumerate(commutators):
-        wanted = theirs[:, i] - matrix[i, 0] * ours[:, 0]
-        system = np.concatenate([ours[:, 1:], scale * np.diag(row[1:])])
-        matrix[i, 1:] = sl.lstsq(system, np.concatenate([wanted, np.zeros(len(row) - 1)]))[0]
-    return matrix
-
-
-def _as_pairs(pairs: ArrayLike, n_source: int, n_target: int) -> Int[np.ndarray, "p 2"]:
-    rows = as_array(pairs, "pairs")
-    if rows.ndim != 2 or rows.shape[1] != 2 or not len(rows) or rows.dtype.kind not in "iu":
-        raise InvalidParameterError(
-            f"pairs must be whole numbers in shape (p, 2), at least one row; the shape is {rows.shape} and the type "
-            f"{rows.dtype}."
-        )
-    bad = np.flatnonzero(((rows < 0) | (rows >= [n_source, n_target])).any(axis=1))
-    if bad.size:
-        raise InvalidParameterError(
-            f"pairs must name vertices 0..{n_source - 1} of the source and 0..{n_target - 1} of the target; pair "
-            f"{bad[0]} is {rows[bad[0]].tolist()}."
-        )
-    return rows.astype(np.int64)
+def unit_projector(spectrum: Spectrum, k: int) -> Float[np.ndarray, "n k"]:
+    """Return B φ_i / √A, whose transpose gives the coefficients of a function in `unit_modes`."""
+    return np.asarray(spectrum.mass @ unit_modes(spectrum, k) / point_areas(spectrum).sum())
 
 
 @one_blas_thread()
@@ -297,8 +185,7 @@ def transfer_function(mapping: FunctionalMap, values: ArrayLike) -> Float[np.nda
     if bad.size:
         raise InvalidParameterError(f"values must be finite; row {bad[0]} is {functions[bad[0]]}.")
     k2, k1 = mapping.matrix.shape
-    weighed = mapping.source.mass @ functions / point_areas(mapping.source).sum()
-    coefficients = mapping.matrix @ (unit_modes(mapping.source, k1).T @ weighed)
+    coefficients = mapping.matrix @ (unit_projector(mapping.source, k1).T @ functions)
     return np.asarray(unit_modes(mapping.target, k2) @ coefficients)
 
 

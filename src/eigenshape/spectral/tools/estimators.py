@@ -9,8 +9,12 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._arguments import describe_value
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, MissingExtraError
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
@@ -109,16 +113,13 @@ class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
     def fit(self, X: Any, y: object = None) -> SpectralEmbedder:
         """Compute the embedding of (n, d) points; `y` is ignored."""
         del y
+        _require_data_points(X)
         points = validate_data(self, X, dtype=np.float64, ensure_min_samples=2)
         if self.method not in (*POWERS, "diffusion"):
             raise InvalidParameterError(
                 f"method must be one of {', '.join([*POWERS, 'diffusion'])}; it is {self.method!r}."
             )
-        if not 1 <= self.n_components < len(points):
-            raise InvalidParameterError(
-                f"n_components must lie in 1..{len(points) - 1}, below the number of points; it is "
-                f"{self.n_components}."
-            )
+        whole_number(self.n_components, "n_components", 1, len(points) - 1)
         n_pairs = self.n_components + 1
         self.spectrum_, self.n_neighbors_ = _graph_spectrum(points, self.n_neighbors, n_pairs, 1)
         if self.method == "diffusion":
@@ -199,13 +200,10 @@ class SpectralClusterer(ClusterMixin, BaseEstimator):  # type: ignore[misc]
     def fit(self, X: Any, y: object = None) -> SpectralClusterer:
         """Compute the clusters of (n, d) points; `y` is ignored."""
         del y
+        _require_data_points(X)
         points = validate_data(self, X, dtype=np.float64, ensure_min_samples=2)
         wanted = 1 if self.n_clusters is None else self.n_clusters
-        if not 1 <= wanted <= len(points):
-            raise InvalidParameterError(
-                f"n_clusters must lie in 1..{len(points)}, at most the number of points; it is "
-                f"{self.n_clusters}."
-            )
+        whole_number(wanted, "n_clusters", 1, len(points))
         most = len(points) if self.n_clusters is None else wanted
         n_pairs = min(wanted + SPARE_PAIRS, len(points))
         self.spectrum_, self.n_neighbors_ = _graph_spectrum(points, self.n_neighbors, n_pairs, most)
@@ -218,6 +216,21 @@ class SpectralClusterer(ClusterMixin, BaseEstimator):  # type: ignore[misc]
         """Compute the clusters of (n, d) points and return the cluster of each."""
         del kwargs
         return self.fit(X, y).labels_
+
+
+def _require_data_points(X: Any) -> None:
+    """Raise an error for our own shapes: an estimator takes data points.
+
+    Raises
+    ------
+    InvalidParameterError
+        The message names what takes a shape instead.
+    """
+    if isinstance(X, TriangleMesh | SimplicialMesh | PointCloud):
+        raise InvalidParameterError(
+            f"An estimator takes (n, d) data points; X is {describe_value(X)}. Pass its points, or use "
+            f"es.spectral.spectral_embedding and es.spectral.spectral_clusters with the spectrum of the shape."
+        )
 
 
 def _graph_spectrum(

@@ -1,0 +1,275 @@
+"""Each row of the tables for people who come from other libraries runs: their code, and ours beside it.
+
+Code stands between backticks. Calls and assignments run in the order of the row. A name without a call is looked up on
+their side, and called with right arguments on ours. Where both sides give numbers of the same shape, these are equal,
+but for the rows that say how they differ.
+"""
+
+import ast
+import contextlib
+import io
+import re
+from collections.abc import Callable
+from importlib import import_module
+from inspect import isfunction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from laws.natural_slips import right_arguments
+
+import eigenshape as es
+
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "coming_from"
+DIFFERENCE = re.compile(r"\b(theirs|differ)\b")  # with which a row says that numbers are not equal
+
+
+class Instance:
+    """Their class, whose methods are those of a fresh instance, as a table writes them."""
+
+    def __init__(self, kind: type, make: Callable[[], Any]) -> None:
+        self.kind, self.make = kind, make
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        return self.kind(*args, **kwargs)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.make(), name)
+
+
+def bumpy_ball() -> es.TriangleMesh:
+    ball = es.icosphere(2)
+    x, y, z = ball.vertices.T
+    radius = 1 + 0.3 * x * y + 0.2 * z**3 + 0.1 * np.sin(3 * x + y)
+    return es.TriangleMesh(ball.vertices * [1.0, 1.3, 0.8] * radius[:, None], ball.faces)
+
+
+def shared_names(folder: Path) -> dict[str, Any]:
+    """What code on both sides may use: arrays and files."""
+    mesh, sheet, solid = bumpy_ball(), es.shapes.grid(8, 6), es.shapes.box(3, 3, 3)
+    es.write_mesh(mesh, folder / "shape.off")
+    es.io.write_points(es.PointCloud(mesh.vertices), folder / "points.ply")
+    rim = es.geometry.boundary_loops(sheet)[0]
+    loop = [*mesh.faces[10], mesh.faces[10][0]]
+    angles = np.linspace(0, 2 * np.pi, len(rim), endpoint=False)
+    return {
+        "np": np,
+        "sp": sp,
+        "V": np.array(mesh.vertices),
+        "F": np.array(mesh.faces),
+        "P": np.array(mesh.vertices),
+        "T": np.array(solid.simplices),
+        "v": np.array(mesh.vertices),
+        "t": np.array(mesh.faces),
+        "v4": np.array(solid.points),
+        "t4": np.array(solid.simplices),
+        "h": np.array(mesh.vertices[:, 1]),
+        "values": np.array(mesh.vertices[:, 1]),
+        "heights": np.array([0.0, 1.0]),
+        "sheet_V": np.array(sheet.vertices),
+        "sheet_F": np.array(sheet.faces),
+        "solid_V": np.array(solid.points),
+        "rim": np.array(rim),
+        "circle": np.column_stack([np.cos(angles), np.sin(angles)]),
+        "points": 0.9 * mesh.vertices[:7],
+        "path": str(folder / "shape.off"),
+        "points_path": str(folder / "points.ply"),
+        "new_path": str(folder / "new.obj"),
+        "sheet_values": sheet.vertices[:, 0] ** 2,
+        "segments": np.column_stack([np.arange(len(rim)), np.roll(np.arange(len(rim)), -1)]),
+        "f": np.array(mesh.vertices[:, 1]),
+        "on_faces": np.array(mesh.vertices[mesh.faces[:, 0], 1]),
+        "vectors": np.array(es.calculus.gradient(mesh, mesh.vertices[:, 1])),
+        "b": np.array([3, 90]),
+        "bc": np.array([[0.0], [1.0]]),
+        "sources": np.array([3, 90]),
+        "p2p": np.arange(len(mesh.vertices)),
+        "B": np.zeros((len(mesh.vertices), 1)),
+        "Aeq": sp.csc_matrix(np.eye(1, len(mesh.vertices), 50)),
+        "Beq": np.array([[0.3]]),
+        "ends": np.array([0, 8]),
+        "end_places": np.array([[0.0, 0.0], [1.0, 0.0]]),
+        "t_coef": 1.0,
+        "use_robust": False,
+        "loop": loop,
+        "points_on_mesh": [[(3, []), (90, [])]],
+        "curves_on_mesh": [[(int(vertex), []) for vertex in loop]],
+        "landmarks": np.array([[0, 0], [40, 40], [80, 80]]),
+        "times": [0.1, 0.5],
+        "i": 3,
+        "j": 90,
+        "k": 12,
+        "n": 20,
+        "m": 1.0,
+        "level": 0.1,
+    }
+
+
+def our_names(shared: dict[str, Any]) -> dict[str, Any]:
+    mesh = bumpy_ball()
+    laplacian = es.cotangent_laplacian(mesh)
+    spectrum = es.solve_spectrum(laplacian, 40)
+    return shared | {
+        "es": es,
+        "mesh": mesh,
+        "sheet": es.shapes.grid(8, 6),
+        "solid": es.shapes.box(3, 3, 3),
+        "cloud": es.PointCloud(mesh.vertices, dim=2),
+        "laplacian": laplacian,
+        "spectrum": spectrum,
+        "source": spectrum,
+        "target": spectrum,
+        "mesh1": mesh,
+        "mesh2": mesh,
+        "pairs": shared["landmarks"],
+    }
+
+
+def names_of_lapy(shared: dict[str, Any]) -> dict[str, Any]:
+    lapy = import_module("lapy")
+    tet = lapy.TetMesh(shared["solid_V"], shared["T"])
+    tet.orient_()
+
+    def tria() -> Any:
+        return lapy.TriaMesh(shared["V"].copy(), shared["F"].copy())
+
+    names = {name: import_module(f"lapy.{name}") for name in ("diffgeo", "heat", "shapedna")}
+    names |= {name: import_module(f"lapy.{name}") for name in ("conformal", "solver", "intersect")}
+    names |= {name: import_module(f"lapy.{name}") for name in ("remesh", "plot", "io")}
+    for module in list(names.values()):
+        names |= {key: value for key, value in vars(module).items() if key not in names}
+    tria().write_vtk(shared["path"].replace(".off", ".vtk"))
+    evals, evecs = lapy.Solver(tria()).eigs(12)
+    return names | {
+        "lapy": lapy,
+        "TriaMesh": Instance(lapy.TriaMesh, tria),
+        "TetMesh": Instance(lapy.TetMesh, lambda: tet),
+        "Solver": Instance(lapy.Solver, lambda: lapy.Solver(tria())),
+        "Polygon": Instance(lapy.Polygon, lambda: lapy.Polygon(shared["circle"])),
+        "tria": tria(),
+        "tet": tet,
+        "evals": evals,
+        "evecs": evecs,
+        "vtk_path": shared["path"].replace(".off", ".vtk"),
+    }
+
+
+def names_of_libigl(shared: dict[str, Any]) -> dict[str, Any]:
+    igl, edges = import_module("igl"), es.geometry.edge_table((shared["V"], shared["F"]))
+    return {"igl": igl, "scipy": import_module("scipy"), "edges": edges}
+
+
+def names_of_potpourri3d(shared: dict[str, Any]) -> dict[str, Any]:
+    return vars(import_module("potpourri3d")) | vars(import_module("robust_laplacian"))
+
+
+def names_of_pyfm(shared: dict[str, Any]) -> dict[str, Any]:
+    functional, meshes = import_module("pyFM.functional"), import_module("pyFM.mesh")
+    mesh = meshes.TriMesh(shared["V"], shared["F"])
+    mesh.process(40)
+    return {
+        "TriMesh": meshes.TriMesh,
+        "FunctionalMapping": functional.FunctionalMapping,
+        "signatures": import_module("pyFM.signatures"),
+        "spectral": import_module("pyFM.spectral"),
+        "mesh": mesh,
+        "mesh1": mesh,
+        "mesh2": mesh,
+        "p2p": np.arange(len(shared["V"])),
+    }
+
+
+PEERS = {
+    "lapy": names_of_lapy,
+    "libigl": names_of_libigl,
+    "potpourri3d": names_of_potpourri3d,
+    "pyfm": names_of_pyfm,
+}
+
+
+def rows_of(page: str) -> list[list[str]]:
+    """Return the cells of each row of the tables of a page, without their heads."""
+    lines = (DOCS / f"{page}.md").read_text().splitlines()
+    return [
+        [cell.strip() for cell in line.strip().strip("|").split("|")]
+        for line, following in zip(lines, [*lines[1:], ""], strict=True)
+        if line.startswith("|") and not line.startswith("|---") and not following.startswith("|---")
+    ]
+
+
+def run(cell: str, names: dict[str, Any]) -> list[Any]:
+    """Return the values of the expressions in a cell; what it assigns is kept for later rows.
+
+    `Class.one`, `two` stands for two methods of a class, `module.one`, `two` for two functions of a module.
+    """
+    values = []
+    owner: Any = None
+    for code in re.findall(r"`([^`]+)`", cell):
+        if code.isidentifier() and code not in names:
+            values.append(getattr(owner, code))
+            continue
+        if re.match(r"\w+\.\w+", code):
+            owner = names[code.split(".")[0]]
+        if isinstance(ast.parse(code).body[0], ast.Assign):
+            exec(code, names)
+            continue
+        value = eval(code, names)
+        if code.startswith("es.") and isfunction(value):
+            arguments, _ = right_arguments(code.split(".")[-1], value, None)
+            value = value(**arguments)
+        values.append(value)
+    return values
+
+
+def as_numbers(value: Any) -> np.ndarray | None:
+    """Return the numbers of an answer, or of the first part of a tuple."""
+    if isinstance(value, tuple):
+        return as_numbers(value[0])
+    if sp.issparse(value):
+        return value.toarray()
+    if isinstance(value, np.ndarray | float | int) and np.asarray(value).dtype.kind in "iuf":
+        return np.squeeze(value)
+    return None
+
+
+def complaints_about(cells: list[str], theirs: dict[str, Any], ours: dict[str, Any]) -> list[str]:
+    with contextlib.redirect_stdout(io.StringIO()):
+        try:
+            expected = run(cells[0], theirs)
+        except Exception as error:  # noqa: BLE001 - the law is that there is none
+            return [f"{cells[0]}: {type(error).__name__}: {error}"]
+        try:
+            found = run(cells[1], ours)
+        except Exception as error:  # noqa: BLE001
+            return [f"{cells[1]}: {type(error).__name__}: {error}"]
+    numbers = [as_numbers(values[0]) if values else None for values in (expected, found)]
+    if any(each is None for each in numbers) or numbers[0].shape != numbers[1].shape:
+        return []
+    if DIFFERENCE.search(cells[1]):
+        return []
+    if np.allclose(*numbers, rtol=1e-6, atol=1e-9 * np.abs(numbers[0]).max()):
+        return []
+    return [f"{cells}: {numbers[0].ravel()[:5]} there, {numbers[1].ravel()[:5]} here"]
+
+
+@pytest.mark.parametrize("page", PEERS)
+def test_every_row_runs(page, tmp_path):
+    shared = shared_names(tmp_path)
+    try:
+        theirs = shared | PEERS[page](shared)
+    except ImportError as error:
+        pytest.skip(f"{error}")
+    ours = our_names(shared)
+    rows = rows_of(page)
+    complaints = [text for cells in rows for text in complaints_about(cells, theirs, ours)]
+    assert not complaints, "\n".join(complaints)
+
+
+@pytest.mark.parametrize("page", PEERS)
+def test_few_rows_have_no_code_and_they_say_what_is_missing(page):
+    rows = rows_of(page)
+    prose = [cells for cells in rows if "`" not in cells[1]]
+    assert all("missing" in cells[1] or cells[-1] for cells in prose)
+    assert len(prose) < len(rows) / 4
