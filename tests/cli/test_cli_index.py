@@ -77,6 +77,7 @@ def test_ls_lists_what_the_table_says(index):
         (["height=..1"], ["fish/a"]),
         (["height=2"], ["bird/a"]),
         (["label=bird,fish", "height=0..9"], ["bird/a", "fish/a"]),
+        (["label!=fish", "height!=2"], ["bird/b", "cup", "range", "seven"]),
         (["label=7"], ["seven"]),  # a class is a text, whatever it looks like
         (["label=1..2"], ["range"]),
         (['label="cup, small",7'], ["cup", "seven"]),
@@ -90,7 +91,7 @@ def test_filters_choose_shapes(index, filters, names):
     assert [record["name"] for record in run_json("index", "ls", index, *options)] == names
 
 
-@pytest.mark.parametrize("text", ["label", "=cat", "height=", "height=1..2..3", "height=a..b"])
+@pytest.mark.parametrize("text", ["label", "=cat", "!=cat", "height=", "height=1..2..3", "height=a..b"])
 def test_a_filter_that_is_none_is_refused(index, text):
     done = run("index", "ls", index, "--filter", text, code=1)
     assert repr(text) in done.stderr

@@ -180,6 +180,9 @@ def test_what_cannot_be_stored(index):
         index.add_descriptors("x", [with_vertices(descriptor(1), np.arange(2)[:, None])])
     with pytest.raises(InvalidParameterError, match=r"must be Unicode text; 'b\\udcff' is not"):
         index.add_descriptors("x", [descriptor(1)], source="b\udcff")
+    for name in ("", " ", "nul\0"):
+        with pytest.raises(InvalidParameterError, match="a character that shows, and no NUL"):
+            index.add_descriptors(name, [descriptor(1)])
     with pytest.raises(
         InvalidParameterError,
         match="must have as many numbers; those of recipe 'test' have 3, and these have 5",
