@@ -12,7 +12,9 @@ from eigenshape.cli import app
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.heat.recipe import THESIS
+from eigenshape.retrieval.store.batch import announce_learning
 from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.store.writing import DescribedShape
 from eigenshape.shapes.creatures import make_creature
 
 TABLE = "name,label,tags,height\nfish/a,fish,wet;small,0.5\nbird/a,bird,,2\n"
@@ -91,7 +93,9 @@ def test_filters_choose_shapes(index, filters, names):
     assert [record["name"] for record in run_json("index", "ls", index, *options)] == names
 
 
-@pytest.mark.parametrize("text", ["label", "=cat", "!=cat", "height=", "height=1..2..3", "height=a..b"])
+@pytest.mark.parametrize(
+    "text", ["label", "=cat", "!=cat", "height=", "height=1..2..3", "height=a..b"]
+)
 def test_a_filter_that_is_none_is_refused(index, text):
     done = run("index", "ls", index, "--filter", text, code=1)
     assert repr(text) in done.stderr
@@ -117,6 +121,28 @@ def test_stats_count_shapes_classes_and_bytes(index):
     assert facts["recipes"] == {"scale-free": 4}
     assert facts["bytes"] == sum(path.stat().st_size for path in index.rglob("*"))
     assert "4 shapes" in run("index", "stats", index).stdout
+
+
+def test_stats_say_the_stage_before_there_are_shapes(tmp_path):
+    index = ShapeIndex.create(tmp_path / "index")
+    passed_on = []
+    with announce_learning(index.folder, lambda *facts: passed_on.append(facts)) as report:
+        report(37, 4000, "cat", None)
+        text = run("index", "stats", index.folder).stdout
+        assert "learning a codebook: 37 of 100 shapes read by process" in text
+        assert "37 of 100" in run_json("index", "stats", index.folder)["stage"]
+    assert passed_on == [(37, 4000, "cat", None)]
+    assert run_json("index", "stats", index.folder)["stage"] is None
+
+
+def test_no_column_vanishes_in_a_narrow_terminal(tmp_path):
+    index = ShapeIndex.create(tmp_path / "index")
+    descriptor = find_heat_features(make_creature("fish", n_vertices=500)).descriptor
+    facts = {"repairs": "what was done to it " * 9}
+    index.add_many([DescribedShape("long" * 30, [descriptor], label="fish", attributes=facts)])
+    done = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["index", "ls", str(index.folder)])
+    assert "│ fish " in done.stdout
+    assert max(map(len, done.stdout.splitlines())) == 80
 
 
 def test_verify_names_a_damaged_shape_and_exits_with_1(index):

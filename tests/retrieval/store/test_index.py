@@ -49,7 +49,9 @@ def test_a_shape_finds_itself_first_with_score_zero(index):
     for seed in range(12):
         best, *others = index.query(descriptor(seed), n_matches=4)
         assert (best.name, best.score, best.label) == (f"s{seed:02}", 0.0, f"class {seed % 3}")
+        assert "correspondences" not in vars(best)  # until they are asked for
         assert best.correspondences.tolist() == [[0, 0], [1, 1]]
+        assert not best.correspondences.flags.writeable
         assert len(others) == 3
         assert [m.score for m in others] == sorted(m.score for m in others)
 
