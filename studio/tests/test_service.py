@@ -57,7 +57,7 @@ class ServiceProcess(Server):
     """A service, and requests to it."""
 
     def __init__(
-        self, index, token=TOKEN, timeout=60.0, memory=3e9, sources="", grace=10, write_token=""
+        self, index, token=TOKEN, timeout=60.0, memory=3e9, sources="", *, grace=10, write_token=""
     ):
         folder = Path(__file__).parent
         arguments = [folder, index, token, timeout, memory, sources, grace, write_token]

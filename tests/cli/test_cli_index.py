@@ -9,6 +9,8 @@ from typer.testing import CliRunner
 
 import eigenshape as es
 from eigenshape.cli import app
+from eigenshape.cli.steps import sheets
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.heat.recipe import THESIS
@@ -143,6 +145,16 @@ def test_no_column_vanishes_in_a_narrow_terminal(tmp_path):
     done = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["index", "ls", str(index.folder)])
     assert "│ fish " in done.stdout
     assert max(map(len, done.stdout.splitlines())) == 80
+
+
+def test_duplicates_are_listed(index):
+    shelf = ShapeIndex.open(index)
+    shelf.add_descriptors("copy", shelf.descriptors("fish/a", shelf.default_recipe()), label="x")
+    (pair,) = run_json("index", "duplicates", index, "--score", 0.001)["pairs"]
+    assert (pair["shape"], pair["other"], pair["score"]) == ("copy", "fish/a", 0)
+    assert "│ fish/a │" in run("index", "duplicates", index, "--score", 0.001).stdout
+    shelf.remove("copy")
+    assert "none of 4 shapes" in run("index", "duplicates", index, "--score", 0.001).stdout
 
 
 def test_verify_names_a_damaged_shape_and_exits_with_1(index):
@@ -310,6 +322,24 @@ def test_an_explanation_is_drawn(meshes, index, tmp_path):
     assert from_above.read_bytes() != picture.read_bytes()
     done = run("query", index, "fish/a", "--explain", picture, code=1)
     assert "Leave --picture and --explain out" in done.stderr
+
+
+def test_a_match_is_drawn_from_the_side_of_the_query(tmp_path):
+    mesh = make_creature("quadruped", n_vertices=800)
+    turned = TriangleMesh(mesh.vertices[:, [2, 0, 1]], mesh.faces)  # a third of a turn
+    write_mesh(turned, tmp_path / "turned.ply")
+    index = ShapeIndex.create(None)
+    source = str(tmp_path / "turned.ply")
+    index.add("turned", turned, source=source, n_views=0)
+    query = sheets.color_query(mesh, index.default_recipe())
+    (match,) = index.query(query.descriptor)
+    figures = [
+        sheets.contact_sheet(query, "scan", [match], view="left"),
+        sheets.explanation(query, "scan", match),
+    ]
+    for figure in figures:
+        one, two = (axes.images[0].get_array() for axes in figure.axes if axes.images)
+        assert np.mean((one < 250).any(axis=2) != (two < 250).any(axis=2)) < 0.02  # one outline
 
 
 def test_a_folder_that_is_not_there_makes_no_index(tmp_path):
