@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -699,13 +700,32 @@ def test_the_container_copies_what_there_is_and_installs_as_the_readme_says():
             copied.add(source.rstrip("/"))
     # What pip needs to build both packages, of each pyproject.
     assert {"pyproject.toml", "README.md", "LICENSE", "src", "studio"} <= copied
+    # All of it is let through to the builder, and caches are not.
+    lines = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    assert {line[1:] for line in lines if line.startswith("!")} == copied
+    assert {"*", "**/__pycache__", "studio/front/node_modules"} <= set(lines)
     runs = " && ".join(text for name, text in steps if name == "RUN")
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert "pip install . ./studio" in runs
+    assert "pip install -c deploy/constraints.txt . ./studio" in runs
     assert "pip install . ./studio" in readme
     assert [text for name, text in steps if name == "USER"][-1] not in ("root", "0")
+    # Versions are locked, of all packages that the two need.
+    locked = (ROOT / "deploy" / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = [line.partition("==")[::2] for line in locked if not line.startswith("#")]
+    assert all(pinned for _, pinned in pins)
+    names_of_pins = {name.lower().replace("_", "-") for name, _ in pins}
+    for project in (ROOT, ROOT / "studio"):
+        needed = tomllib.loads((project / "pyproject.toml").read_text())["project"]["dependencies"]
+        needed = {re.match(r"[\w-]+", each)[0].lower().replace("_", "-") for each in needed}
+        assert needed - {"eigenshape"} <= names_of_pins
+    # The user owns the folder under the volume, and compiles loops where it will look for them.
     names = [name for name, _ in steps]
-    assert names.index("USER") > max(k for k, name in enumerate(names) if name == "RUN")
+    volume = json.loads(dict(steps)["VOLUME"])[0]
+    owned = f"install -d -o eigenshape -g eigenshape {volume}"
+    assert any(name == "RUN" and owned in text for name, text in steps[: names.index("USER")])
+    assert [text for name, text in steps[names.index("USER") :] if name == "RUN"] == [
+        "eigenshape warm-up"
+    ]
     assert {"EXPOSE", "HEALTHCHECK", "VOLUME"} <= set(names)
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from time import perf_counter
 
-import numpy as np
-
 import eigenshape as es
 from eigenshape.cli.console import err, escape_text, out, print_json, print_table, progress_bar
 from eigenshape.cli.inputs import JsonOption
@@ -60,7 +58,7 @@ def _steps() -> dict[str, Callable[[], object]]:
     def spectrum() -> None:
         for operator in (es.cotangent_laplacian(mesh), es.robust_laplacian(mesh)):
             es.solve_spectrum(operator, 50)
-        cloud = es.PointCloud(np.asarray(mesh.vertices), dim=2)
+        cloud = es.PointCloud(mesh.vertices, dim=2)
         es.solve_spectrum(es.point_cloud_laplacian(cloud), 20)
 
     return {
