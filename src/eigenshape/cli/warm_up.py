@@ -49,7 +49,7 @@ def _steps() -> dict[str, Callable[[], object]]:
     index = es.ShapeIndex.create(None)
     top = mesh.vertices[mesh.vertices[:, 1].argmax()]
     region = es.deformation.BrushRegion(top, 0.5)
-    turn = es.deformation.Rotation(mesh.vertices.mean(axis=0), (0, 0, 1), 0.4)
+    turn = es.Rotation(mesh.vertices.mean(axis=0), [0, 0, 1], 0.4)
 
     def search() -> None:
         for match in index.query(scan):
