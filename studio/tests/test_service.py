@@ -344,7 +344,7 @@ WRONG_PARAMETERS = {
     "unknown": ("/v1/query?name=a.ply&k=3", "no parameter 'k' here; .*: name, n, filter"),
     "maybe exact": ("/v1/query?name=a.ply&exact=maybe", "exact must be 0 or 1"),
     "a long filter": ("/v1/query?name=a.ply&filter=" + "x" * 5000, "filter must have at most 4,0"),
-    "no condition": ("/v1/query?name=a.ply&filter=cat", "such as label=cat .*; it is 'cat'"),
+    "no condition": ("/v1/query?name=a.ply&filter=cat", "such as label=cat, .*; it is 'cat'"),
     "no range": ("/v1/query?name=a.ply&filter=legs=a..b", "least and a largest number"),
     "two of one": ("/v1/query?name=a.ply&filter=tag=a&filter=tag=b", "'tag' has two"),
 }
@@ -366,6 +366,8 @@ def test_parameters_of_other_calls_are_checked(service):
     assert "vertices must be a whole" in get("/v1/points?name=a&vertices=1,x").json()["error"]
     assert get("/v1/points?name=a&vertices=").status_code == 404
     assert "limit must lie between" in get("/v1/shapes?limit=1001").json()["error"]
+    unknown = get("/v1/shapes?filter=height=1")
+    assert (unknown.status_code, "no shape has 'height'" in unknown.text) == (400, True)
     assert "A filter is a condition" in get("/v1/shapes?filter=").json()["error"]
     assert "no shape 'ghost'" in get("/v1/shapes/ghost").json()["error"]
 
