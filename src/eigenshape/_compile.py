@@ -201,6 +201,13 @@ class _LoopCache(FunctionCache):  # type: ignore[misc]
             _warn_once(f"Compiled loops must be kept in a folder with space left; {reason}.")
 
 
+def cache_folder() -> Path | None:
+    """Return the folder that holds all compiled loops which were loaded; None if none are kept."""
+    caches = (getattr(loop, "_cache", None) for loop in _LOOPS)
+    paths = [cache.cache_path for cache in caches if isinstance(cache, _LoopCache)]
+    return Path(os.path.commonpath(paths)) if paths else None
+
+
 def temporary_folder() -> Path:
     """Return where this user's compiled loops lie when nowhere else is a place for them."""
     user = os.getuid() if hasattr(os, "getuid") else "loops"

@@ -8,8 +8,9 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
@@ -20,12 +21,14 @@ from browser import drop_file, find, open_page, start_browser, wait_until
 from test_server import GOOD, HOSTILE, Server, ply_of
 
 import eigenshape as es
+from eigenshape.retrieval.store import files as store
 from eigenshape_studio.service.openapi import openapi
 from eigenshape_studio.service.server import serve
 from eigenshape_studio.service.shelf import ShelfReader
 
 ROOT = Path(__file__).parents[2]
 TOKEN = "a-token-of-the-tests-0123456789"
+WRITE_TOKEN = "a-token-for-writing-0123456789"
 LEGS = {"fish": 0, "bird": 2, "biped": 2, "quadruped": 4, "giraffe": 4}
 KINDS = tuple(LEGS)
 MARKUP = '<img src="x" onerror="alert(1)">'
@@ -34,7 +37,7 @@ NAMES = ("../../etc/passwd", "a b%2f?&#\"'é\u202e", "line\nbreak\t\x1b[31m", MA
 SCRIPT = """
 import sys
 from functools import partial
-folder, index, token, timeout, memory, sources, grace = sys.argv[1:]
+folder, index, token, timeout, memory, sources, grace, write_token = sys.argv[1:]
 sys.path.append(folder)
 import misbehaving
 from eigenshape.retrieval import Workers
@@ -45,7 +48,7 @@ server.MOST_BYTES, server.GRACE = 1 << 20, int(grace)
 server.Rules = partial(server.Rules, pause=0.5, deadline=2.0)
 server.serve(
     index, port=0, token=token or None, workers=Workers(2, float(timeout), float(memory)),
-    show_sources=bool(sources), announce=partial(print, flush=True),
+    write_token=write_token or None, show_sources=bool(sources), announce=partial(print, flush=True),
     describe=misbehaving.describe_or_misbehave,
 )
 """
@@ -54,9 +57,11 @@ server.serve(
 class ServiceProcess(Server):
     """A service, and requests to it."""
 
-    def __init__(self, index, token=TOKEN, timeout=60.0, memory=3e9, sources="", grace=10):
+    def __init__(
+        self, index, token=TOKEN, timeout=60.0, memory=3e9, sources="", *, grace=10, write_token=""
+    ):
         folder = Path(__file__).parent
-        arguments = [folder, index, token, timeout, memory, sources, grace]
+        arguments = [folder, index, token, timeout, memory, sources, grace, write_token]
         command = [sys.executable, "-c", SCRIPT, *map(str, arguments)]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         self.url = self.process.stdout.readline().strip()
@@ -339,7 +344,7 @@ WRONG_PARAMETERS = {
     "unknown": ("/v1/query?name=a.ply&k=3", "no parameter 'k' here; .*: name, n, filter"),
     "maybe exact": ("/v1/query?name=a.ply&exact=maybe", "exact must be 0 or 1"),
     "a long filter": ("/v1/query?name=a.ply&filter=" + "x" * 5000, "filter must have at most 4,0"),
-    "no condition": ("/v1/query?name=a.ply&filter=cat", "such as label=cat .*; it is 'cat'"),
+    "no condition": ("/v1/query?name=a.ply&filter=cat", "such as label=cat, .*; it is 'cat'"),
     "no range": ("/v1/query?name=a.ply&filter=legs=a..b", "least and a largest number"),
     "two of one": ("/v1/query?name=a.ply&filter=tag=a&filter=tag=b", "'tag' has two"),
 }
@@ -361,6 +366,8 @@ def test_parameters_of_other_calls_are_checked(service):
     assert "vertices must be a whole" in get("/v1/points?name=a&vertices=1,x").json()["error"]
     assert get("/v1/points?name=a&vertices=").status_code == 404
     assert "limit must lie between" in get("/v1/shapes?limit=1001").json()["error"]
+    unknown = get("/v1/shapes?filter=height=1")
+    assert (unknown.status_code, "no shape has 'height'" in unknown.text) == (400, True)
     assert "A filter is a condition" in get("/v1/shapes?filter=").json()["error"]
     assert "no shape 'ghost'" in get("/v1/shapes/ghost").json()["error"]
 
@@ -470,6 +477,70 @@ def test_shapes_of_other_processes_are_seen_by_several_services(tmp_path):
         index.remove("fish")
         time.sleep(1.1)
         assert second.query(scan_of("fish")).json()["matches"] == []
+
+
+def test_shapes_are_added_and_removed_with_a_token_of_its_own(tmp_path):
+    index = es.ShapeIndex.create(tmp_path / "index")
+    with serving(index.folder, write_token=WRITE_TOKEN) as running, ExitStack() as stack:
+
+        def client_with(**headers):
+            headers["content-type"] = "application/octet-stream"
+            client = httpx.Client(base_url=running.base, timeout=300, headers=headers)
+            return stack.enter_context(client)
+
+        writer = client_with(authorization=f"Bearer {WRITE_TOKEN}")
+
+        def add(kind, name, client=writer, **more):
+            parameters = {"name": name, "file": "scan.ply", **more}
+            return client.post("/v1/shapes", params=parameters, content=scan_of(kind, pose=0))
+
+        facts = {"label": "animal", "tag": ["wet", "new"], "attributes": '{"legs": 0}'}
+        # Who may read may not write, neither by the header nor by the cookie of the page.
+        by_header, by_cookie = {"authorization": f"Bearer {TOKEN}"}, {"cookie": running.cookie}
+        for client in (client_with(**by_header), client_with(**by_cookie)):
+            assert add("fish", "fish", client).status_code == 403
+            assert client.delete("/v1/shapes/fish").status_code == 403
+        assert is_well(running)
+
+        # Two clients at the same time: an index has one writer, and both wait for their turn.
+        with ThreadPoolExecutor(2) as threads:
+            first = threads.submit(add, "fish", "zoo/fish", **facts)
+            second = threads.submit(add, "bird", "zoo/bird")
+        assert (first.result().status_code, second.result().status_code) == (201, 201)
+        fish = first.result().json()
+        assert (fish["label"], fish["tags"], fish["attributes"]) == (
+            "animal",
+            ["new", "wet"],
+            {"legs": 0},
+        )
+        assert writer.get(fish["thumbnail"]).status_code == 200
+        found = running.query(scan_of("fish")).json()["matches"]
+        assert [match["name"] for match in found] == ["zoo/fish", "zoo/bird"]
+
+        assert add("bird", "zoo/fish").status_code == 409
+        assert add("bird", "zoo/fish", replace=1).json()["label"] is None
+        assert "no NUL" in add("fish", "nul\0").json()["error"]
+        assert "JSON object" in add("fish", "x", attributes="[1]").json()["error"]
+        assert "finite number" in add("fish", "x", attributes='{"a": null}').json()["error"]
+        large = {"params": {"name": "x", "file": "x.ply"}, "content": bytes((1 << 20) + 1)}
+        assert writer.post("/v1/shapes", **large).status_code == 413
+        bad = writer.post("/v1/shapes", params={"name": "x", "file": "x.ply"}, content=b"no mesh")
+        assert (bad.status_code, "could not be described" in bad.text) == (422, True)
+
+        assert writer.delete("/v1/shapes/zoo%2Ffish").json()["name"] == "zoo/fish"
+        assert writer.delete("/v1/shapes/zoo%2Ffish").status_code == 404
+        assert running.client.get("/health").json()["shapes"] == 1
+        assert [record.name for record in index.records()] == ["zoo/bird"]
+
+
+def test_a_change_that_cannot_be_written_says_so(tmp_path):
+    index = make_index(tmp_path)
+    with serving(index.folder, write_token=WRITE_TOKEN) as running, store.writing(index.folder):
+        bearer = {"authorization": f"Bearer {WRITE_TOKEN}"}
+        answer = running.client.delete("/v1/shapes/zoo%2Ffish", headers=bearer)
+        assert answer.status_code == 503
+        assert "The index was not changed: An index has one writer at a time" in answer.text
+        assert is_well(running)
 
 
 def test_a_reader_looks_at_most_once_a_second(index, monkeypatch):
@@ -594,6 +665,8 @@ def test_the_page_shows_matches_with_pictures_and_errors_in_words(index, tmp_pat
 def test_a_token_must_be_long_and_plain(index, token):
     with pytest.raises(es.InvalidParameterError, match="16 to 256 letters"):
         serve(index.folder, token=token)
+    with pytest.raises(es.InvalidParameterError, match="must differ from the token for reading"):
+        serve(index.folder, token=TOKEN, write_token=TOKEN)
 
 
 def test_another_address_takes_permission(index):
@@ -629,13 +702,32 @@ def test_the_container_copies_what_there_is_and_installs_as_the_readme_says():
             copied.add(source.rstrip("/"))
     # What pip needs to build both packages, of each pyproject.
     assert {"pyproject.toml", "README.md", "LICENSE", "src", "studio"} <= copied
+    # All of it is let through to the builder, and caches are not.
+    lines = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    assert {line[1:] for line in lines if line.startswith("!")} == copied
+    assert {"*", "**/__pycache__", "studio/front/node_modules"} <= set(lines)
     runs = " && ".join(text for name, text in steps if name == "RUN")
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert "pip install . ./studio" in runs
+    assert "pip install -c deploy/constraints.txt . ./studio" in runs
     assert "pip install . ./studio" in readme
     assert [text for name, text in steps if name == "USER"][-1] not in ("root", "0")
+    # Versions are locked, of all packages that the two need.
+    locked = (ROOT / "deploy" / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = [line.partition("==")[::2] for line in locked if not line.startswith("#")]
+    assert all(pinned for _, pinned in pins)
+    names_of_pins = {name.lower().replace("_", "-") for name, _ in pins}
+    for project in (ROOT, ROOT / "studio"):
+        needed = tomllib.loads((project / "pyproject.toml").read_text())["project"]["dependencies"]
+        needed = {re.match(r"[\w-]+", each)[0].lower().replace("_", "-") for each in needed}
+        assert needed - {"eigenshape"} <= names_of_pins
+    # The user owns the folder under the volume, and compiles loops where it will look for them.
     names = [name for name, _ in steps]
-    assert names.index("USER") > max(k for k, name in enumerate(names) if name == "RUN")
+    volume = json.loads(dict(steps)["VOLUME"])[0]
+    owned = f"install -d -o eigenshape -g eigenshape {volume}"
+    assert any(name == "RUN" and owned in text for name, text in steps[: names.index("USER")])
+    assert [text for name, text in steps[names.index("USER") :] if name == "RUN"] == [
+        "eigenshape warm-up"
+    ]
     assert {"EXPOSE", "HEALTHCHECK", "VOLUME"} <= set(names)
 
 

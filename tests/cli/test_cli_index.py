@@ -9,10 +9,14 @@ from typer.testing import CliRunner
 
 import eigenshape as es
 from eigenshape.cli import app
+from eigenshape.cli.steps import sheets
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.heat.recipe import THESIS
+from eigenshape.retrieval.store.batch import announce_learning
 from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.store.writing import DescribedShape
 from eigenshape.shapes.creatures import make_creature
 
 TABLE = "name,label,tags,height\nfish/a,fish,wet;small,0.5\nbird/a,bird,,2\n"
@@ -77,6 +81,7 @@ def test_ls_lists_what_the_table_says(index):
         (["height=..1"], ["fish/a"]),
         (["height=2"], ["bird/a"]),
         (["label=bird,fish", "height=0..9"], ["bird/a", "fish/a"]),
+        (["label!=fish", "height!=2"], ["bird/b", "cup", "range", "seven"]),
         (["label=7"], ["seven"]),  # a class is a text, whatever it looks like
         (["label=1..2"], ["range"]),
         (['label="cup, small",7'], ["cup", "seven"]),
@@ -90,7 +95,9 @@ def test_filters_choose_shapes(index, filters, names):
     assert [record["name"] for record in run_json("index", "ls", index, *options)] == names
 
 
-@pytest.mark.parametrize("text", ["label", "=cat", "height=", "height=1..2..3", "height=a..b"])
+@pytest.mark.parametrize(
+    "text", ["label", "=cat", "!=cat", "height=", "height=1..2..3", "height=a..b"]
+)
 def test_a_filter_that_is_none_is_refused(index, text):
     done = run("index", "ls", index, "--filter", text, code=2)
     assert repr(text) in done.stderr
@@ -116,6 +123,38 @@ def test_stats_count_shapes_classes_and_bytes(index):
     assert facts["recipes"] == {"scale-free": 4}
     assert facts["bytes"] == sum(path.stat().st_size for path in index.rglob("*"))
     assert "4 shapes" in run("index", "stats", index).stdout
+
+
+def test_stats_say_the_stage_before_there_are_shapes(tmp_path):
+    index = ShapeIndex.create(tmp_path / "index")
+    passed_on = []
+    with announce_learning(index.folder, lambda *facts: passed_on.append(facts)) as report:
+        report(37, 4000, "cat", None)
+        text = run("index", "stats", index.folder).stdout
+        assert "learning a codebook: 37 of 100 shapes read by process" in text
+        assert "37 of 100" in run_json("index", "stats", index.folder)["stage"]
+    assert passed_on == [(37, 4000, "cat", None)]
+    assert run_json("index", "stats", index.folder)["stage"] is None
+
+
+def test_no_column_vanishes_in_a_narrow_terminal(tmp_path):
+    index = ShapeIndex.create(tmp_path / "index")
+    descriptor = find_heat_features(make_creature("fish", n_vertices=500)).descriptor
+    facts = {"repairs": "what was done to it " * 9}
+    index.add_many([DescribedShape("long" * 30, [descriptor], label="fish", attributes=facts)])
+    done = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["index", "ls", str(index.folder)])
+    assert "│ fish " in done.stdout
+    assert max(map(len, done.stdout.splitlines())) == 80
+
+
+def test_duplicates_are_listed(index):
+    shelf = ShapeIndex.open(index)
+    shelf.add_descriptors("copy", shelf.descriptors("fish/a", shelf.default_recipe()), label="x")
+    (pair,) = run_json("index", "duplicates", index, "--score", 0.001)["pairs"]
+    assert (pair["shape"], pair["other"], pair["score"]) == ("copy", "fish/a", 0)
+    assert "│ fish/a │" in run("index", "duplicates", index, "--score", 0.001).stdout
+    shelf.remove("copy")
+    assert "none of 4 shapes" in run("index", "duplicates", index, "--score", 0.001).stdout
 
 
 def test_verify_names_a_damaged_shape_and_exits_with_1(index):
@@ -283,6 +322,26 @@ def test_an_explanation_is_drawn(meshes, index, tmp_path):
     assert from_above.read_bytes() != picture.read_bytes()
     done = run("query", index, "fish/a", "--explain", picture, code=2)
     assert "Leave --picture and --explain out" in done.stderr
+
+
+def test_a_match_is_drawn_from_the_side_of_the_query(tmp_path):
+    mesh = make_creature("quadruped", n_vertices=800)
+    turned = TriangleMesh(mesh.vertices[:, [2, 0, 1]], mesh.faces)  # a third of a turn
+    write_mesh(turned, tmp_path / "turned.ply")
+    index = ShapeIndex.create(None)
+    source = str(tmp_path / "turned.ply")
+    index.add("turned", turned, source=source, n_views=0)
+    query = sheets.color_query(mesh, index.default_recipe())
+    (match,) = index.query(query.descriptor)
+    figures = [
+        sheets.contact_sheet(query, "scan", [match], view="left"),
+        sheets.explanation(query, "scan", match),
+    ]
+    for figure in figures:
+        pictures = [axes.images[0].get_array() for axes in figure.axes if axes.images]
+        one, two = ((picture != picture[0, 0]).any(axis=2) for picture in pictures)
+        assert 0.1 < one.mean() < 0.9
+        assert np.mean(one != two) < 0.02  # one outline
 
 
 def test_a_folder_that_is_not_there_makes_no_index(tmp_path):

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from eigenshape.cli import app
 from eigenshape.features.parts import find_parts
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.labeled_shapes import read_labeled_shape
 from eigenshape.io.labels import read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
@@ -89,6 +90,27 @@ def test_label_takes_several_meshes_or_a_library_with_names(poses, tmp_path):
     # The order of the shapes differs, and with it the last digit of the votes.
     same = np.array(of_library["face_labels"]) == several["face_labels"]
     assert same.mean() > 0.99
+
+
+@pytest.mark.long
+def test_a_library_with_slivers_and_a_broken_file_serves_the_rest(poses, tmp_path):
+    shape = read_labeled_shape(poses / "rest.ply", poses / "rest.seg")
+    a, b, _ = shape.mesh.faces[0]
+    between = shape.mesh.vertices[[a, b]].mean(axis=0)
+    sliver = TriangleMesh(
+        np.vstack([shape.mesh.vertices, between]),
+        np.vstack([shape.mesh.faces, [a, b, shape.mesh.n_vertices]]),
+    )
+    write_mesh(sliver, tmp_path / "sliver.ply", face_labels=np.append(shape.labels, 7))
+    (tmp_path / "broken.ply").write_text("no mesh")
+    done = run("label", poses / "posed.ply", "--library", tmp_path, "--json", code=3)
+    assert "repair: sliver.ply: drop_degenerate removed 1 face" in done.stderr
+    assert "left out: broken.ply" in done.stderr
+    found = json.loads(done.stdout)
+    assert (list(found["like"]), found["left_out"]) == (["sliver"], ["broken.ply"])
+    (tmp_path / "sliver.ply").unlink()
+    done = run("label", poses / "posed.ply", "--library", tmp_path, code=1)
+    assert "that can be described" in done.stderr
 
 
 @pytest.mark.long

@@ -56,7 +56,11 @@ def test_every_module_with_a_verb_is_in_the_list():
 
 
 def verbs_in(folder):
-    return {path.stem for path in folder.glob("*.py") if f"\ndef {path.stem}(" in path.read_text()}
+    return {
+        path.stem.replace("_", "-")
+        for path in folder.glob("*.py")
+        if f"\ndef {path.stem}(" in path.read_text()
+    }
 
 
 @pytest.mark.parametrize(

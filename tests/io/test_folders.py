@@ -4,6 +4,7 @@ import pytest
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.io.folders import find_items
+from eigenshape.retrieval.store.damage import StoreWarning
 
 FILES = ["cats/felix.ply", "cats/old/tom.obj", "dogs/rex.OFF", "lonely.stl", "cats/notes.txt"]
 
@@ -90,12 +91,31 @@ def test_a_table_gives_classes_tags_and_attributes(folder):
     assert found["cats/old/tom"].label == "old"  # which the table does not name
 
 
+def test_a_table_of_a_whole_collection_serves_a_part_of_it(folder):
+    table = folder / "table.csv"
+    table.write_text("name,label\ncats/tom,x\ncats/felix,tabby\ncats/tim,x\n")
+    with pytest.warns(StoreWarning, match=r"2 of 3 rows .* no file .*; line 2 names 'cats/tom'"):
+        found = find_items(folder, labels=table)
+    assert found[0].label == "tabby"
+
+
+def test_links_to_folders_are_followed_once(folder, tmp_path_factory):
+    outside = tmp_path_factory.mktemp("outside")
+    (outside / "wolf.ply").touch()
+    (outside / "back").symlink_to(folder)  # a circle
+    for name in ("birds", "more"):
+        (folder / name).symlink_to(outside)
+    (folder / "a").symlink_to(folder / "cats")  # sorted before the folder itself
+    names = [item.name for item in find_items(folder)]
+    assert names == ["birds/wolf", "cats/felix", "cats/old/tom", "dogs/rex", "lonely"]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("title,label\na,b\n", "must have a column 'name'; its columns are 'title', 'label'"),
         ("", "its columns are none"),
-        ("name,label\ncats/tom,x\n", "line 2 names 'cats/tom'"),
+        ("name,label\ncats/tom,x\n", "none of them, and line 2 names 'cats/tom'. .* 'cats/felix'"),
         ("name,label\n,x\n", "line 2 does not"),
         ("name,label\ncats/felix,a,b\n", "must have 2 cells a line; line 2 has more"),
         (b"name,label\n\xff,x\n", "in UTF-8"),

@@ -20,7 +20,8 @@ err = Console(stderr=True, highlight=False, soft_wrap=True)
 
 SOME_FAILED = 3  # exit code where some of several inputs failed, and the others are done
 NUMBERS = "+-.0123456789"  # first characters of a number
-LONGEST_NUMBER = 16  # characters of a column that stay however narrow the terminal is
+LEAST_WIDTH = 8  # characters of a column that stay however narrow the terminal is
+FRAME = 3  # characters of a table beside those of each column
 
 
 def escape_text(text: object) -> str:
@@ -48,14 +49,22 @@ def _plain(value: Any) -> Any:
 def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
     """Print rows under their headings, numbers to the right."""
     table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
-    for index, column in enumerate(columns):
-        # in a narrow terminal long names are cut, numbers are not
-        widest = max([len(column), *(len(row[index]) for row in rows)])
-        numbers = all(row[index][:1] in NUMBERS for row in rows) and any(row[index] for row in rows)
-        justify: Literal["left", "right"] = "right" if numbers and index else "left"
-        table.add_column(
-            column, justify=justify, no_wrap=True, min_width=min(widest, LONGEST_NUMBER)
-        )
+    cells = [[row[index] for row in rows] for index in range(len(columns))]
+    widths = [max(map(len, [name, *texts])) for name, texts in zip(columns, cells, strict=True)]
+    numeric = [all(text[:1] in NUMBERS for text in texts) and any(texts) for texts in cells]
+    # In a narrow terminal the longest texts are cut, numbers are not. Rich alone would leave no
+    # character of a short column beside a long one.
+    room = out.width - FRAME * len(columns) - 1
+    longest = max(widths)
+    while sum(widths) > room and longest > LEAST_WIDTH:
+        longest -= 1
+        widths = [
+            width if is_number else min(width, longest)
+            for width, is_number in zip(widths, numeric, strict=True)
+        ]
+    for index, (column, width) in enumerate(zip(columns, widths, strict=True)):
+        justify: Literal["left", "right"] = "right" if numeric[index] and index else "left"
+        table.add_column(column, justify=justify, no_wrap=True, width=width)
     for row in rows:
         table.add_row(*map(escape_text, row))
     out.print(table)

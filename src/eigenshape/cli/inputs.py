@@ -131,7 +131,8 @@ FilterOption = Annotated[
         "--filter",
         metavar="CONDITION",
         help="Only shapes that meet a condition: label=cat, tag=scanned, or by an attribute "
-        "height=1.5..3. label=cat,dog allows either. Several filters must all be met.",
+        "height=1.5..3. label=cat,dog allows either, and label!=cat all others. Several filters must "
+        "all be met.",
     ),
 ]
 REGIONS = (

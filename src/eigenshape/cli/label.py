@@ -9,7 +9,7 @@ import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
-from eigenshape.cli.console import print_json, progress_bar
+from eigenshape.cli.console import SOME_FAILED, print_json, progress_bar
 from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, UpOption, ViewOption
 
 COLUMNS = {
@@ -69,12 +69,14 @@ def label(
 ) -> None:
     """Copy the labels of one mesh or several to another: label a horse, and get a labeled camel.
 
-    Left and right may be exchanged. Repairs are applied to the mesh that gets the labels.
+    Left and right may be exchanged. The options of repair are for the mesh that gets the labels;
+    labeled meshes are repaired where they need it. A mesh of the library that still cannot be
+    described is left out by name, and the exit code is 3.
     """
     steps.require_picture(picture)
     side = steps.parse_side(view, up)
     steps.require_label_path(output)
-    examples, names = steps.read_examples(like or [], labels or [], library)
+    examples, names, left_out = steps.read_examples(like or [], labels or [], library)
     target = steps.load_mesh(mesh, repair)
     with progress_bar("label") as progress:
         found = es.transfer_labels(list(examples.values()), target, progress=progress)
@@ -84,6 +86,7 @@ def label(
             {
                 "path": str(mesh),
                 "like": dict(zip(examples, found.weights.tolist(), strict=True)),
+                "left_out": left_out,
                 "parts": rows,
                 "face_labels": found.labels,
                 "face_confidence": found.confidence,
@@ -99,3 +102,5 @@ def label(
         best = list(examples.values())[int(found.weights.argmax())]
         figure = es.plot.figure_label_transfer(best, target, found, names=names, **side)
         steps.save_picture(figure, picture)
+    if left_out:
+        raise typer.Exit(SOME_FAILED)

@@ -42,6 +42,14 @@ def serve(
             "can read options, but not the environment variable. By default a random one is printed.",
         ),
     ] = None,
+    write_token: Annotated[
+        str | None,
+        typer.Option(
+            envvar="EIGENSHAPE_WRITE_TOKEN",
+            help="Another secret, with which programs may also add and remove shapes. Without it "
+            "the service only reads.",
+        ),
+    ] = None,
     workers: Annotated[
         int, typer.Option(min=1, help="Number of processes that describe uploaded meshes.")
     ] = 2,
@@ -80,6 +88,7 @@ def serve(
         allow_remote=allow_remote,
         allow_hosts=allow_host or (),
         token=token,
+        write_token=write_token,
         workers=es.retrieval.Workers(workers, timeout, memory_bytes(memory)),
         show_sources=show_sources,
         announce=partial(print_address, "service"),

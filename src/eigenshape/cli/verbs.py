@@ -46,6 +46,8 @@ VERBS = {
     "serve": "Serve an index: upload a scan, by a page or a program, and get the most similar shapes.",
     "report": "Write a shape with its spectrum, heat and parts to one HTML file that any browser "
     "opens.",
+    "warm-up": "Compile the loops of spectra, search, matching, parts and bending, and keep them on "
+    "disk.",
     "demo": "Try everything: make creatures, index them, scan one from one side in a new pose, and "
     "find its kind.",
 }
@@ -59,9 +61,11 @@ INDEX_VERBS = {
     "compact": "Give back the space of removed and replaced shapes.",
     "export": "Write the descriptors of shapes, and what is known of them, for other programs.",
     "merge": "Make one index of several, by copying them or by reference.",
+    "duplicates": "List pairs of shapes that are nearly the same, wherever they lie and whatever "
+    "their size.",
     "learn": "Learn a codebook from meshes, for indexes that are built in parts.",
 }
-NEED_NO_ARGUMENT = ("operators", "studio", "demo")
+NEED_NO_ARGUMENT = ("operators", "studio", "warm-up", "demo")
 MARKUP: Any = "markdown"  # leaves plain brackets alone, which rich markup would take for its own
 
 # typer brings its own copy of click since version 0.20 and used the package before; this is the
@@ -132,9 +136,10 @@ class Verbs(TyperGroup):
         alone = typer.Typer(
             rich_markup_mode=MARKUP, add_completion=False, pretty_exceptions_enable=False
         )
-        module = import_module(f"{self.package}.{name}")
+        function = name.replace("-", "_")
+        module = import_module(f"{self.package}.{function}")
         alone.command(name, cls=Verb, no_args_is_help=name not in NEED_NO_ARGUMENT)(
-            getattr(module, name)
+            getattr(module, function)
         )
         return typer.main.get_command(alone)
 

@@ -1,6 +1,7 @@
 """Find the shapes of folders, with what is known of them, and index them."""
 
 import csv
+import os
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -31,6 +32,7 @@ def find_items(
 ) -> list[Item]:
     """Find the files of meshes and of points in folders and in the folders in them.
 
+    Links to folders are followed, and each folder is searched once.
     A shape is named by its path below the given folder, without the suffix of the file unless two
     files differ only in the suffix. Points beside a mesh of the same name, such as its landmarks,
     are left out. The class of a shape is the name of the folder that holds it; a file that lies
@@ -44,7 +46,7 @@ def find_items(
         Table of comma-separated values with a header. The column ``name`` holds names of shapes or
         paths of files below the folder. ``label`` is the class, ``tags`` are separated by
         semicolons, and every other column is an attribute, a number where the text is one. Empty
-        cells are left out.
+        cells are left out. The table may name shapes of a larger collection.
     part : pair of int, optional
         ``(i, n)``: only part i of n, counted from 1, so that n jobs share the work. The name of a
         shape determines its part, so the jobs need not communicate.
@@ -54,12 +56,17 @@ def find_items(
     list of Item
         Sorted by path within each folder.
 
+    Warns
+    -----
+    StoreWarning
+        If the table names shapes that are not there: how many, and the first of them.
+
     Raises
     ------
     InvalidParameterError
         If two shapes have the same name, there is no file, or there is no such part.
     FileFormatError
-        If the table has no column ``name``, or names a shape that is not there.
+        If the table has no column ``name``, or names none of the shapes.
     OSError
         If a source does not exist, or the table cannot be read.
 
@@ -175,7 +182,7 @@ def _items_of(source: Path) -> Iterator[Item]:
         source.stat()
         yield Item(source.stem, source)
         return
-    known = [path for path in sorted(source.rglob("*")) if path.suffix.lower() in SHAPE_FORMATS]
+    known = sorted(path for path in _files_below(source) if path.suffix.lower() in SHAPE_FORMATS)
     meshes = {path.with_suffix("") for path in known if path.suffix.lower() not in POINTS}
     paths = [
         path
@@ -187,6 +194,24 @@ def _items_of(source: Path) -> Iterator[Item]:
         named = path if stems[path.with_suffix("")] > 1 else path.with_suffix("")
         below = named.relative_to(source)
         yield Item(below.as_posix(), path, below.parent.name or None)
+
+
+def _files_below(folder: Path) -> Iterator[Path]:
+    """List all files in a folder and below; links are followed, and no folder is entered twice."""
+    entered: set[str] = set()
+    waiting = [folder]
+    # Links wait until the rest is done: a folder that has a path of its own is named by that path.
+    while waiting:
+        for place, folders, files in os.walk(waiting.pop(0)):
+            real = os.path.realpath(place)
+            if real in entered:
+                folders.clear()
+                continue
+            entered.add(real)
+            here = Path(place)
+            folders.sort()
+            waiting += [here / name for name in folders if (here / name).is_symlink()]
+            yield from (here / name for name in files)
 
 
 def _different_items(items: Sequence[Item]) -> list[Item]:
@@ -218,18 +243,30 @@ def _labeled(items: Sequence[Item], table: Path) -> list[Item]:
     # a name with the suffix of its file is as good
     by_name |= {item.name + item.path.suffix: item for item in items}
     labeled = {}
+    absent = []
     for line, row in rows:
         item = by_name.get(row[NAME])
         if item is None:
-            raise FileFormatError(
-                f"{table} must name shapes that are there; line {line} names {row[NAME]!r}."
-            )
+            absent.append(f"line {line} names {row[NAME]!r}")
+            continue
         facts = {key: text for key, text in row.items() if key not in (NAME, LABEL, TAGS)}
         labeled[item.name] = replace(
             item,
             label=row.get(LABEL, item.label),
             tags=tuple(tag.strip() for tag in row.get(TAGS, "").split(";") if tag.strip()),
             attributes={key: _number_or_text(text) for key, text in facts.items()},
+        )
+    if rows and not labeled:
+        raise FileFormatError(
+            f"{table} must name shapes that are there; it names none of them, and {absent[0]}. "
+            f"A shape is named by its path below the given folder, such as {items[0].name!r}."
+        )
+    if absent:
+        # A table for a whole collection serves a folder that holds a part of it.
+        warnings.warn(
+            f"{len(absent)} of {len(rows)} rows of {table} name no file that is there; {absent[0]}.",
+            StoreWarning,
+            stacklevel=3,
         )
     return [labeled.get(item.name, item) for item in items]
 

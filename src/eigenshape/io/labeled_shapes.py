@@ -117,14 +117,18 @@ def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
     >>> found.labels.shape == (other.n_faces,)
     True
     """
-    folder = as_path(folder, "folder")
+    return {path.stem: read_labeled_shape(path) for path in find_labeled_shapes(as_path(folder, "folder"))}
+
+
+def find_labeled_shapes(folder: Path) -> list[Path]:
+    """Return the meshes of a folder, sorted by name; raise FileFormatError if there are none."""
     paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in MESH_FORMATS)
     if not paths:
         raise FileFormatError(
             f"A folder of labeled shapes must hold a mesh; {folder} holds none. "
             f"Formats: {', '.join(MESH_FORMATS)}."
         )
-    return {path.stem: read_labeled_shape(path) for path in paths}
+    return paths
 
 
 def read_label_names(folder: str | Path) -> list[str]:

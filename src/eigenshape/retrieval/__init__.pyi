@@ -37,6 +37,7 @@ from .store.batch import build_index as build_index
 from .store.batch import train_codebook_from_files as train_codebook_from_files
 from .store.damage import Damage as Damage
 from .store.damage import StoreWarning as StoreWarning
+from .store.duplicates import find_duplicates as find_duplicates
 from .store.index import ShapeIndex as ShapeIndex
 from .store.parts import merge_matches as merge_matches
 from .store.parts import query_indexes as query_indexes

@@ -27,6 +27,7 @@ MARGIN = 0.25  # free space around the points, in extents: the field is periodic
 SMOOTHING = 1.0  # standard deviation of the Gaussian that smooths the normals, in cells
 REACH = 3  # cells around a point in which there is a surface; it closes holes of this radius
 SUPPORT = 1.0  # cells between a face and the nearest point, above which the face has no support
+RIM_STEPS = 8  # averages that smooth the rim, each over a face and those around it
 # A vertex keeps this share of an edge of the grid away from its ends, so no triangle is a needle.
 CLOSEST_TO_CORNER = 0.15
 LEAST_SPREAD = 0.05  # of the nearest points in the second direction, relative to the first
@@ -92,7 +93,7 @@ def reconstruct_surface(
     near = np.zeros(counts, dtype=bool)
     near[tuple(places.astype(int).T)] = True
     surface = _level_set(field, ndimage.binary_dilation(near, iterations=REACH))
-    mesh = _supported(surface, places, normals)
+    mesh = _supported(surface, places, normals, np.sqrt(areas) / cell)
     missed = np.mean(cKDTree(mesh.vertices).query(places)[0] > MISSED_CELLS)
     if missed > MOST_MISSED:
         raise InvalidShapeError(
@@ -206,19 +207,44 @@ def _level_set(field: Float[np.ndarray, "x y z"], near: Bool[np.ndarray, "x y z"
 
 
 def _supported(
-    mesh: TriangleMesh, places: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"]
+    mesh: TriangleMesh,
+    places: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+    spacings: Float[np.ndarray, " n"],
 ) -> TriangleMesh:
     """Drop large pieces whose faces are far from all points, or face away from the nearest."""
     corners = mesh.vertices[mesh.faces]
     facing = area_vectors(corners)
     distance, nearest = cKDTree(places).query(corners.mean(axis=1))
-    bare = (np.einsum("fi,fi->f", facing, normals[nearest]) < 0) | (distance > SUPPORT)
+    # A camera sees few points on a face that turns away from it: far is what is far for them.
+    reach = SUPPORT * np.clip(spacings[nearest], 1, REACH)
+    bare = (np.einsum("fi,fi->f", facing, normals[nearest]) < 0) | (distance > reach)
     if not bare.any():
         return mesh
-    patches, _ = submesh(mesh, bare)
-    count, labels = vertex_components(patches)
-    owner = labels[patches.faces[:, 0]]
-    areas = np.bincount(owner, weights=np.linalg.norm(facing[bare], axis=1), minlength=count)
-    dropped = np.zeros(mesh.n_faces, dtype=bool)
-    dropped[bare] = areas[owner] > np.pi * REACH**2  # smaller ones close holes
-    return submesh(mesh, ~dropped)[0]
+    # Single points decide where the rim runs, so it is ragged: averages of what faces say over
+    # their neighbors move it as mean curvature does (Merriman, Bence and Osher, 1992).
+    corner_of = sp.csr_array(
+        (np.ones(3 * mesh.n_faces), (np.repeat(np.arange(mesh.n_faces), 3), mesh.faces.ravel())),
+        shape=(mesh.n_faces, mesh.n_vertices),
+    )
+    n_around = np.maximum(corner_of.sum(axis=0), 1)
+    share = bare.astype(float)
+    for _ in range(RIM_STEPS):
+        share = corner_of @ ((corner_of.T @ share) / n_around) / 3
+    bare = share > 0.5
+    bare = _large_pieces(mesh, bare)  # smaller ones close holes
+    return submesh(mesh, _large_pieces(mesh, ~bare))[0]
+
+
+def _large_pieces(mesh: TriangleMesh, chosen: Bool[np.ndarray, " f"]) -> Bool[np.ndarray, " f"]:
+    """Return which of some faces lie in pieces of them that are larger than a disc of the reach."""
+    if not chosen.any():
+        return chosen
+    pieces, _ = submesh(mesh, chosen)
+    count, labels = vertex_components(pieces)
+    owner = labels[pieces.faces[:, 0]]
+    sizes = np.linalg.norm(area_vectors(pieces.vertices[pieces.faces]), axis=1)
+    areas = np.bincount(owner, weights=sizes, minlength=count)
+    large = np.zeros(mesh.n_faces, dtype=bool)
+    large[chosen] = areas[owner] > np.pi * REACH**2
+    return large

@@ -61,6 +61,9 @@ class Rules:
         The verb of the command that printed the address.
     open_paths : collection of str
         That GET reads without the token.
+    write_token : str, optional
+        A second secret, which the header alone brings; it opens all that the first one does. The
+        application says what takes it.
     json_errors : bool
         Whether refusals are JSON objects with a text under "error". Otherwise they are plain text.
     """
@@ -75,6 +78,7 @@ class Rules:
     name: str = "studio"
     verb: str = "studio"
     open_paths: Collection[str] = ()
+    write_token: str | None = None
     json_errors: bool = False
 
 
@@ -162,9 +166,11 @@ class Guard:
             if name == self._cookie_name
         ]
         # No page of another site can send this header: it would take a permission by CORS.
-        scheme, _, bearer = _only(scope, b"authorization", default="").partition(" ")
-        if scheme.lower() == "bearer":
-            given.append(bearer.strip())
+        bearer = bearer_of(_only(scope, b"authorization", default=""))
+        if bearer is not None:
+            if is_secret(bearer, self.rules.write_token):
+                return
+            given.append(bearer)
         if not any(self._is_token(value) for value in given):
             raise RefusedError(
                 403,
@@ -174,14 +180,15 @@ class Guard:
             )
 
     def _is_token(self, given: str) -> bool:
-        return secrets.compare_digest(given.encode(), self.rules.token.encode())
+        return is_secret(given, self.rules.token)
 
     def _check_kind(self, scope: Scope) -> None:
         """Refuse methods, types and sizes that no call of the page has."""
-        if scope["method"] in ("GET", "HEAD"):
-            return
+        methods = ["GET", "POST"] + ["DELETE"] * (self.rules.write_token is not None)
+        if scope["method"] not in (*methods, "HEAD"):
+            raise RefusedError(405, f"The {self.rules.name} takes {', '.join(methods)}.")
         if scope["method"] != "POST":
-            raise RefusedError(405, f"The {self.rules.name} takes GET and POST.")
+            return
         # A form of another page cannot have this type.
         if _only(scope, b"content-type").encode() != MESSAGE_TYPE:
             raise RefusedError(415, "The body must be application/octet-stream.")
@@ -273,6 +280,17 @@ def _only(scope: Scope, name: bytes, default: str | None = None) -> str:
     if len(values) > 1 or (not values and default is None):
         raise RefusedError(400, f"The header {name.decode()} must be given once.")
     return values[0] if values else str(default)
+
+
+def bearer_of(authorization: str) -> str | None:
+    """Return the token of a header Authorization, if it has one."""
+    scheme, _, bearer = authorization.partition(" ")
+    return bearer.strip() if scheme.lower() == "bearer" else None
+
+
+def is_secret(given: str, secret: str | None) -> bool:
+    """Say whether a secret was given, in a time that tells nothing of it."""
+    return secret is not None and secrets.compare_digest(given.encode(), secret.encode())
 
 
 def local_hosts(port: int) -> tuple[str, ...]:

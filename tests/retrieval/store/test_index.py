@@ -49,7 +49,9 @@ def test_a_shape_finds_itself_first_with_score_zero(index):
     for seed in range(12):
         best, *others = index.query(descriptor(seed), n_matches=4)
         assert (best.name, best.score, best.label) == (f"s{seed:02}", 0.0, f"class {seed % 3}")
+        assert "correspondences" not in vars(best)  # until they are asked for
         assert best.correspondences.tolist() == [[0, 0], [1, 1]]
+        assert not best.correspondences.flags.writeable
         assert len(others) == 3
         assert [m.score for m in others] == sorted(m.score for m in others)
 
@@ -180,6 +182,9 @@ def test_what_cannot_be_stored(index):
         index.add_descriptors("x", [with_vertices(descriptor(1), np.arange(2)[:, None])])
     with pytest.raises(InvalidParameterError, match=r"must be Unicode text; 'b\\udcff' is not"):
         index.add_descriptors("x", [descriptor(1)], source="b\udcff")
+    for name in ("", " ", "nul\0"):
+        with pytest.raises(InvalidParameterError, match="a character that shows, and no NUL"):
+            index.add_descriptors(name, [descriptor(1)])
     with pytest.raises(
         InvalidParameterError,
         match="must have as many numbers; those of recipe 'test' have 3, and these have 5",

@@ -52,7 +52,9 @@ def names(matches):
         ({"seed": 3}, {3}),
         ({"word": "b", "label": "class 1"}, {1, 4, 7}),
         ({"word": (0, 1)}, set()),
-        ({"nothing": 1}, set()),
+        ({"tag!=": "even"}, {1, 3, 5, 7, 9}),
+        ({"label!=": ["class 0", "class 1"]}, {2, 5, 8, 9}),
+        ({"seed!=": (1, 8), "seed": (0, 8)}, {0}),
         ({}, set(range(10))),
     ],
 )
@@ -61,6 +63,20 @@ def test_filters(index, where, wanted):
     assert names(found) == {f"s{seed}" for seed in wanted}
     scores = {match.name: match.score for match in index.query(descriptor(3), n_matches=100)}
     assert all(match.score == scores[match.name] for match in found)
+
+
+def test_an_attribute_that_no_shape_has_is_refused_with_those_there_are(index):
+    for where in ({"sead": 1}, {"seed": 1, "sead!=": 1}):
+        message = "no shape has 'sead'. The attributes are: seed, word"
+        with pytest.raises(es.InvalidParameterError, match=message):
+            index.query(descriptor(3), where=where)
+        with pytest.raises(es.InvalidParameterError, match=message):
+            index.records(where=where)
+    part = es.ShapeIndex.create(None)
+    part.add_descriptors("other", [descriptor(2)])
+    folders = [index.folder, part.folder]  # of several indexes, one may lack it
+    found = es.retrieval.query_indexes(descriptor(3), folders, where={"seed!=": (1, 9)})
+    assert names(found) == {"s0", "other"}
 
 
 def test_conditions_that_are_none(index):

@@ -132,7 +132,7 @@ def add(
     recipe = steps.index_recipe(shelf, method, codebook, in_parts=part is not None, n_frames=frames)
     with steps.worker_processes(workers, timeout, memory, scheduler) as processes:
         if recipe is None and frames:
-            learned = steps.learn_codebook(items, processes, repairs)
+            learned = steps.learn_codebook(items, processes, repairs, shelf)
             recipe = es.retrieval.PatchRecipe(learned, n_frames=frames)
         report = steps.describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     pruned = steps.prune(shelf, sources) if prune else []

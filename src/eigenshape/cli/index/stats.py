@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 
 import eigenshape as es
-from eigenshape.cli.console import out, print_json, print_table
+from eigenshape.cli import steps
+from eigenshape.cli.console import escape_text, out, print_json, print_table
 from eigenshape.cli.inputs import IndexArgument, JsonOption
 
 KILOBYTE = 1000  # bytes
@@ -18,10 +19,12 @@ def stats(index: IndexArgument, *, as_json: JsonOption = False) -> None:
     labels = Counter(record.label for record in records)
     recipes = Counter(str(recipe.name) for record in records for recipe in record.recipes)
     n_bytes = sum(path.stat().st_size for path in index.rglob("*") if path.is_file())
+    stage = steps.read_stage(index)
     if as_json:
         print_json(
             {
                 "index": str(index),
+                "stage": stage,
                 "shapes": len(records),
                 "bytes": n_bytes,
                 "recipes": dict(recipes),
@@ -31,6 +34,8 @@ def stats(index: IndexArgument, *, as_json: JsonOption = False) -> None:
         return
     each = n_bytes / max(len(records), 1) / KILOBYTE
     out.print(f"{len(records)} shapes, {n_bytes / KILOBYTE:,.0f} KB, {each:.1f} KB a shape")
+    if stage is not None:
+        out.print(f"{escape_text(stage)}; shapes are added after that")
     rows = [[name, str(count)] for name, count in recipes.most_common()]
     print_table("Descriptions", ["recipe", "shapes"], rows)
     rows = [[label or "(none)", str(count)] for label, count in labels.most_common()]

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,13 @@ from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.store.batch import BatchReport, build_index, train_codebook_from_files
+from eigenshape.retrieval.store.batch import (
+    BatchReport,
+    Callback,
+    announce_learning,
+    build_index,
+    train_codebook_from_files,
+)
 from eigenshape.retrieval.store.index import ShapeIndex
 
 RETRIES = 3  # workers of a cluster that a task may lose before it counts as failed
@@ -99,12 +105,18 @@ def describe_all(
 
 
 def learn_codebook(
-    items: Sequence[Item], workers: Workers, repairs: tuple[str, ...]
+    items: Sequence[Item],
+    workers: Workers,
+    repairs: tuple[str, ...],
+    shelf: ShapeIndex | None = None,
 ) -> PatchCodebook:
-    """Learn a codebook with a progress bar."""
-    with progress_bar("codebook") as progress:
+    """Learn a codebook with a progress bar; `index stats` of an index says how far it is."""
+    with progress_bar("codebook") as progress, ExitStack() as stack:
+        report: Callback = batch_reporter(progress)
+        if shelf is not None:
+            report = stack.enter_context(announce_learning(shelf.folder, report))
         return train_codebook_from_files(
-            items, read_surface, repairs=repairs, workers=workers, callback=batch_reporter(progress)
+            items, read_surface, repairs=repairs, workers=workers, callback=report
         )
 
 

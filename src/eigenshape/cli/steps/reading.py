@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Int
+from scipy.spatial import cKDTree
 
-from eigenshape._errors import InvalidParameterError
-from eigenshape.cli.console import print_repairs
+from eigenshape._errors import EigenshapeError, InvalidParameterError
+from eigenshape.cli.console import err, escape_text, print_repairs
 from eigenshape.cli.inputs import repair_names
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
@@ -15,9 +16,9 @@ from eigenshape.geometry.repair import repair
 from eigenshape.geometry.repair_report import RepairedCloud
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.labeled_shapes import (
+    find_labeled_shapes,
     read_label_names,
     read_labeled_shape,
-    read_labeled_shapes,
 )
 from eigenshape.io.labels import read_map
 from eigenshape.io.mesh_files import read_mesh
@@ -53,8 +54,12 @@ def load_shape(
 
 def read_examples(
     like: Sequence[Path], labels: Sequence[Path], library: Path | None
-) -> tuple[dict[str, LabeledShape], list[str]]:
-    """Read the labeled shapes of a verb by name, and the names of labels that a library has."""
+) -> tuple[dict[str, LabeledShape], list[str], list[str]]:
+    """Read the labeled shapes of a verb by name, and the names of labels that a library has.
+
+    Each shape is repaired where it needs it. Last come the names of those of the library that
+    still cannot be described; they are left out, with a line on stderr.
+    """
     if labels and len(labels) != len(like):
         raise InvalidParameterError(
             f"--labels must be given once for each --like; there are {len(labels)} for {len(like)}."
@@ -63,11 +68,38 @@ def read_examples(
         raise InvalidParameterError("Labels must come from --like or from --library; give one.")
     beside: Sequence[Path | None] = labels or [None] * len(like)
     found = {
-        str(path): read_labeled_shape(path, given) for path, given in zip(like, beside, strict=True)
+        str(path): _read_example(path, given) for path, given in zip(like, beside, strict=True)
     }
     if library is None:
-        return found, []
-    return found | read_labeled_shapes(library), read_label_names(library)
+        return found, [], []
+    left_out = []
+    for path in find_labeled_shapes(library):
+        try:
+            example = _read_example(path)
+            example.points  # noqa: B018 - described here, and kept, so that a failure has a name
+        except (EigenshapeError, OSError) as error:
+            err.print(f"[yellow]left out:[/] {escape_text(path.name)}: {escape_text(error)}")
+            left_out.append(path.name)
+        else:
+            found[path.stem] = example
+    if not found:
+        raise InvalidParameterError(
+            f"A library must hold a labeled shape that can be described; {library} holds none."
+        )
+    return found, read_label_names(library), left_out
+
+
+def _read_example(path: Path, labels: Path | None = None) -> LabeledShape:
+    """Read a labeled shape and repair what is needed; faces keep their labels."""
+    given = read_labeled_shape(path, labels)
+    done = repair(given.mesh, ("auto",))
+    if not done.report:
+        return given
+    print_repairs(tuple(f"{path.name}: {line}" for line in done.report))
+    # Repairs remove and split faces: each takes the label of the nearest one before.
+    middles = [mesh.vertices[mesh.faces].mean(axis=1) for mesh in (given.mesh, done.mesh)]
+    nearest = cKDTree(middles[0]).query(middles[1])[1]
+    return LabeledShape(done.mesh, given.labels[nearest])
 
 
 def read_partners(path: Path | None) -> Int[np.ndarray, " n"] | None:

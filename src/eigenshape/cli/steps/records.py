@@ -2,10 +2,11 @@
 
 from typing import Any
 
+from eigenshape.retrieval.store.batch import read_stage
 from eigenshape.retrieval.store.filters import parse_filters
 from eigenshape.retrieval.store.records import Record
 
-__all__ = ["count_shapes", "parse_filters", "record_facts"]
+__all__ = ["count_shapes", "parse_filters", "read_stage", "record_facts"]
 
 
 def record_facts(record: Record) -> dict[str, Any]:

@@ -13,10 +13,13 @@ from eigenshape._progress import Progress
 from eigenshape._text import literal
 from eigenshape.cli.console import err, escape_text, progress_bar
 from eigenshape.cli.steps.reading import read_repaired
+from eigenshape.cli.steps.views import Side
+from eigenshape.deformation.rigidity import nearest_rotations
 from eigenshape.geometry.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.plot.camera import Up, View
+from eigenshape.geometry.simplices import size_one
+from eigenshape.plot.camera import Up, View, aim_camera
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
 from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
@@ -26,6 +29,7 @@ from eigenshape.retrieval.store.records import Match
 
 CAPTION = "corresponding parts have one color; a lower score is more similar"
 N_CELLS = 12  # of the query by patches
+FEWEST_TO_TURN = 4  # pairs of points that determine how a match is turned
 N_EXPLAINED = 12  # pairs of points of an explanation: as many colors as people tell apart
 # times what a patch has of the surface, in length: farther from a matched patch nothing is known
 REACH = 3.0
@@ -87,7 +91,8 @@ def contact_sheet(
     """Draw a query beside its matches, read from their files.
 
     The parts of the query have colors of their own; a part of a match has the color of the query's
-    part that it corresponds to, and is gray where there is none. A match whose file cannot be read
+    part that it corresponds to, and is gray where there is none. Matches are turned so that they
+    are seen from the side of the query. A match whose file cannot be read
     is named on stderr, and its place stays empty.
     """
     first = Panel(
@@ -98,7 +103,7 @@ def contact_sheet(
         for done, match in enumerate(matches):
             progress(done / len(matches), match.name)
             panels.append(_panel(query, match, repairs))
-    return figure_contact_sheet(first, panels, caption=caption, view=view, up=up)
+    return figure_contact_sheet(first, panels, caption=caption, **_side_of(query, view, up))
 
 
 def explanation(
@@ -126,12 +131,31 @@ def explanation(
     ):
         reach = REACH * np.sqrt(surface_area(surface) / max(len(match.vertices), 1))
         labels = _cells(surface, vertices, np.arange(len(vertices)), reach)
-        panels.append(Panel(surface, name, labels, vertices))
+        shown = surface if surface is query.mesh else _turned(surface, query, match)
+        panels.append(Panel(shown, name, labels, vertices))
     caption = (
         f"The {len(ours)} surest of {len(match.correspondences)} pairs of corresponding points: "
         "their surroundings have one color"
     )
-    return figure_contact_sheet(panels[0], panels[1:], caption=caption, view=view, up=up)
+    return figure_contact_sheet(panels[0], panels[1:], caption=caption, **_side_of(query, view, up))
+
+
+def _side_of(query: ColoredQuery, view: View, up: Up) -> Side:
+    """Return the side from which the query is drawn, as directions: matches are turned to it."""
+    _, down, towards = aim_camera(query.mesh, view=view, up=up).rotation
+    return {"view": towards, "up": -down}
+
+
+def _turned(mesh: TriangleMesh, query: ColoredQuery, match: Match) -> TriangleMesh:
+    """Turn a match so that points which correspond lie on the same side as on the query."""
+    ours, theirs = match.correspondences.T
+    if len(ours) < FEWEST_TO_TURN:
+        return mesh
+    targets = query.mesh.vertices[query.descriptor.vertices[ours]]
+    points = mesh.vertices[match.vertices[theirs]]
+    targets, points = (size_one(each - each.mean(axis=0))[0] for each in (targets, points))
+    rotation = nearest_rotations((targets.T @ points)[None])[0]
+    return TriangleMesh(mesh.vertices @ rotation.T, mesh.faces)
 
 
 def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel:
@@ -154,7 +178,7 @@ def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel
         reach = REACH * np.sqrt(surface_area(mesh) / len(match.vertices))
         labels = _cells(mesh, match.vertices[theirs], query.colors[ours], reach)
     marked = theirs[np.isin(ours, query.dots)]
-    return Panel(mesh, title, labels, match.vertices[marked])
+    return Panel(_turned(mesh, query, match), title, labels, match.vertices[marked])
 
 
 def _read_match(match: Match, repairs: tuple[str, ...]) -> TriangleMesh:

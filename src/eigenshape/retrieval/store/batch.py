@@ -1,13 +1,15 @@
 """Describe many files in worker processes, and add what they find to an index."""
 
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import closing
+import os
+import socket
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import file_digest, sha256
 from itertools import chain
 from pathlib import Path
-from time import monotonic
+from time import monotonic, time
 from typing import SupportsIndex
 
 from eigenshape._arguments import require_each, require_type
@@ -41,6 +43,7 @@ Callback = Callable[[int, int, str, str | None], None]
 # Gaussians, and take some minutes; fewer than 40 leave it to the codebook of the library.
 FEWEST_TO_TRAIN, MOST_TO_TRAIN = 40, 100
 REPAIRS = "repairs"  # attribute of a shape that was repaired: what was done
+STAGE = "stage.txt"  # in the folder of an index, while it is prepared for its first shapes
 N_TRAINING_VIEWS = 2  # partial views of each closed shape that a codebook is learned from
 # Shapes are added together, at most this many, and at most this many seconds after the last ones.
 # One change costs 5 ms of CPU and some waits for the disk; a stopped build loses what is not added.
@@ -189,8 +192,9 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     taught: dict[str, Outcome[_ReadFile]] = {}
     if learn and not index.recipes():
         count = N_PATCH_VIEWS if views is None else views
-        taught = _read_teachers(items, read_item, count, workers, callback)
-        index.keep_recipe(PatchRecipe(_learn_from(taught.values())))
+        with announce_learning(index.folder, callback) as report:
+            taught = _read_teachers(items, read_item, count, workers, report)
+            index.keep_recipe(PatchRecipe(_learn_from(taught.values())))
         # Of several processes that fill a new index, all take the codebook of the first.
         patch_recipe = next(kept for kept in index.recipes() if isinstance(kept, PatchRecipe))
         taught = {name: _encoded(outcome, patch_recipe, count) for name, outcome in taught.items()}
@@ -295,6 +299,42 @@ def _read_teachers(
             callback(number + 1, len(items), item.name, outcome.error)
     # in this order, so that the codebook does not depend on which file was done first
     return {item.name: found[item.name] for item in chosen}
+
+
+@contextmanager
+def announce_learning(folder: Path, callback: Callback) -> Iterator[Callback]:
+    """Write into the folder of an index how far learning its codebook is, beside a callback.
+
+    Until the codebook is learned the index holds no shape, which takes minutes on large meshes.
+    """
+    note = folder / STAGE
+
+    def write(done: str) -> None:
+        with suppress(OSError):  # a full disk; it is a note alone
+            note.write_text(
+                f"learning a codebook: {done} shapes read by process {os.getpid()} on "
+                f"{socket.gethostname()}"
+            )
+
+    def report(n_done: int, n_items: int, name: str, error: str | None) -> None:
+        write(f"{n_done} of {min(n_items, MOST_TO_TRAIN)}")
+        callback(n_done, n_items, name, error)
+
+    write("no")
+    try:
+        yield report
+    finally:
+        note.unlink(missing_ok=True)
+
+
+def read_stage(folder: Path) -> str | None:
+    """Return what is being done to an index before it holds shapes, and how old that note is."""
+    note = folder / STAGE
+    try:
+        age = max(time() - note.stat().st_mtime, 0)
+        return f"{note.read_text()}, {age:.0f} s ago"
+    except OSError:
+        return None
 
 
 def _learn_from(outcomes: Iterable[Outcome[_ReadFile]]) -> PatchCodebook:

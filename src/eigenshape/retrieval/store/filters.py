@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.store.snapshot import Shapes
 
 RESERVED = ("label", "tag")  # keys of a filter that are no attributes; their values are texts
 RANGE = ".."  # between the least and the largest number of a filter as text
+NOT = "!="  # after a key: shapes that do not meet the condition
 
 
 def parse_filters(texts: Sequence[str] | None) -> dict[str, Any] | None:
-    """Return the conditions of filters such as "label=cat,dog" or "height=1.5..3".
+    """Return the conditions of filters such as "label=cat,dog", "height=1.5..3" or "kind!=cat".
 
     Returns
     -------
@@ -32,21 +33,23 @@ def parse_filters(texts: Sequence[str] | None) -> dict[str, Any] | None:
     conditions: dict[str, Any] = {}
     for text in texts or ():
         key, sign, value = (part.strip() for part in text.partition("="))
-        if not sign or not key or not value:
+        if key.endswith("!"):
+            key = key.removesuffix("!").strip() + NOT
+        if not sign or key in ("", NOT) or not value:
             raise InvalidParameterError(
-                f"A filter is a condition such as label=cat or height=1.5..3; it is {text!r}."
+                f"A filter is a condition such as label=cat, label!=cat or height=1.5..3; it is {text!r}."
             )
         if key in conditions:
             raise InvalidParameterError(
                 f"A filter has one condition for each key; {key!r} has two. Either of two values "
-                f"is {key}=one,other."
+                f"is {key.removesuffix(NOT)}=one,other."
             )
         conditions[key] = _parse_condition(text, key, value)
     return conditions or None
 
 
 def _parse_condition(text: str, key: str, value: str) -> Any:
-    if key in RESERVED:  # also "7" and "1..2", which are good names of folders
+    if key.removesuffix(NOT) in RESERVED:  # also "7" and "1..2", which are good names of folders
         return _split(value)
     if RANGE not in value:
         return [_number_or_text(part) for part in _split(value)]
@@ -86,24 +89,46 @@ def choose_shapes(shapes: Shapes, where: Mapping[str, Any]) -> Bool[np.ndarray, 
         If a condition is none.
     """
     require_type(where, Mapping, "where")
-    tests = {key: _condition(key, value) for key, value in where.items()}
+    require_each(list(where), str, "where")
+    # The key without its sign, whether the condition must be met, and its test
+    tests = [
+        (key.removesuffix(NOT), not key.endswith(NOT), _condition(key.removesuffix(NOT), value))
+        for key, value in where.items()
+    ]
     chosen = np.ones(len(shapes.ids), dtype=bool)
-    label = tests.pop("label", None)
-    if label is not None:  # by the codes alone: no text is read
-        known = [label(each) for each in shapes.labels]
-        chosen = np.array(known, dtype=bool)[shapes.label_codes] if known else chosen
+    for key, wanted, test in tests:
+        if key == "label" and shapes.labels:  # by the codes alone: no text is read
+            known = np.array([test(each) == wanted for each in shapes.labels], dtype=bool)
+            chosen &= known[shapes.label_codes]
+    tests = [each for each in tests if each[0] != "label"]
     for place in np.flatnonzero(chosen).tolist() if tests else []:
         row = shapes.row(place)
         attributes = json.loads(row.attributes)
-        for key, test in tests.items():
+        for key, wanted, test in tests:
             if key == "tag":
                 agrees = any(test(tag) for tag in json.loads(row.tags))
             else:
                 agrees = key in attributes and test(attributes[key])
-            if not agrees:
+            if agrees != wanted:
                 chosen[place] = False
                 break
     return chosen
+
+
+def require_attributes(shapes: Shapes, where: Mapping[str, Any]) -> None:
+    """Raise an error if a condition is about an attribute of no shape, which is often misspelled."""
+    keys = {str(key).removesuffix(NOT) for key in where} - set(RESERVED)
+    known: set[str] = set()
+    for place in range(len(shapes.ids)):
+        if keys <= known:  # usually after the first shape
+            return
+        known |= json.loads(shapes.row(place).attributes).keys()
+    missing = sorted(keys - known)
+    if missing and len(shapes.ids):
+        raise InvalidParameterError(
+            f"A filter must be about label, tag or an attribute that a shape has; no shape has "
+            f"{missing[0]!r}. The attributes are: {', '.join(sorted(known)) or 'none'}."
+        )
 
 
 def _condition(key: str, value: Any) -> Callable[[Any], bool]:

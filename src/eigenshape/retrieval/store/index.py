@@ -18,7 +18,7 @@ from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.store import files as store
 from eigenshape.retrieval.store.catalog import DATABASE, read_seals
 from eigenshape.retrieval.store.damage import warn_of_damage
-from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.filters import choose_shapes, require_attributes
 from eigenshape.retrieval.store.kept_tables import open_state
 from eigenshape.retrieval.store.reader import EngineMaker, IndexReader, choose_recipe
 from eigenshape.retrieval.store.records import Matches, Record
@@ -35,6 +35,7 @@ from eigenshape.retrieval.store.writing import (
     DescribedShape,
     describe_to_store,
     facts_text,
+    require_name,
     require_text,
     update_shape,
     write_shape,
@@ -224,13 +225,14 @@ class ShapeIndex:
         Raises
         ------
         InvalidParameterError
-            If a condition is none.
+            If a condition is none, or about an attribute that no shape has.
         """
         state = self._read()
         records = _records(state)
         if where is None:
             return records
         chosen = choose_shapes(state.shapes, where)
+        require_attributes(state.shapes, where)
         return [record for record in records if chosen[state.names[record.name]]]
 
     def recipes(self) -> list[AnyRecipe]:
@@ -321,7 +323,8 @@ class ShapeIndex:
         mesh = as_mesh(mesh)
         require_type(recipe, AnyRecipe | None, "recipe")
         # Before the mesh is described, which takes a second
-        require_text(name, label, source)
+        require_name(name)
+        require_text(label, source)
         facts_text(tags, attributes or {})
         if recipe is None:
             recipe = self.default_recipe()
@@ -477,7 +480,9 @@ class ShapeIndex:
             Conditions, all of which a shape must meet: ``{"label": "cat"}``, ``{"tag": "scanned"}``
             or, by the name of an attribute, ``{"height": 3}``. A list of values allows any of them,
             and a tuple of two numbers, of which one may be None, is a range:
-            ``{"label": ["cat", "dog"], "height": (1.5, None)}``.
+            ``{"label": ["cat", "dog"], "height": (1.5, None)}``. A key that ends in ``!=`` chooses
+            the shapes that do not meet its condition, also those without the attribute:
+            ``{"label!=": "cat"}``.
         exact : bool
             Whether to compare all shapes with the query, however many there are. By default, of
             more than 2,000 shapes those are compared that a coarse scan finds nearest: some
@@ -496,7 +501,7 @@ class ShapeIndex:
             If a mesh is given, as `describe`.
         InvalidParameterError
             If `n_matches` is not positive, a number of the descriptor is not finite, or a condition
-            is none.
+            is none or about an attribute that no shape has.
         StoreError
             If no shape is described by the recipe, or the index cannot be read.
 

@@ -183,7 +183,8 @@ def _ask(
 ) -> Matches:
     reader = _open_reader(folder)
     reader.refresh()
-    return reader.query(descriptor, n_matches=n_matches, where=where, exact=exact)
+    # One of several indexes need not have each attribute.
+    return reader.search(reader.state, descriptor, n_matches, where, exact=exact)
 
 
 def _open_reader(folder: Path) -> IndexReader:

@@ -27,7 +27,7 @@ from eigenshape.retrieval.search.candidates import (
 from eigenshape.retrieval.search.coarse import CoarseRows, coarse_rows
 from eigenshape.retrieval.search.engines import Engine, supply_from
 from eigenshape.retrieval.store.damage import warn_of_damage
-from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.filters import choose_shapes, require_attributes
 from eigenshape.retrieval.store.kept_tables import open_state
 from eigenshape.retrieval.store.records import Matches
 from eigenshape.retrieval.store.searching import search_candidates
@@ -181,14 +181,29 @@ class IndexReader:
         else:
             mesh, recipe = as_mesh(shape, "shape"), choose_recipe(list(state.recipes.values()))
             descriptor = kind_of(recipe).describe_query(mesh, recipe)
+        matches = self.search(state, descriptor, wanted, where, exact=exact)
+        if where is not None:
+            require_attributes(state.shapes, where)
+        return matches
+
+    def search(
+        self,
+        state: IndexState,
+        descriptor: Descriptor,
+        n_matches: int,
+        where: Mapping[str, Any] | None,
+        *,
+        exact: bool,
+    ) -> Matches:
+        """Search one state for a descriptor; an attribute of a condition may be that of no shape."""
         # Of the descriptor first, whose numbers may be refused
         chosen = None if where is None else choose_shapes(state.shapes, where)
         snapshot = state.snapshot(descriptor.recipe)
         allowed = np.ones(snapshot.n_shapes, dtype=bool)
         if chosen is not None:
             allowed = snapshot.mask(chosen)
-        candidates = self._candidates(snapshot, descriptor, allowed, wanted, exact=exact)
-        matches, damages = search_candidates(snapshot, descriptor, candidates, wanted)
+        candidates = self._candidates(snapshot, descriptor, allowed, n_matches, exact=exact)
+        matches, damages = search_candidates(snapshot, descriptor, candidates, n_matches)
         warn_of_damage(str(state.folder), damages)
         return matches
 

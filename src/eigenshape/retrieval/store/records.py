@@ -2,14 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._text import html_repr, short_repr
-from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape._threads import one_blas_thread
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 from eigenshape.retrieval.search.candidates import Method
 
 
@@ -71,11 +73,8 @@ class Match(ReadOnly):
     score : float
         Of `matching_score` or `patch_scores`: 0, or nearly, for the same descriptor; smaller is
         more alike.
-    correspondences : (p, 2) int
-        Features or patches that correspond: the number of one of the query, and of one of this
-        shape. Surest pairs first.
-    vertices : (m,) int
-        The vertex of each feature or patch of this shape.
+    query, descriptor : HeatDescriptor or PatchDescriptor
+        That was searched for, as the index keeps numbers; and that of this shape.
     view : int
         Which of the descriptors of the shape matched, in the order in which they were added: 0 is
         the first, that of the whole shape.
@@ -109,14 +108,30 @@ class Match(ReadOnly):
     label: str | None
     source: str | None
     score: float
-    correspondences: Int[np.ndarray, "p 2"]
-    vertices: Int[np.ndarray, " m"]
+    query: Descriptor
+    descriptor: Descriptor
     view: int
     chance: float | None = None
     distance: float | None = None
 
     __repr__ = short_repr
     _repr_html_ = html_repr
+
+    @property
+    def vertices(self) -> Int[np.ndarray, " m"]:
+        """Return the vertex of each feature or patch of this shape."""
+        return self.descriptor.vertices
+
+    @cached_property
+    @one_blas_thread()
+    def correspondences(self) -> Int[np.ndarray, "p 2"]:
+        """Return the features or patches that correspond, surest pairs first.
+
+        Each row is the number of one of the query, and of one of this shape. They are computed when
+        they are first asked for, which takes 2 ms, and kept.
+        """
+        kind = kind_of(self.query.recipe)
+        return freeze(kind.correspondences(self.query, self.descriptor))
 
 
 @dataclass(frozen=True, eq=False)

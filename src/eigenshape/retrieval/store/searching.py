@@ -90,9 +90,8 @@ def _match(
     snapshot: Snapshot, query: Descriptor, place: int, distance: float, score: float
 ) -> Match:
     shape, found = snapshot.shape(place), snapshot.descriptor(place)
-    pairs = kind_of(snapshot.recipe).correspondences(query, found)
     view = int(snapshot.columns["view"][place])
-    match = Match(shape.name, shape.label, shape.source, score, pairs, found.vertices, view)
+    match = Match(shape.name, shape.label, shape.source, score, query, found, view)
     if not isinstance(query, PatchDescriptor):
         return match
     return replace(match, chance=float(chances(np.array([score]))[0]), distance=distance)

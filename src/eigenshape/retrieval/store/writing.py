@@ -83,9 +83,18 @@ def describe_to_store(
     return descriptors
 
 
-def require_text(name: str, *others: str | None) -> None:
+def require_name(name: str) -> None:
+    """Raise an error if a shape cannot have a name: in a path or an address it must say something."""
+    require_text(name)
+    if not name.strip() or "\0" in name:
+        raise InvalidParameterError(
+            f"The name of a shape must have a character that shows, and no NUL; it is {name!r}."
+        )
+
+
+def require_text(*texts: str | None) -> None:
     """Raise an error if a name, label, source or digest is not Unicode text."""
-    for text in (name, *others):
+    for text in texts:
         if text is not None and (
             not isinstance(text, str) or text != text.encode(errors="replace").decode()
         ):
@@ -151,7 +160,8 @@ def require_columns(descriptor: Descriptor, rows: np.ndarray, n_columns: int) ->
 def write_shape(change: Change, shape: DescribedShape, *, replace: bool) -> None:
     """Write a shape in an open change."""
     require_each(shape.descriptors, Descriptor, "descriptors")
-    require_text(shape.name, shape.label, shape.source, shape.digest)
+    require_name(shape.name)
+    require_text(shape.label, shape.source, shape.digest)
     facts = facts_text(shape.tags, shape.attributes)
     rows = rows_of_each(shape.name, shape.descriptors)
     number = _keep_shape(change, shape, facts, replace=replace)

@@ -1,8 +1,10 @@
 """The application of the service: its page, and its calls."""
 
 import asyncio
+import json
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -15,6 +17,7 @@ import anyio.to_thread
 from prometheus_client import CONTENT_TYPE_LATEST
 from starlette.applications import Starlette
 from starlette.convertors import StringConvertor, register_url_convertor
+from starlette.endpoints import HTTPEndpoint
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, Response
@@ -22,7 +25,8 @@ from starlette.routing import Route
 
 import eigenshape as es
 from eigenshape.retrieval.store.filters import parse_filters
-from eigenshape_studio.guard import App, Guard, Rules
+from eigenshape.retrieval.store.writing import facts_text, require_name, require_text
+from eigenshape_studio.guard import App, Guard, Rules, bearer_of, is_secret
 from eigenshape_studio.parse import display_name, shape_suffix
 from eigenshape_studio.service import openapi
 from eigenshape_studio.service.describing import Describers, MeshRefusedError, Picture
@@ -48,15 +52,18 @@ Endpoint = Callable[[Request], Awaitable[Response]]
 
 @dataclass(frozen=True)
 class Settings:
-    """What an answer may hold.
+    """What answers may hold, and who may change the index.
 
     Attributes
     ----------
     show_sources : bool
         Whether answers name the files of shapes.
+    write_token : str, optional
+        The secret of those who may add and remove shapes; without it, nobody may.
     """
 
     show_sources: bool = False
+    write_token: str | None = None
 
 
 class _Drawings:
@@ -102,19 +109,74 @@ class Service:
         """Find the shapes that are most like an uploaded mesh."""
         wanted = read_parameters(request, openapi.QUERY)
         where = _conditions(wanted)
-        try:
-            suffix = shape_suffix(wanted["name"])
-        except es.FileFormatError as error:
-            raise RequestError(400, str(error)) from error
+        suffix = _suffix(wanted["name"])
         data = await request.body()
+        async with self._describing(wanted["name"]):
+            return await self._answer(wanted, where, suffix, data)
+
+    async def add_shape(self, request: Request) -> Response:
+        """Describe an uploaded mesh and add it to the index."""
+        self._require_writer(request)
+        wanted = read_parameters(request, openapi.ADD)
+        name, suffix = wanted["name"], _suffix(wanted["file"])
+        facts = {"label": wanted["label"], "tags": wanted["tag"] or ()}
+        facts |= {"attributes": _attributes(wanted["attributes"])}
+        # Before the mesh is described, which takes seconds
+        require_name(name)
+        require_text(facts["label"])
+        facts_text(facts["tags"], facts["attributes"])
+        await self._refresh()
+        if self.shelf.shape(name) is not None and not wanted["replace"]:
+            raise RequestError(409, f"The index has a shape {name[:80]!r}; replace=1 replaces it.")
+        data = await request.body()
+        async with self._describing(wanted["file"]):
+            shape = await self.describers.describe_shape(
+                suffix, data, self.shelf.recipe, name, facts
+            )
+        await self._change(lambda: self.shelf.add(shape, replace=wanted["replace"]))
+        return JSONResponse(self._facts(self._shape(name)), 201)
+
+    async def remove_shape(self, request: Request) -> Response:
+        """Remove a shape from the index, and tell what was known of it."""
+        self._require_writer(request)
+        read_parameters(request, ())
+        await self._refresh()
+        shape = self._shape(request.path_params["name"])
+        await self._change(lambda: self.shelf.remove(shape.name))
+        return JSONResponse(self._facts(shape))
+
+    def _require_writer(self, request: Request) -> None:
+        """Refuse a request without the token of those who may change the index."""
+        given = bearer_of(request.headers.get("authorization", ""))
+        if self.settings.write_token is None:
+            raise RequestError(
+                403, "This service only reads; start it with EIGENSHAPE_WRITE_TOKEN in place."
+            )
+        if given is None or not is_secret(given, self.settings.write_token):
+            raise RequestError(
+                403,
+                "A change takes the token for writing; send it in the header `Authorization: "
+                "Bearer TOKEN`.",
+            )
+
+    async def _change(self, work: Callable[[], None]) -> None:
+        """Change the index in a thread."""
+        try:
+            await anyio.to_thread.run_sync(work, limiter=self._threads)
+        except es.StoreError as error:  # a full disk, or another process that writes for long
+            raise RequestError(503, f"The index was not changed: {error}") from error
+
+    @asynccontextmanager
+    async def _describing(self, file: str) -> AsyncIterator[None]:
+        """Count a mesh that is described, and say in the answer why one cannot be."""
         if self._n_queries >= MOST_QUERIES:
             raise RequestError(503, f"{MOST_QUERIES} queries wait already; ask again later.")
         self._n_queries += 1
         try:
             with self.metrics.queue.track_inprogress():
-                return await self._answer(wanted, where, suffix, data)
+                yield
         except MeshRefusedError as error:
-            name = display_name(wanted["name"])
+            name = display_name(file)
             cause = str(error).removeprefix("The file: ").removesuffix(".")
             reason = f"{name} could not be described: {cause}"
             raise RequestError(422, f"{reason}.") from error
@@ -287,28 +349,54 @@ class Service:
 
 def make_app(service: Service, rules: Rules) -> App:
     """Return the application: the page and the calls, behind the guard, and counted."""
-    calls: dict[str, tuple[str, Endpoint]] = {
-        "/v1/query": ("POST", service.query),
-        "/v1/shapes": ("GET", service.shapes),
-        "/v1/shapes/{name:any}": ("GET", service.shape),
-        "/v1/thumbnails": ("GET", service.thumbnail),
-        "/v1/points": ("GET", service.points),
-        "/health": ("GET", service.health),
-        "/metrics": ("GET", service.show_metrics),
-        "/openapi.json": ("GET", service.describe_calls),
-        **dict.fromkeys(PAGES, ("GET", service.show_page)),
-        **dict.fromkeys(FILES, ("GET", service.show_file)),
+    calls: dict[str, dict[str, Endpoint]] = {
+        "/v1/query": {"POST": service.query},
+        "/v1/shapes": {"GET": service.shapes, "POST": service.add_shape},
+        "/v1/shapes/{name:any}": {"GET": service.shape, "DELETE": service.remove_shape},
+        "/v1/thumbnails": {"GET": service.thumbnail},
+        "/v1/points": {"GET": service.points},
+        "/health": {"GET": service.health},
+        "/metrics": {"GET": service.show_metrics},
+        "/openapi.json": {"GET": service.describe_calls},
+        **{path: {"GET": service.show_page} for path in PAGES},
+        **{path: {"GET": service.show_file} for path in FILES},
     }
-    routes = [
-        Route(path, _with_plain_errors(call), methods=[method])
-        for path, (method, call) in calls.items()
-    ]
+    routes = [Route(path, _by_method(by_method)) for path, by_method in calls.items()]
     app = Starlette(
         routes=routes, exception_handlers={HTTPException: _show_http_error, Exception: _show_fault}
     )
     app.router.redirect_slashes = False
     templates = frozenset(path.replace(":any", "") for path in calls)
     return count_requests(Guard(app, rules), service.metrics, templates)
+
+
+def _by_method(calls: Mapping[str, Endpoint]) -> type[HTTPEndpoint]:
+    """Return what answers at one address, by a call for each method; another one is refused."""
+    answers = {
+        method.lower(): staticmethod(_with_plain_errors(call)) for method, call in calls.items()
+    }
+    return type("Calls", (HTTPEndpoint,), answers)
+
+
+def _suffix(name: str) -> str:
+    """Return the suffix of a file of shapes; raise RequestError if it is none."""
+    try:
+        return shape_suffix(name)
+    except es.FileFormatError as error:
+        raise RequestError(400, str(error)) from error
+
+
+def _attributes(text: str) -> dict[str, Any]:
+    """Return the attributes of a JSON object; raise RequestError if the text is none."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise RequestError(
+            400, f"The parameter attributes must be a JSON object; it is {text[:80]!r}."
+        )
+    return found
 
 
 def _thumbnail_address(name: str) -> str:
@@ -337,6 +425,8 @@ def _with_plain_errors(call: Endpoint) -> Endpoint:
             return await call(request)
         except RequestError as error:
             return _error(error.status, error.reason)
+        except es.InvalidParameterError as error:
+            return _error(400, str(error))
         except es.StoreError as error:  # damaged, or being replaced
             return _error(500, f"The index cannot be read: {error}")
 

@@ -19,6 +19,7 @@ from matplotlib.image import imsave
 
 import eigenshape as es
 from eigenshape._workers import outcome_of, schedule_work, start_pool
+from eigenshape.retrieval.store.writing import describe_to_store
 from eigenshape_studio.parse import Limits, read_upload
 from eigenshape_studio.search import color_places
 
@@ -101,6 +102,20 @@ def describe_upload(recipe: Recipe, with_picture: bool, path: Path) -> Described
     )
 
 
+def describe_shape(
+    recipe: Recipe, name: str, facts: dict[str, Any], path: Path
+) -> es.retrieval.DescribedShape:
+    """Describe an uploaded file as an index keeps it: whole, from several sides, and as a picture."""
+    surface = read_upload(path, Limits().n_faces)
+    repaired = es.repair(surface.mesh, REPAIRS)
+    done = (*surface.report, *repaired.report)
+    attributes = facts["attributes"] | ({"repairs": "; ".join(done)} if done else {})
+    descriptors = describe_to_store(repaired.mesh, recipe)
+    picture = es.retrieval.draw_thumbnail(repaired.mesh)
+    facts = facts | {"attributes": attributes, "thumbnail": picture}
+    return es.retrieval.DescribedShape(name, descriptors, **facts)
+
+
 def _picture_of_query(mesh: es.TriangleMesh, vertices: np.ndarray) -> dict[str, Any]:
     drawn = _draw(mesh)
     colors = color_places(mesh.vertices[vertices]) / 255
@@ -163,11 +178,13 @@ class Describers:
         MeshRefusedError
             If they are no mesh, or describing it reaches a limit.
         """
-        path = await anyio.to_thread.run_sync(self._keep, suffix, data)
-        try:
-            return await self._run(partial(self._describe, recipe, with_picture), path)
-        finally:
-            path.unlink(missing_ok=True)
+        return await self._run_on(suffix, data, partial(self._describe, recipe, with_picture))
+
+    async def describe_shape(
+        self, suffix: str, data: bytes, recipe: Recipe, name: str, facts: dict[str, Any]
+    ) -> es.retrieval.DescribedShape:
+        """Describe the bytes of a mesh file to be kept; raise MeshRefusedError as `describe`."""
+        return await self._run_on(suffix, data, partial(describe_shape, recipe, name, facts))
 
     async def draw(self, path: Path) -> Picture:
         """Draw a file of the index; raise MeshRefusedError if it cannot be read."""
@@ -185,6 +202,13 @@ class Describers:
         ) as file:
             file.write(data)
             return Path(file.name)
+
+    async def _run_on(self, suffix: str, data: bytes, work: Callable[[Path], T]) -> T:
+        path = await anyio.to_thread.run_sync(self._keep, suffix, data)
+        try:
+            return await self._run(work, path)
+        finally:
+            path.unlink(missing_ok=True)
 
     async def _run(self, work: Callable[[Path], T], path: Path) -> T:
         try:

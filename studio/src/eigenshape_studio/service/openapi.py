@@ -14,7 +14,7 @@ FILTER = Parameter(
     "filter",
     "strings",
     "Only shapes that meet a condition: label=cat, tag=scanned, or by an attribute height=1.5..3. "
-    "label=cat,dog allows either. May be repeated; all conditions must be met.",
+    "label=cat,dog allows either, and label!=cat all others. May be repeated; all conditions must be met.",
 )
 QUERY = (
     Parameter(
@@ -34,6 +34,14 @@ SHAPES = (
     Parameter("offset", "integer", "Shapes to leave out at the beginning.", 0, 0, 2**53),
     Parameter("limit", "integer", "Shapes to return at most.", 100, 1, MOST_LISTED),
     FILTER,
+)
+ADD = (
+    Parameter("name", "string", "Name of the new shape.", REQUIRED),
+    Parameter("file", "string", "Name of the file; its suffix says the format.", REQUIRED),
+    Parameter("label", "string", "Class of the shape."),
+    Parameter("tag", "strings", "A tag of the shape. May be repeated."),
+    Parameter("attributes", "string", 'Numbers and texts by name, as JSON: {"height": 1.5}.', "{}"),
+    Parameter("replace", "boolean", "1 replaces a shape of the same name.", False),
 )
 POINTS = (
     SHAPE_NAME,
@@ -144,6 +152,7 @@ def _call(
     summary: str,
     answer: dict[str, Any],
     parameters: tuple[Parameter, ...] = (),
+    status: str = "200",
     **errors: str,
 ) -> dict[str, Any]:
     """Return the description of a call; errors are given as status_400="When it happens."."""
@@ -152,13 +161,26 @@ def _call(
         "summary": summary,
         "parameters": [parameter.schema() for parameter in parameters],
         "responses": {
-            "200": answer,
+            status: answer,
             **statuses,
-            "403": _json("Error", "The token is missing or wrong."),
+            "403": _json("Error", "The token is missing, wrong, or none for this call."),
         },
     }
 
 
+UPLOAD = {
+    "requestBody": {
+        "required": True,
+        "description": "The bytes of a mesh file.",
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+UPLOAD_ERRORS = {
+    "status_408": "The bytes came too slowly.",
+    "status_413": "The file is too large.",
+    "status_415": "The body is not application/octet-stream.",
+    "status_422": "The file holds no mesh that can be described; the text says why.",
+}
 BAD_PARAMETER = "A parameter is missing, unknown or out of range."
 NO_SHAPE = "The index holds no such shape."
 PATH_NAME = {
@@ -175,21 +197,10 @@ PATHS: dict[str, dict[str, Any]] = {
             _json("Answer", "The most similar shapes, best first."),
             QUERY,
             status_400=BAD_PARAMETER,
-            status_408="The bytes came too slowly.",
-            status_413="The file is too large.",
-            status_415="The body is not application/octet-stream.",
-            status_422="The file holds no mesh that can be described; the text says why.",
+            **UPLOAD_ERRORS,
             status_503="Too many queries wait already; ask again later.",
         )
-        | {
-            "requestBody": {
-                "required": True,
-                "description": "The bytes of a mesh file.",
-                "content": {
-                    "application/octet-stream": {"schema": {"type": "string", "format": "binary"}}
-                },
-            }
-        }
+        | UPLOAD
     },
     "/v1/shapes": {
         "get": _call(
@@ -197,13 +208,32 @@ PATHS: dict[str, dict[str, Any]] = {
             _json("Shapes", "Some of the shapes, and how many there are."),
             SHAPES,
             status_400=BAD_PARAMETER,
+        ),
+        "post": _call(
+            "Add a shape to the index, described by a mesh file. Takes the token for writing.",
+            _json("Shape", "The new shape."),
+            ADD,
+            status="201",
+            status_400=BAD_PARAMETER,
+            status_409="The index has a shape of that name, and replace is not 1.",
+            **UPLOAD_ERRORS,
+            status_503="Too many meshes wait already, or another process writes.",
         )
+        | UPLOAD,
     },
     "/v1/shapes/{name}": {
         "get": _call(
             "Tell what is known of one shape.", _json("Shape", "The shape."), status_404=NO_SHAPE
         )
-        | {"parameters": [PATH_NAME]}
+        | {"parameters": [PATH_NAME]},
+        "delete": _call(
+            "Remove a shape from the index. Takes the token for writing.",
+            _json("Shape", "What was known of the shape."),
+            status_404=NO_SHAPE,
+            status_405="The service only reads.",
+            status_503="Another process writes.",
+        )
+        | {"parameters": [PATH_NAME]},
     },
     "/v1/thumbnails": {
         "get": _call(

@@ -90,7 +90,7 @@ class Parameter:
             items = {"type": "integer", "minimum": 0}
             schema = {"type": "array", "items": items, "maxItems": self.high}
         if self.default is not REQUIRED and self.default is not None:
-            schema["default"] = int(self.default)
+            schema["default"] = self.default if self.kind == "string" else int(self.default)
         described = {
             "name": self.name,
             "in": "query",

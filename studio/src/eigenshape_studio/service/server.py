@@ -32,6 +32,7 @@ def serve(  # noqa: PLR0913  one for each option of the command
     allow_remote: bool = False,
     allow_hosts: Sequence[str] = (),
     token: str | None = None,
+    write_token: str | None = None,
     workers: es.retrieval.Workers | None = None,
     show_sources: bool = False,
     announce: Callable[[str], None] = print,
@@ -55,6 +56,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
     token : str, optional
         The secret that requests bring. By default a random one, which is part of the address that
         is announced; a token that is given is not announced.
+    write_token : str, optional
+        Another secret, with which requests may also add and remove shapes. Without it nobody may.
     workers : Workers, optional
         The processes that describe uploads: how many, and what each mesh may take. By default two,
         with 60 s for each mesh.
@@ -70,19 +73,25 @@ def serve(  # noqa: PLR0913  one for each option of the command
     Raises
     ------
     InvalidParameterError
-        If the host is another machine's or all of them, and `allow_remote` is not set; if the token
-        is too short or has letters that an address cannot hold.
+        If the host is another machine's or all of them, and `allow_remote` is not set; if a token
+        is too short or has letters that an address cannot hold, or the two tokens are equal.
     StoreError
         If the folder is no index, or is damaged.
     OSError
         If the port is taken.
     """
     require_permission(host, "service", allow_remote=allow_remote)
-    if token is not None and not TOKEN.fullmatch(token):
+    for given in (token, write_token):
+        if given is not None and not TOKEN.fullmatch(given):
+            raise es.InvalidParameterError(
+                "A token must have 16 to 256 letters, digits, or any of ._~- and no others; the "
+                f"given one, of {len(given)} characters, does not. Try python -c 'import secrets; "
+                "print(secrets.token_urlsafe())'."
+            )
+    if token is not None and token == write_token:
         raise es.InvalidParameterError(
-            "A token must have 16 to 256 letters, digits, or any of ._~- and no others; the given "
-            f"one, of {len(token)} characters, does not. Try python -c 'import secrets; "
-            "print(secrets.token_urlsafe())'."
+            "The token for writing must differ from the token for reading, which stands in the "
+            "address of the page; they are equal."
         )
     shelf = ShelfReader(index)
     listening = listen(host, port)
@@ -97,6 +106,7 @@ def serve(  # noqa: PLR0913  one for each option of the command
         name="service",
         verb="serve",
         open_paths=("/health",),
+        write_token=write_token,
         json_errors=True,
     )
     address = shown_address(host, port)
@@ -105,7 +115,7 @@ def serve(  # noqa: PLR0913  one for each option of the command
         workers = es.retrieval.Workers(timeout=60.0)
     describers = Describers(workers, shelf.recipe, describe)
     try:
-        app = make_app(Service(shelf, describers, Settings(show_sources)), rules)
+        app = make_app(Service(shelf, describers, Settings(show_sources, write_token)), rules)
         page = f"{address}/?token={secret}" if browse else None
         run_app(app, listening, lambda: announce(shown), page, grace=GRACE)
     finally:

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Int
 
 import eigenshape as es
-from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.filters import choose_shapes, require_attributes
 
 REFRESH_SECONDS = 1.0  # between looks for shapes that other processes have added or removed
 
@@ -95,8 +95,10 @@ class ShelfReader:
     """
 
     def __init__(self, folder: str | Path) -> None:
-        self._reader = es.ShapeIndex.open(folder).reader()
+        self._index = es.ShapeIndex.open(folder)
+        self._reader = self._index.reader()
         self._lock = threading.Lock()
+        self._writing = threading.Lock()
         self._due = monotonic() + REFRESH_SECONDS
         self._list_names()
 
@@ -111,13 +113,25 @@ class ShelfReader:
     def _list_names(self) -> None:
         self._names: list[str] = sorted(self._reader.state.names)
 
-    def refresh(self) -> None:
+    def refresh(self, *, now: bool = False) -> None:
         """See what other processes have added or removed; the index is looked at once a second."""
         with self._lock:
-            if monotonic() >= self._due:
+            if now or monotonic() >= self._due:
                 if self._reader.refresh():
                     self._list_names()
                 self._due = monotonic() + REFRESH_SECONDS
+
+    def add(self, shape: es.retrieval.DescribedShape, *, replace: bool) -> None:
+        """Add a shape, or replace one; StoreError says what does not allow it."""
+        with self._writing:  # an index has one writer, and waits for others for seconds alone
+            self._index.add_many([shape], replace=replace)
+        self.refresh(now=True)
+
+    def remove(self, name: str) -> None:
+        """Remove a shape; StoreError says what does not allow it."""
+        with self._writing:
+            self._index.remove(name)
+        self.refresh(now=True)
 
     def query(
         self,
@@ -159,6 +173,7 @@ class ShelfReader:
         state, names = self._reader.state, self._names
         if where is not None:
             chosen = choose_shapes(state.shapes, where)
+            require_attributes(state.shapes, where)
             names = sorted(name for name, place in state.names.items() if chosen[place])
         found = map(self.shape, names[offset : offset + limit])
         return len(names), [shape for shape in found if shape is not None]

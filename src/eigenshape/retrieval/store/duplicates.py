@@ -1,0 +1,84 @@
+"""Pairs of shapes of an index that are nearly the same."""
+
+import numpy as np
+
+from eigenshape._arguments import require_type
+from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Progress
+from eigenshape.retrieval.store.index import ShapeIndex
+
+# A shape that is moved, scaled, or has another order of vertices has a score below 0.03; with noise
+# of a thousandth of its size or in another pose, 0.02 to 0.15; another mesh of it, 0.12 to 0.22;
+# five kinds of synthetic creatures among each other, 0.25 and more.
+NEARLY_THE_SAME = 0.1
+AT_FIRST = 16  # matches of a shape that are looked at; more only where all are near
+
+
+def find_duplicates(
+    index: ShapeIndex, *, most_score: float = NEARLY_THE_SAME, progress: Progress | None = None
+) -> list[tuple[str, str, float]]:
+    """Find pairs of shapes that are nearly the same, wherever they lie and whatever their size.
+
+    Each shape is searched for in the index, as it is stored.
+
+    Parameters
+    ----------
+    index : ShapeIndex
+    most_score : float
+        Scores up to which two shapes count as nearly the same. A scaled or moved copy has a score
+        near 0, and a shape in another pose mostly less than 0.1; for heat, scores have other sizes.
+    progress : callable, optional
+        Called as progress(fraction_done, message).
+
+    Returns
+    -------
+    list of (str, str, float)
+        Two names in alphabetical order, and the lower score of the two searches; lowest first.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `most_score` is negative or not finite.
+    StoreError
+        If the index cannot be read.
+
+    See Also
+    --------
+    ShapeIndex.query, ShapeIndex.remove
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> index, fish = es.ShapeIndex.create(None), es.make_creature("fish", n_vertices=500)
+    >>> large = es.TriangleMesh(9 * fish.vertices, fish.faces)
+    >>> for name, mesh in {"fish": fish, "large fish": large}.items():
+    ...     index.add(name, mesh, n_views=0)
+    >>> [(one, two) for one, two, score in es.retrieval.find_duplicates(index)]
+    [('fish', 'large fish')]
+    """
+    require_type(index, ShapeIndex, "index")
+    if not 0 <= most_score < np.inf:
+        raise InvalidParameterError(
+            f"most_score must be finite and at least 0; it is {most_score}."
+        )
+    pairs: dict[tuple[str, str], float] = {}
+    if not len(index):
+        return []
+    with index.reader() as reader:
+        snapshot = reader.snapshot(reader.default_recipe())
+        # The first descriptor of each shape is that of the whole.
+        places = np.flatnonzero(snapshot.columns["view"] == 0).tolist()
+        for number, place in enumerate(places):
+            name = snapshot.name(place)
+            if progress is not None:
+                progress(number / len(places), name)
+            descriptor, n_matches = snapshot.descriptor(place), AT_FIRST
+            found = reader.query(descriptor, n_matches=n_matches)
+            while len(found) == n_matches and found[-1].score <= most_score:
+                n_matches *= 4
+                found = reader.query(descriptor, n_matches=n_matches)
+            for match in found:
+                if match.name != name and match.score <= most_score:
+                    pair = min(name, match.name), max(name, match.name)
+                    pairs[pair] = min(match.score, pairs.get(pair, np.inf))
+    return sorted(((*pair, score) for pair, score in pairs.items()), key=lambda row: (row[2], row))
