@@ -117,7 +117,10 @@ def read_labeled_shapes(folder: str | Path) -> dict[str, LabeledShape]:
     >>> found.labels.shape == (other.n_faces,)
     True
     """
-    return {path.stem: read_labeled_shape(path) for path in find_labeled_shapes(as_path(folder, "folder"))}
+    return {
+        path.stem: read_labeled_shape(path)
+        for path in find_labeled_shapes(as_path(folder, "folder"))
+    }
 
 
 def find_labeled_shapes(folder: Path) -> list[Path]:
