@@ -88,7 +88,7 @@ def test_without_repairs_it_converts(tmp_path):
         ),
         (
             ("--repair", "weld", "-o", "{folder}/b.vtk"),
-            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb; ",
+            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtk, .npz; ",
         ),
         (
             ("--repair", "weld", "-o", "{folder}/no/b.ply"),
