@@ -116,7 +116,7 @@ def test_segment_prints_a_table(biped):
         (("segment", "{missing}", "--picture", "a.bmp"), "A picture must end in"),
         (
             ("features", "{missing}", "-o", "a.off"),
-            "A mesh with colors must be written to a file that ends in .ply; ",
+            "A mesh with colors must be written to a file that ends in .ply, .glb, .obj; ",
         ),
         (
             ("segment", "{mesh}", "--level", 1, "-n", 3),

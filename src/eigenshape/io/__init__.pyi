@@ -9,6 +9,7 @@ from .bridges import to_trimesh as to_trimesh
 from .edits import read_edits as read_edits
 from .edits import write_edits as write_edits
 from .fields import read_fields as read_fields
+from .fields import write_fields as write_fields
 from .folders import find_items as find_items
 from .folders import index_folder as index_folder
 from .labeled_shapes import read_label_names as read_label_names

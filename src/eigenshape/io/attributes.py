@@ -52,7 +52,7 @@ class SourceFile:
 
 @dataclass(frozen=True, eq=False)
 class MeshAttributes:
-    """What a mesh file holds besides positions and faces.
+    r"""What a mesh file holds besides positions and faces.
 
     `read_mesh(path, attributes=True)` returns it, `carry_attributes` carries it to a repaired mesh,
     and `write_mesh(mesh, path, attributes=...)` writes it.
@@ -85,7 +85,7 @@ class MeshAttributes:
     >>> import pathlib, tempfile
     >>> import eigenshape as es
     >>> path = pathlib.Path(tempfile.mkdtemp(), "a.obj")
-    >>> _ = path.write_text("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nvt 0 0\\nvt 1 0\\nvt 0 1\\nf 1/1 2/2 3/3\\n")
+    >>> _ = path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n")
     >>> mesh, attributes = es.read_mesh(path, attributes=True)
     >>> attributes.texture_coordinates[0].tolist()
     [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
@@ -189,9 +189,7 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
 def _face_keys(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 6"]:
     """Return the middle and the direction of each face, of which the direction weighs little."""
     vectors = area_vectors(corners)
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    directions = np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0)
-    return np.column_stack([corners.mean(axis=1), DIRECTION * directions])
+    return np.column_stack([corners.mean(axis=1), DIRECTION * unit_rows(vectors)])
 
 
 def label_attributes(
@@ -229,15 +227,16 @@ def corner_normals(
     _, groups = np.unique(keys, axis=0, return_inverse=True)
     vectors = np.repeat(area_vectors(mesh.vertices[mesh.faces]), 3, axis=0)
     sums = [np.bincount(groups.ravel(), weights=column) for column in vectors.T]
-    normals = np.column_stack(sums)[groups.ravel()]
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = unit_rows(np.column_stack(sums)[groups.ravel()])
     # A corner of faces without area keeps its old normal.
-    normals = np.where(
-        lengths > 0,
-        normals / np.where(lengths > 0, lengths, 1.0),
-        attributes.normals.reshape(-1, 3),
-    )
-    return normals.reshape(-1, 3, 3)
+    old = attributes.normals.reshape(-1, 3)
+    return np.where(normals.any(axis=1, keepdims=True), normals, old).reshape(-1, 3, 3)
+
+
+def unit_rows(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """Give vectors the length 1, and leave those of length 0."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1.0)
 
 
 def loss_sentence(names: Sequence[str], path: Path) -> str:

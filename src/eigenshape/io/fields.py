@@ -12,8 +12,9 @@ import numpy as np
 
 from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._files import read_regular
+from eigenshape._files import read_regular, replace_file
 from eigenshape._typing import ArrayLike
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io import npz, vtk_legacy, vtu
 from eigenshape.io.parsing import naming, suffix_of
@@ -31,6 +32,47 @@ LEGACY_TYPES = {
     "u1": "unsigned_char",
 }
 Fields = dict[str, np.ndarray]
+
+
+def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLike]) -> None:
+    """Write a mesh with functions on its vertices and faces, for ParaView, PyVista or NumPy.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        With n vertices and f faces.
+    path : str or Path
+        Must end in .vtu, .vtk or .npz.
+    fields : mapping of str to array
+        Functions by name, (n,) or (n, d) on vertices, (f,) or (f, d) on faces. If there are as many
+        vertices as faces, they are on vertices.
+
+    Raises
+    ------
+    FileFormatError
+        If the suffix is another one.
+    InvalidParameterError
+        If a field has another number of rows, or is not of numbers.
+    OSError
+        If the system cannot write the file.
+
+    See Also
+    --------
+    read_fields
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(1)
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "ball.vtk")
+    >>> es.io.write_fields(mesh, path, {"area": es.geometry.face_areas(mesh)})
+    >>> es.io.read_fields(path)["area"].shape
+    (80,)
+    """
+    mesh, path = as_mesh(mesh), Path(path)
+    suffix = suffix_of(path, None, FIELD_FORMATS)
+    replace_file(path, format_fields(mesh, suffix, fields))
 
 
 def format_fields(mesh: TriangleMesh, suffix: str, fields: Mapping[str, ArrayLike]) -> bytes:
@@ -126,7 +168,7 @@ def read_fields(path: str | Path) -> Fields:
     Parameters
     ----------
     path : str or Path
-        A file in .vtu, .vtk or .npz, such as `write_mesh(mesh, path, fields=...)` writes.
+        A file in .vtu, .vtk or .npz, such as `write_fields` writes.
 
     Returns
     -------
@@ -147,7 +189,7 @@ def read_fields(path: str | Path) -> Fields:
     >>> import eigenshape as es
     >>> mesh = es.icosphere(1)
     >>> path = pathlib.Path(tempfile.mkdtemp(), "ball.vtu")
-    >>> es.write_mesh(mesh, path, fields={"height": mesh.vertices[:, 2]})
+    >>> es.io.write_fields(mesh, path, {"height": mesh.vertices[:, 2]})
     >>> es.io.read_fields(path)["height"].shape
     (42,)
     """

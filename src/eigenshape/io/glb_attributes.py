@@ -20,6 +20,7 @@ from eigenshape.io.attributes import (
     corner_normals,
     linear_colors,
     screen_colors,
+    unit_rows,
 )
 from eigenshape.io.glb import pack, read_gltf, read_scene
 from eigenshape.io.gltf import (
@@ -274,7 +275,6 @@ def rewrite(
     gltf, scene = _open(source)
     lost: list[str] = []
     document = _copy_document(gltf, source, lost)
-    tree = document.tree
     old_faces, old_corners = np.divmod(attributes.corners, 3)
     rows = scene.piece.rows[scene.piece.faces[old_faces, old_corners]]
     owners = old_faces[:, 0]
@@ -289,7 +289,6 @@ def rewrite(
         # A reflection turns triangles over, and the reader has turned them back.
         is_mirrored = np.linalg.slogdet(matrix[:3, :3])[0] < 0
         order = [2, 1, 0] if is_mirrored else [0, 1, 2]
-        inverse = np.linalg.pinv(matrix[:3, :3])
         written[node] = [part for part in primitives if part.get("mode", 4) not in SURFACES]
         for numbers in _sharing(primitives):
             shared = primitives[numbers[0]]
@@ -307,12 +306,10 @@ def rewrite(
             table: dict[str, Any] = {}
             for name, index in shared["attributes"].items():
                 if name == "POSITION":
-                    local = (places[vertices] - matrix[:3, 3]) @ inverse.T
+                    local = (places[vertices] - matrix[:3, 3]) @ np.linalg.pinv(matrix[:3, :3]).T
                     table[name] = document.add_accessor(local.astype("<f4"), name=name)
                 elif name == "NORMAL" and normal is not None:
-                    local = normal[first] @ matrix[:3, :3]
-                    lengths = np.linalg.norm(local, axis=1, keepdims=True)
-                    local /= np.where(lengths > 0, lengths, 1.0)
+                    local = unit_rows(normal[first] @ matrix[:3, :3])
                     table[name] = document.add_accessor(local.astype("<f4"), name=name)
                 elif name == "TANGENT":
                     lost.append(TANGENTS)
@@ -471,9 +468,11 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
             of_part = np.repeat(materials == material, 3)
             entry = {"attributes": table, "indices": document.add_accessor(indices[of_part])}
             primitives.append(entry | ({"material": int(material)} if material >= 0 else {}))
-        name = {"name": attributes.groups[group]} if group >= 0 and attributes.groups[group] else {}
+        named = (
+            {"name": attributes.groups[group]} if group >= 0 and attributes.groups[group] else {}
+        )
         tree["scenes"][0]["nodes"].append(len(tree["nodes"]))
-        tree["nodes"].append({"mesh": len(tree["meshes"]), **name})
+        tree["nodes"].append({"mesh": len(tree["meshes"]), **named})
         tree["meshes"].append({"primitives": primitives})
     return document.pack()
 

@@ -1,8 +1,9 @@
 """Read and write meshes. The content of a file is checked before a mesh is returned."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Literal, overload
 
@@ -11,7 +12,6 @@ from jaxtyping import Int, UInt8
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import read_regular, replace_file
-from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io import glb_attributes, obj_attributes, off, ply, stl
@@ -27,16 +27,16 @@ from eigenshape.io.cells import require_kind
 from eigenshape.io.fields import FIELD_FORMATS, format_fields
 from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
 
-TEXT = {
+TEXT: dict[str, Callable[..., bytes]] = {
     ".off": off.format_mesh,
-    ".obj": obj_attributes.write_new,
     ".ply": ply.format_text,
     ".stl": stl.format_text,
 }
-BINARY = {".ply": ply.format_binary, ".stl": stl.format_binary}
+BINARY: dict[str, Callable[..., bytes]] = {".ply": ply.format_binary, ".stl": stl.format_binary}
 WRITTEN = (".off", ".obj", ".ply", ".stl", ".glb", *FIELD_FORMATS)
 LABELED = (".ply", ".glb", ".obj")  # formats that hold parts
-ALWAYS_BINARY = (".glb", *FIELD_FORMATS)
+TEXT_FORMATS = (*TEXT, ".obj")
+BINARY_FORMATS = (*BINARY, ".glb", *FIELD_FORMATS)
 GLTF = (".glb", ".gltf")
 WITH_ATTRIBUTES = (*GLTF, ".obj", ".ply")  # formats that hold more than positions and faces
 
@@ -173,7 +173,6 @@ def write_mesh(
     binary: bool | None = None,
     colors: UInt8[np.ndarray, "n 3"] | None = None,
     face_labels: Int[np.ndarray, " f"] | None = None,
-    fields: Mapping[str, ArrayLike] | None = None,
     attributes: MeshAttributes | None = None,
 ) -> None:
     """Write a mesh to a file, in the format of its suffix.
@@ -196,9 +195,6 @@ def write_mesh(
         A whole number of 32 bits for each face, such as the number of its part. In PLY it is the
         property `label` of faces; OBJ and GLB get a material for each part, named part_0, part_1
         and so on, in the mean color of its vertices.
-    fields : mapping of str to array, optional
-        Functions to write with the mesh, by name, with a row for each vertex or each face; for VTU,
-        VTK and NPZ. If there are as many vertices as faces, rows belong to vertices.
     attributes : MeshAttributes, optional
         What the file that the mesh was read from holds besides, as `read_mesh` returns it. From OBJ
         to OBJ and from glTF to GLB, everything but positions and normals is written again as it
@@ -211,7 +207,7 @@ def write_mesh(
         If the suffix is unknown, or the format has only single precision and coordinates do not fit
         into it.
     InvalidParameterError
-        If the format has no such binary or text form, if it takes no colors, labels or fields, if
+        If the format has no such binary or text form, if it takes no colors or labels, if
         their shapes are wrong, or if attributes belong to other faces.
     OSError
         If the system cannot write the file.
@@ -220,7 +216,7 @@ def write_mesh(
     --------
     read_mesh : Read a mesh.
     eigenshape.io.carry_attributes : Carry attributes to a repaired mesh.
-    eigenshape.io.read_fields : Read functions on vertices and faces.
+    eigenshape.io.write_fields : Write a mesh with functions on vertices and faces.
     eigenshape.plot.value_colors, eigenshape.plot.part_colors : Compute colors.
 
     Examples
@@ -234,7 +230,12 @@ def write_mesh(
     True
     """
     lost = save_mesh(
-        as_mesh(mesh), Path(path), binary, colors, face_labels, fields or {}, attributes
+        as_mesh(mesh),
+        Path(path),
+        binary=binary,
+        colors=colors,
+        face_labels=face_labels,
+        attributes=attributes,
     )
     if lost:
         warnings.warn(lost, stacklevel=2)
@@ -243,10 +244,10 @@ def write_mesh(
 def save_mesh(
     mesh: TriangleMesh,
     path: Path,
+    *,
     binary: bool | None = None,
     colors: UInt8[np.ndarray, "n 3"] | None = None,
     face_labels: Int[np.ndarray, " f"] | None = None,
-    fields: Mapping[str, ArrayLike] | None = None,
     attributes: MeshAttributes | None = None,
 ) -> str:
     """Write a mesh as `write_mesh` does, and return a sentence that names what is lost, or none."""
@@ -257,16 +258,11 @@ def save_mesh(
             f"attributes must belong to the {mesh.n_faces} faces of the mesh; they belong to {held.mesh.n_faces} "
             "other ones. Carry them by es.io.carry_attributes(attributes, repaired_mesh)."
         )
-    may_be_binary = suffix in BINARY or suffix in ALWAYS_BINARY
-    is_binary = may_be_binary if binary is None else binary
-    if (is_binary and not may_be_binary) or (not is_binary and suffix not in TEXT):
-        kinds = (*BINARY, *ALWAYS_BINARY) if is_binary else TEXT
+    is_binary = suffix in BINARY_FORMATS if binary is None else binary
+    kinds = BINARY_FORMATS if is_binary else TEXT_FORMATS
+    if suffix not in kinds:
         raise InvalidParameterError(
             f"binary={binary} is for {', '.join(kinds)}; the suffix is {suffix}."
-        )
-    if fields and suffix not in FIELD_FORMATS:
-        raise InvalidParameterError(
-            f"fields go to {', '.join(FIELD_FORMATS)}; the suffix is {suffix}."
         )
     if colors is not None:
         _require_colors(colors, mesh, suffix)
@@ -283,7 +279,7 @@ def save_mesh(
         opaque = np.column_stack([colors, np.full(len(colors), 255, np.uint8)])
         held = replace(held, colors=opaque[mesh.faces], source=None)
     try:
-        files = _encode(mesh, path, suffix, is_binary, face_labels, fields or {}, held, lost)
+        files = _encode(mesh, path, is_binary, face_labels, held, lost)
     except FileFormatError as err:
         raise FileFormatError(f"{path} cannot hold the mesh. {err}") from err
     for place, data in files.items():
@@ -294,39 +290,38 @@ def save_mesh(
 def _encode(
     mesh: TriangleMesh,
     path: Path,
-    suffix: str,
     binary: bool,
     face_labels: Int[np.ndarray, " f"] | None,
-    fields: Mapping[str, ArrayLike],
     held: MeshAttributes,
     lost: list[str],
 ) -> dict[Path, bytes]:
     """Return the files to write, and add to `lost` what they do not keep."""
-    if held.source and suffix == ".glb" and held.source.suffix in GLTF:
-        data, more = glb_attributes.rewrite(held.source, held, mesh)
+    suffix, source = path.suffix.lower(), held.source
+    if source and suffix == ".glb" and source.suffix in GLTF:
+        data, more = glb_attributes.rewrite(source, held, mesh)
         lost += more
         return {path: data}
-    if held.source and suffix == held.source.suffix == ".obj":
-        files, more = obj_attributes.rewrite(held.source, held, mesh, path)
+    if source and suffix == source.suffix == ".obj":
+        files, more = obj_attributes.rewrite(source, held, mesh, path)
         lost += more
         return files
     lost += held.others
-    if suffix == ".glb":
-        return {path: glb_attributes.write_new(held, mesh)}
     if suffix == ".obj":
         return obj_attributes.write_new(held, mesh, path)
+    if suffix == ".glb":
+        return {path: glb_attributes.write_new(held, mesh)}
     kept = ("vertex colors",) if suffix == ".ply" else ()
     lost += [name for name, there in held.contents.items() if there and name not in kept]
     if suffix in FIELD_FORMATS:
-        return {path: format_fields(mesh, suffix, fields)}
+        return {path: format_fields(mesh, suffix, {})}
     write = (BINARY if binary else TEXT)[suffix]
-    if suffix != ".ply":
-        return {path: write(mesh)}
-    tints = None
-    if held.colors is not None:
-        tints = np.full((mesh.n_vertices, 3), 255, np.uint8)
-        tints[mesh.faces.ravel()] = held.colors.reshape(-1, 4)[:, :3]
-    return {path: write(mesh, colors=tints, face_labels=face_labels)}
+    if suffix == ".ply":
+        tints = None
+        if held.colors is not None:
+            tints = np.full((mesh.n_vertices, 3), 255, np.uint8)
+            tints[mesh.faces.ravel()] = held.colors.reshape(-1, 4)[:, :3]
+        write = partial(write, colors=tints, face_labels=face_labels)
+    return {path: write(mesh)}
 
 
 def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:

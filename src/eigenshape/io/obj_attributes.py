@@ -244,12 +244,12 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Fil
     ]
     state = (-1, -1)
     for face in np.lexsort([of_faces, attributes.face_groups]).tolist():
-        group, material = int(attributes.face_groups[face]), int(of_faces[face])
+        group, number = int(attributes.face_groups[face]), int(of_faces[face])
         if group != state[0]:
             lines.append(f"g {attributes.groups[group] or f'group_{group}'}")
-        if material != state[1] and material >= 0:
-            lines.append(f"usemtl {names[material]}")
-        state = group, material
+        if number != state[1] and number >= 0:
+            lines.append(f"usemtl {names[number]}")
+        state = group, number
         lines.append("f " + " ".join(corners[3 * face : 3 * face + 3]))
     files[path] = ("\n".join(lines) + "\n").encode()
     return files

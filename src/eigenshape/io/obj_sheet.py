@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.attributes import unit_rows
 from eigenshape.io.obj import corner_index, join_lines
 from eigenshape.io.text import Line, coordinates, fans, rows_text, whole
 
@@ -19,6 +20,8 @@ ORDERS = tuple(permutations(range(3)))
 TURNED = ((0, 2, 1), (1, 0, 2), (2, 1, 0))  # the permutations in ORDERS that reverse a face
 # A vertex, "/7" where it has the texture coordinate 7, and the number of its normal or -1.
 Corner = tuple[int, str, int]
+# New vertices, the corners of the file that they belong to, and whether their order is reversed.
+Piece = tuple[Sequence[int], Sequence[Corner], bool]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +138,8 @@ def format_sheet(
 
     triangles, added = _match_triangles(sheet, mesh.faces, old_places, new_places)
     rows: list[str | list[Corner]] = []
-    for row in sheet.rows:
-        rows += [row] if isinstance(row, str) else _pieces(sheet.polygons[row], triangles[row])
+    for line in sheet.rows:
+        rows += [line] if isinstance(line, str) else _pieces(sheet.polygons[line], triangles[line])
     rows += [[(vertex, "", -1) for vertex in face] for face in added.tolist()]
     normals, numbers = _normals(sheet, rows, mesh.vertices if moved is None else moved)
     lines += rows_text("vn ", normals)
@@ -172,9 +175,8 @@ def _normals(
         return np.empty((0, 3)), numbers
     vectors = area_vectors(vertices[np.array(triangles)])
     sums = np.column_stack([np.bincount(owners, weights=column) for column in vectors.T])
-    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
-    old = np.array([normal for _, normal in numbers])
-    return np.where(lengths > 0, sums / np.where(lengths > 0, lengths, 1.0), old), numbers
+    units, old = unit_rows(sums), np.array([normal for _, normal in numbers])
+    return np.where(units.any(axis=1, keepdims=True), units, old), numbers
 
 
 def _places(
@@ -231,8 +233,7 @@ def _pieces(polygon: Sequence[Corner], triangles: Triangles) -> list[list[Corner
     """Return the remaining part of a polygon: the whole, perhaps reversed, or some triangles."""
     whole_polygon = _whole(triangles)
     if whole_polygon is not None:
-        vertices, is_turned = whole_polygon
-        pieces = [(vertices, polygon, is_turned)]
+        pieces: list[Piece] = [(whole_polygon[0], polygon, whole_polygon[1])]
     else:
         pieces = [
             (triangle[0], (polygon[0], polygon[index], polygon[index + 1]), triangle[1])
