@@ -116,10 +116,10 @@ def _format_vtu(mesh: TriangleMesh, of_vertices: Fields, of_faces: Fields) -> by
     def element(name: str, values: np.ndarray) -> str:
         data = values.astype(values.dtype.newbyteorder("<")).tobytes()
         text = base64.b64encode(struct.pack("<Q", len(data)) + data).decode()
-        width = values.shape[1] if values.ndim == 2 else 1
+        width = f'NumberOfComponents="{values.shape[1]}" ' if values.ndim == 2 else ""
         return (
             f'<DataArray type="{XML_TYPES[values.dtype.str[1:]]}" Name={quoteattr(name)} '
-            f'NumberOfComponents="{width}" format="binary">{text}</DataArray>'
+            f'{width}format="binary">{text}</DataArray>'
         )
 
     ends = 3 * np.arange(1, mesh.n_faces + 1)

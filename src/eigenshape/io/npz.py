@@ -5,6 +5,7 @@ from io import BytesIO
 import numpy as np
 
 from eigenshape._errors import FileFormatError
+from eigenshape.io.unpacking import require_reasonable
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
@@ -33,6 +34,10 @@ def read_arrays(data: bytes) -> dict[str, np.ndarray]:
     """Read all arrays by name; none may hold Python objects."""
     try:
         with np.load(BytesIO(data), allow_pickle=False) as file:
+            sizes = [entry.file_size for entry in file.zip.infolist()]
+            require_reasonable(sum(sizes), len(data))
             return {name: file[name] for name in file.files}
+    except FileFormatError:
+        raise
     except Exception as err:  # zipfile, zlib and numpy each raise their own
         raise FileFormatError(f"A .npz file must hold arrays of numbers; {err}.") from err
