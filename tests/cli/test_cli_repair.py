@@ -87,7 +87,7 @@ def test_without_repairs_it_converts(tmp_path):
             "Names of --repair must be among auto, weld",
         ),
         (
-            ("--repair", "weld", "-o", "{folder}/b.vtk"),
+            ("--repair", "weld", "-o", "{folder}/b.dxf"),
             "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtk, .npz; ",
         ),
         (

@@ -453,7 +453,10 @@ def test_obj_to_glb_and_back(tmp_path):
         UserWarning, match=r"b\.glb does not keep: properties of materials other than color"
     ) as seen:
         es.write_mesh(mesh, tmp_path / "b.glb", attributes=attributes)
-    assert "polygons, of which triangles are made, smoothing groups" in str(seen[0].message)
+    assert (
+        "polygons, of which triangles are made, names of objects beside those of groups, smoothing groups"
+        in str(seen[0].message)
+    )
     found = es.read_mesh(tmp_path / "b.glb", attributes=True)[1]
     np.testing.assert_allclose(found.materials[1].color, (0.1, 0.2, 0.3, 0.5))
     assert [m.image for m in found.materials] == [PNG, None]

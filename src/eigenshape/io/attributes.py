@@ -1,7 +1,7 @@
 """What a mesh file holds besides positions and faces: texture coordinates, materials, colors, groups."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +9,7 @@ from jaxtyping import Float, Int, UInt8
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import freeze
-from eigenshape._text import short_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
@@ -37,8 +37,10 @@ class Material:
 
     name: str = ""
     color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    image: bytes | None = None
+    image: bytes | None = field(default=None, repr=False)
     image_name: str = ""
+
+    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,7 @@ class SourceFile:
 
     path: Path
     suffix: str
-    data: bytes
+    data: bytes = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +106,7 @@ class MeshAttributes:
     source: SourceFile | None = None
 
     __repr__ = short_repr
+    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""

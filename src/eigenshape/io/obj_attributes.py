@@ -42,6 +42,8 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     defined, others = _read_materials(sheet, source)
     if (faces_of > 1).any():
         others.append("polygons, of which triangles are made")
+    if _rows(sheet, "o") and _rows(sheet, "g"):
+        others.append("names of objects beside those of groups")
     if _rows(sheet, "s"):
         others.append("smoothing groups")
     has_normals = (normals >= 0).any()
