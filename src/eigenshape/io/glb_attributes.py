@@ -180,11 +180,13 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
         names.append("morph targets")
     if any(part.get("mode", 4) not in SURFACES for part in primitives):
         names.append("lines and points")
-    plain = {"name", "doubleSided", "pbrMetallicRoughness"}
-    plain_pbr = {"baseColorFactor", "baseColorTexture"}
+    plain_pbr = {"baseColorFactor", "baseColorTexture", "metallicFactor"}
     for entry in tree.get("materials", []):
         pbr = entry.get("pbrMetallicRoughness", {})
-        if set(entry) - plain or set(pbr) - plain_pbr:
+        is_metal = pbr.get("metallicFactor", 1.0) != 0.0  # our own files say 0
+        is_clear = pbr.get("baseColorFactor", [1.0])[-1] < 1
+        plain = {"name", "pbrMetallicRoughness", *(["alphaMode"] if is_clear else [])}
+        if is_metal or set(entry) - plain or set(pbr) - plain_pbr:
             names.append("properties of materials other than color and image")
             break
     if len(tree.get("nodes", [])) > len(tree.get("meshes", [])):
