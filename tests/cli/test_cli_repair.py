@@ -272,3 +272,13 @@ def test_a_texture_goes_through_every_verb_and_losses_are_printed(tmp_path):
         for material in read_mesh(tmp_path / "parts.glb", attributes=True)[1].materials
     }
     assert all(name.startswith("part_") for name in names)
+
+
+def test_broken_materials_do_not_stop_a_repair(tmp_path):
+    write_mesh(BALL, tmp_path / "a.obj")
+    text = (tmp_path / "a.obj").read_text()
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + text)
+    (tmp_path / "a.mtl").write_text("newmtl odd\nKd spectral file.rfl\n")
+    printed = run("repair", tmp_path / "a.obj", "-o", tmp_path / "b.glb").stderr
+    assert "Materials and other attributes must be whole" in " ".join(printed.split())
+    assert read_mesh(tmp_path / "b.glb").n_faces == BALL.n_faces

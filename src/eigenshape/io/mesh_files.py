@@ -129,7 +129,15 @@ def read_mesh(
         mesh = TriangleMesh(points, simplices)
         if not attributes:
             return mesh
-        return mesh, _read_attributes(SourceFile(path, suffix, data), mesh)
+        try:
+            return mesh, _read_attributes(SourceFile(path, suffix, data), mesh)
+        except FileFormatError:
+            raise
+        except (LookupError, TypeError, AttributeError, ValueError) as err:
+            raise FileFormatError(
+                f"Materials and other attributes must be whole; these are not: {err!r}. "
+                "Without attributes=True the file can be read."
+            ) from err
 
 
 def _read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
