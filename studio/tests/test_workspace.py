@@ -460,3 +460,17 @@ def test_a_side_that_is_none_is_refused(side):
     with pytest.raises(es.InvalidParameterError, match="must be"):
         workspace.analysis.look_from(*side)
     workspace.close()
+
+
+def test_a_file_that_is_saved_keeps_what_the_opened_one_held(tmp_path):
+    ball = es.icosphere(2)
+    colors = np.arange(3 * ball.n_vertices, dtype=np.uint8).reshape(-1, 3)
+    es.write_mesh(ball, tmp_path / "a.glb", colors=colors)
+    mesh, attributes = es.read_mesh(tmp_path / "a.glb", attributes=True)
+    workspace = Workspace(mesh, "a.glb")
+    workspace.attributes = attributes
+    for kind in ("glb", "ply"):
+        path = tmp_path / f"b.{kind}"
+        path.write_bytes(workspace._file(kind).tobytes())
+        assert es.read_mesh(path, attributes=True)[1].colors is not None
+    workspace.close()

@@ -133,8 +133,8 @@ def test_label_takes_what_segment_prints(poses, tmp_path):
         (("--labels", "{bad}"), "A label must be a whole number; line 2 has 'head'"),
         (("--labels", "{bad}", "--picture", "a.bmp"), "A picture must end in"),
         (
-            ("--labels", "{bad}", "-o", "a.obj"),
-            "written to a file that ends in .ply, .seg, .txt; a.obj ends in '.obj'",
+            ("--labels", "{bad}", "-o", "a.off"),
+            "written to a file that ends in .ply, .glb, .obj, .seg, .txt; a.off ends in '.off'",
         ),
         (
             ("--labels", "{bad}", "-o", "{bad}/no/a.seg"),

@@ -87,8 +87,8 @@ def test_without_repairs_it_converts(tmp_path):
             "Names of --repair must be among auto, weld",
         ),
         (
-            ("--repair", "weld", "-o", "{folder}/b.vtk"),
-            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb; ",
+            ("--repair", "weld", "-o", "{folder}/b.dxf"),
+            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtk, .npz; ",
         ),
         (
             ("--repair", "weld", "-o", "{folder}/no/b.ply"),
@@ -238,3 +238,47 @@ def test_cells_say_what_polygons_of_four_corners_are(tmp_path):
         run("spectrum", tmp_path / "a.vtk", "--cells", "tetrahedra", "-k", 3, "--json").stdout
     )
     assert len(done["eigenvalues"]) == 3
+
+
+def test_a_texture_goes_through_every_verb_and_losses_are_printed(tmp_path):
+    """From OBJ to GLB by a bend, and on to OBJ in another folder by a repair."""
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in BALL.vertices.tolist()]
+    lines += [f"vt {x!r} {y!r}" for x, y, _ in BALL.vertices.tolist()]
+    lines += ["mtllib a.mtl", "usemtl wool"]
+    lines += [
+        "f " + " ".join(f"{corner}/{corner}" for corner in row) for row in (BALL.faces + 1).tolist()
+    ]
+    (tmp_path / "a.obj").write_text("\n".join(lines) + "\n")
+    (tmp_path / "a.mtl").write_text("newmtl wool\nKd 1 0.5 0.25\nmap_Kd wool.png\n")
+    (tmp_path / "wool.png").write_bytes(b"an image")
+    (tmp_path / "far").mkdir()
+    glb, obj = tmp_path / "b.glb", tmp_path / "far" / "c.obj"
+    bend = ("--region", "y>70%", "--move", "0,0.1,0")
+    assert "lost" not in run("deform", tmp_path / "a.obj", *bend, "-o", glb).stderr
+    assert "lost" not in run("repair", glb, "-o", obj).stderr
+    mesh, found = read_mesh(obj, attributes=True)
+    (wool,) = found.materials
+    assert (wool.name, wool.image) == ("wool", b"an image")
+    np.testing.assert_allclose(wool.color, (1, 0.5, 0.25, 1), atol=1e-6)
+    # Texture coordinates are those of the places before the bend, which moved the rest up alone.
+    np.testing.assert_allclose(
+        found.texture_coordinates[..., 0], mesh.vertices[mesh.faces][..., 0], atol=0.1
+    )
+    printed = " ".join(run("repair", glb, "-o", tmp_path / "d.stl").stderr.split())
+    assert "lost: d.stl does not keep: texture coordinates, materials, images." in printed
+    run("segment", glb, "-n", "2", "-o", tmp_path / "parts.glb")
+    names = {
+        material.name
+        for material in read_mesh(tmp_path / "parts.glb", attributes=True)[1].materials
+    }
+    assert all(name.startswith("part_") for name in names)
+
+
+def test_broken_materials_do_not_stop_a_repair(tmp_path):
+    write_mesh(BALL, tmp_path / "a.obj")
+    text = (tmp_path / "a.obj").read_text()
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + text)
+    (tmp_path / "a.mtl").write_text("newmtl odd\nKd spectral file.rfl\n")
+    printed = run("repair", tmp_path / "a.obj", "-o", tmp_path / "b.glb").stderr
+    assert "Materials and other attributes must be whole" in " ".join(printed.split())
+    assert read_mesh(tmp_path / "b.glb").n_faces == BALL.n_faces

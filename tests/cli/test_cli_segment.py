@@ -106,8 +106,8 @@ def test_segment_prints_a_table(biped):
             "--method takes parts, scale-free, thesis; it is 'best'",
         ),
         (
-            ("segment", "{missing}", "-o", "a.obj"),
-            "A mesh with labels must be written to a file that ends in .ply, .seg, .txt; a.obj ends",
+            ("segment", "{missing}", "-o", "a.off"),
+            "A mesh with labels must be written to a file that ends in .ply, .glb, .obj, .seg, .txt; a.off ends",
         ),
         (
             ("segment", "{missing}", "-o", "{missing}/a.ply"),
@@ -115,8 +115,8 @@ def test_segment_prints_a_table(biped):
         ),
         (("segment", "{missing}", "--picture", "a.bmp"), "A picture must end in"),
         (
-            ("features", "{missing}", "-o", "a.obj"),
-            "A mesh with colors must be written to a file that ends in .ply; ",
+            ("features", "{missing}", "-o", "a.off"),
+            "A mesh with colors must be written to a file that ends in .ply, .glb, .obj; ",
         ),
         (
             ("segment", "{mesh}", "--level", 1, "-n", 3),

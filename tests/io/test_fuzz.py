@@ -73,6 +73,13 @@ def test_any_piece_cut_out_doubled_or_put_in(name, data):
 @settings(max_examples=80, deadline=None)
 @given(noise=st.binary(max_size=200))
 def test_noise(suffix, noise):
-    heads = {".off": b"OFF ", ".obj": b"v ", ".ply": b"ply\n", ".stl": b"solid ", ".glb": b"glTF"}
+    heads = {
+        ".off": b"OFF ",
+        ".obj": b"v ",
+        ".ply": b"ply\n",
+        ".stl": b"solid ",
+        ".glb": b"glTF",
+        ".npz": b"PK\x03\x04",
+    }
     read_or_refuse(PARSERS[suffix], noise)
     read_or_refuse(PARSERS[suffix], heads[suffix] + noise)

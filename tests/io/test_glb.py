@@ -7,9 +7,9 @@ import pytest
 import trimesh
 from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES, read
 
-from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh, read_mesh, write_mesh
+from eigenshape import FileFormatError, InvalidShapeError, read_mesh, write_mesh
 from eigenshape.geometry import enclosed_volume
-from eigenshape.io.glb import format_mesh, parse
+from eigenshape.io.glb import parse
 from eigenshape.io.gltf import Gltf, place_triangles
 
 GOOD = FILES["glb"][1]
@@ -232,7 +232,7 @@ def test_copies_are_bounded(copied):
         tree["nodes"] *= 10
     else:
         tree["meshes"][0]["primitives"] *= 10
-    assert len(place_triangles(Gltf(tree, [binary], most=100))[1]) == 40
+    assert len(place_triangles(Gltf(tree, [binary], most=100)).nodes) == 40
     with pytest.raises(
         FileFormatError, match="must stay within 50 vertices and faces; its copies make more"
     ):
@@ -247,8 +247,8 @@ def test_not_finite_coordinates_are_refused(tmp_path):
         read_mesh(path)
 
 
-def test_single_precision_refuses_what_it_cannot_hold():
+def test_single_precision_refuses_what_it_cannot_hold(tmp_path):
     with pytest.raises(
         FileFormatError, match=r"GLB holds single precision, up to 3.4e38; vertex 1"
     ):
-        format_mesh(TriangleMesh(TETRAHEDRON.vertices * 1e39, FACES))
+        write_mesh((TETRAHEDRON.vertices * 1e39, FACES), tmp_path / "a.glb")

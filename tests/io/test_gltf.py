@@ -12,7 +12,7 @@ from test_glb import unpacked
 from tetrahedra import FACES, VERTICES
 
 from eigenshape import EigenshapeError, FileFormatError, read_mesh, read_shape
-from eigenshape.io.glb import parse_text
+from eigenshape.io.glb import parse
 
 TREE, BINARY = unpacked()
 
@@ -121,7 +121,7 @@ def test_any_changed_bytes(tmp_path_factory, data):
     for _ in range(data.draw(st.integers(1, 6))):
         bad[data.draw(st.integers(0, len(bad) - 1))] = data.draw(st.integers(0, 255))
     try:
-        vertices, faces = parse_text(bytes(bad), folder)
+        vertices, faces = parse(bytes(bad), folder)
     except (EigenshapeError, OSError):
         return
     assert vertices.shape[1] == faces.shape[1] == 3

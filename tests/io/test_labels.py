@@ -111,7 +111,7 @@ def test_labels_of_polygons_are_those_of_their_triangles(tmp_path):
 def test_labels_that_do_not_fit_are_refused(tmp_path):
     with pytest.raises(
         InvalidParameterError,
-        match=r"face_labels must be \(4,\) and go to a PLY file; .* go to \.off",
+        match=r"face_labels must be \(4,\) and go to \.ply, \.glb, \.obj; .* go to \.off",
     ):
         write_mesh(TETRAHEDRON, tmp_path / "a.off", face_labels=np.zeros(4, int))
     with pytest.raises(

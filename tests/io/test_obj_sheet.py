@@ -54,10 +54,11 @@ def test_a_file_that_nothing_changes_keeps_what_it_says():
     vertices, faces = parse(CUBE)
     found = format_sheet(read_sheet(CUBE), TriangleMesh(vertices, faces))
     assert lines(found, "f") == [
-        "f 1/1 4/4 3/3 2/2", "f 5/1 6/2 7/3 9/4", "f 1 2 6 5", "f 2/1 3/2 7/3 6/4", "f 3 4 8 7", "f 4/1 1/2 5/3 9/4",
+        "f 1/1 4/4 3/3 2/2", "f 5/1/1 6/2/2 7/3/3 9/4/4", "f 1//5 2//6 6//2 5//1",
+        "f 2/1 3/2 7/3 6/4", "f 3 4 8 7", "f 4/1 1/2 5/3 9/4",
     ]  # fmt: skip
     assert lines(found, "v")[0] == "v 0.0 0.0 0.0 0.5 0.5 1"
-    assert [line for line in found.decode().splitlines() if line[:2] not in ("v ", "f ")] == [
+    assert [line for line in found.decode().splitlines() if line[:2] not in ("v ", "f ", "vn")] == [
         "mtllib cube#1.mtl", "o cube", "vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1", "g sides", "usemtl wood", "g rest",
     ]  # fmt: skip
     np.testing.assert_array_equal(parse(found)[0], vertices)
@@ -77,7 +78,8 @@ def test_welded_and_dropped_vertices_are_renumbered():
     found = format_sheet(read_sheet(CUBE), mesh)
     assert len(lines(found, "v")) == 8
     assert lines(found, "f") == [
-        "f 1/1 4/4 3/3 2/2", "f 5/1 6/2 7/3 8/4", "f 1 2 6 5", "f 2/1 3/2 7/3 6/4", "f 3 4 8 7", "f 4/1 1/2 5/3 8/4",
+        "f 1/1 4/4 3/3 2/2", "f 5/1/1 6/2/2 7/3/3 8/4/4", "f 1//5 2//6 6//2 5//1",
+        "f 2/1 3/2 7/3 6/4", "f 3 4 8 7", "f 4/1 1/2 5/3 8/4",
     ]  # fmt: skip
 
 

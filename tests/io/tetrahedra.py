@@ -1,13 +1,17 @@
 """One tetrahedron in every format, and a way to read bytes."""
 
+from pathlib import Path
+
 import numpy as np
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io import glb, obj, off, ply, stl
+from eigenshape.io import glb, glb_attributes, obj, obj_attributes, off, ply, stl
+from eigenshape.io.attributes import plain_attributes
 
 VERTICES = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
 TETRAHEDRON = TriangleMesh(VERTICES, FACES)
+PLAIN = plain_attributes(TETRAHEDRON)
 
 BIG_ENDIAN = ply.format_binary(TETRAHEDRON).replace(b"little", b"big")
 BIG_ENDIAN = BIG_ENDIAN[: BIG_ENDIAN.index(b"end_header\n") + 11]
@@ -52,14 +56,14 @@ FILES = {
         .replace(b" 2 1\n3", b"\n2 1 3")
         .replace(b"0.0 1.0", b"0.0\n1.0"),
     ),
-    "obj": (obj.parse, obj.format_mesh(TETRAHEDRON)),
+    "obj": (obj.parse, obj_attributes.write_new(PLAIN, TETRAHEDRON, Path("a.obj"))[Path("a.obj")]),
     "ply text": (ply.parse, ply.format_text(TETRAHEDRON)),
     "ply little": (ply.parse, ply.format_binary(TETRAHEDRON)),
     "ply big": (ply.parse, BIG_ENDIAN),
     "ply strip": (ply.parse, STRIP),
     "stl text": (stl.parse, stl.format_text(TETRAHEDRON)),
     "stl binary": (stl.parse, stl.format_binary(TETRAHEDRON)),
-    "glb": (glb.parse, glb.format_mesh(TETRAHEDRON)),
+    "glb": (glb.parse, glb_attributes.write_new(PLAIN, TETRAHEDRON)),
 }
 
 

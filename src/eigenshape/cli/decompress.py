@@ -15,7 +15,10 @@ def decompress(
     packed: Annotated[Path, typer.Argument(help="File that `eigenshape compress` wrote (.esz).")],
     *,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL or GLB.")
+        Path,
+        typer.Option(
+            "-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ."
+        ),
     ],
 ) -> None:
     """Write the mesh of a file that `eigenshape compress` wrote.

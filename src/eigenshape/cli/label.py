@@ -55,8 +55,8 @@ def label(
         typer.Option(
             "-o",
             "--output",
-            help="Write the mesh with its labels, also as colors (PLY), or the label of each face, "
-            "one a line (SEG or TXT).",
+            help="Write the mesh with its labels, also as colors (PLY), or with a material for each "
+            "label (GLB or OBJ), or the label of each face, one a line (SEG or TXT).",
         ),
     ] = None,
     picture: Annotated[
@@ -97,7 +97,7 @@ def label(
         steps.print_rows("Labels", columns, rows)
     if output:
         colors = steps.label_colors(target, found.labels, list(examples.values()))
-        steps.save_labels(target, found.labels, colors, output)
+        steps.save_labels(mesh, target, found.labels, colors, output)
     if picture:
         best = list(examples.values())[int(found.weights.argmax())]
         figure = es.plot.figure_label_transfer(best, target, found, names=names, **side)

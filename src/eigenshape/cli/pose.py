@@ -29,7 +29,9 @@ def pose(
     repair: RepairOption = "",
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Write the bent mesh (PLY, OBJ, OFF, STL or GLB)."),
+        typer.Option(
+            "-o", "--output", help="Write the bent mesh (PLY, OBJ, GLB, OFF, STL, VTU, VTK or NPZ)."
+        ),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")

@@ -23,7 +23,9 @@ def repair(
     *,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL or GLB."),
+        typer.Option(
+            "-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ."
+        ),
     ],
     names: Annotated[
         str,
@@ -39,7 +41,7 @@ def repair(
     cells: CellsOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Repair a mesh and write it, and report what was done. From OBJ to OBJ, polygons, textures and groups stay.
+    """Repair a mesh and write it, and report what was done. All else that the file holds stays, or is named.
 
     For instance: eigenshape repair scan.ply --repair auto -o clean.ply
     """

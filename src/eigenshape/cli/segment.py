@@ -84,8 +84,8 @@ def segment(
         typer.Option(
             "-o",
             "--output",
-            help="Write the mesh with its parts as colors and labels (PLY), or the number of the "
-            "part of each face, one a line (SEG or TXT).",
+            help="Write the mesh with its parts as colors and labels (PLY) or as materials (GLB or "
+            "OBJ), or the number of the part of each face, one a line (SEG or TXT).",
         ),
     ] = None,
     picture: Annotated[Path | None, typer.Option(help="Draw the parts (PNG, SVG or PDF).")] = None,
@@ -119,7 +119,9 @@ def segment(
     else:
         steps.print_rows("Parts", COLUMNS, rows)
     if output:
-        steps.save_labels(surface, parts.labels, es.plot.part_colors(surface, parts.labels), output)
+        steps.save_labels(
+            mesh, surface, parts.labels, es.plot.part_colors(surface, parts.labels), output
+        )
     if picture:
         figure = es.plot.figure_segments(surface, parts.labels, parts.features.vertices, **side)
         steps.save_picture(figure, picture)

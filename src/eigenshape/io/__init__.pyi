@@ -1,3 +1,6 @@
+from .attributes import Material as Material
+from .attributes import MeshAttributes as MeshAttributes
+from .attributes import carry_attributes as carry_attributes
 from .bridges import from_pyvista as from_pyvista
 from .bridges import from_trimesh as from_trimesh
 from .bridges import to_arrays as to_arrays
@@ -5,6 +8,8 @@ from .bridges import to_pyvista as to_pyvista
 from .bridges import to_trimesh as to_trimesh
 from .edits import read_edits as read_edits
 from .edits import write_edits as write_edits
+from .fields import read_fields as read_fields
+from .fields import write_fields as write_fields
 from .folders import find_items as find_items
 from .folders import index_folder as index_folder
 from .labeled_shapes import read_label_names as read_label_names

@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 
 from eigenshape._errors import FileFormatError
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.gltf import Gltf, decode_buffers, place_triangles
-from eigenshape.io.stl import single_precision
+from eigenshape.io.gltf import Gltf, Scene, decode_buffers, place_triangles
 from eigenshape.io.text import quote_line
 
 JSON_CHUNK = b"JSON"
@@ -17,24 +15,33 @@ BINARY_CHUNK = b"BIN\0"
 COPIES = 2**22  # most vertices and faces from copies in a small file; they take 200 MB
 
 
-def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces of the scene; a buffer outside the file raises an error."""
-    chunks = _chunks(data)
-    tree = _tree(chunks.get(JSON_CHUNK, b""))
-    return _scene(tree, decode_buffers(tree, chunks.get(BINARY_CHUNK, b"")))
+def parse(data: bytes, folder: Path | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Read vertices and faces of the scene, from a .glb file or, if a folder is given, a .gltf file.
+
+    The buffers of a .gltf file lie in its folder or in data URIs.
+    """
+    piece = read_scene(read_gltf(data, folder)).piece
+    return piece.vertices, piece.faces
 
 
-def parse_text(data: bytes, folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces of the scene of a .gltf file, whose buffers lie in this folder or in data URIs."""
-    tree = _tree(data)
-    return _scene(tree, decode_buffers(tree, b"", folder))
+def read_gltf(data: bytes, folder: Path | None = None) -> Gltf:
+    """Read the tree and the buffers of a file; see `parse`."""
+    if folder is None:
+        chunks = _chunks(data)
+        tree = _tree(chunks.get(JSON_CHUNK, b""))
+        buffers = decode_buffers(tree, chunks.get(BINARY_CHUNK, b""))
+    else:
+        tree = _tree(data)
+        buffers = decode_buffers(tree, b"", folder)
+    return Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES))
 
 
-def _scene(tree: dict[str, Any], buffers: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
-    vertices, faces = place_triangles(Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES)))
-    if not len(faces):
+def read_scene(gltf: Gltf) -> Scene:
+    """Read the triangles of the scene; there must be some."""
+    scene = place_triangles(gltf)
+    if not len(scene.piece.faces):
         raise FileFormatError("A glTF file must hold triangles; it holds none.")
-    return vertices, faces
+    return scene
 
 
 def _chunks(data: bytes) -> dict[bytes, bytes]:
@@ -71,48 +78,12 @@ def _tree(text: bytes) -> dict[str, Any]:
     return tree
 
 
-def format_mesh(mesh: TriangleMesh) -> bytes:
-    """Write binary glTF in single precision.
-
-    Raises
-    ------
-    FileFormatError
-        If a coordinate does not fit into single precision.
-    """
-    vertices = single_precision(mesh, "GLB")
-    positions, corners = vertices.astype("<f4").tobytes(), mesh.faces.astype("<u4").tobytes()
-    box = {"min": vertices.min(axis=0).tolist(), "max": vertices.max(axis=0).tolist()}
-    tree = {
-        "asset": {"version": "2.0", "generator": "eigenshape"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "accessors": [
-            {
-                "bufferView": 0,
-                "componentType": 5126,
-                "count": mesh.n_vertices,
-                "type": "VEC3",
-                **box,
-            },
-            {"bufferView": 1, "componentType": 5125, "count": 3 * mesh.n_faces, "type": "SCALAR"},
-        ],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": len(positions), "target": 34962},
-            {
-                "buffer": 0,
-                "byteOffset": len(positions),
-                "byteLength": len(corners),
-                "target": 34963,
-            },
-        ],
-        "buffers": [{"byteLength": len(positions) + len(corners)}],
-    }
+def pack(tree: dict[str, Any], binary: bytes) -> bytes:
+    """Write a tree and its buffer as one binary file."""
     text = json.dumps(tree, separators=(",", ":")).encode()
-    body = _chunk(JSON_CHUNK, text + b" " * (-len(text) % 4)) + _chunk(
-        BINARY_CHUNK, positions + corners
-    )
+    body = _chunk(JSON_CHUNK, text + b" " * (-len(text) % 4))
+    if binary:
+        body += _chunk(BINARY_CHUNK, binary + b"\0" * (-len(binary) % 4))
     return b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(4, "little") + body
 
 

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import unquote
 
 import numpy as np
@@ -15,8 +15,8 @@ from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
 
 KINDS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTHS = {"SCALAR": 1, "VEC3": 3}
-TRIANGLES, STRIP, FAN = 4, 5, 6
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+TRIANGLES, STRIP, FAN = SURFACES = 4, 5, 6
 LARGEST = sys.float_info.max
 NO_FACES = np.empty((0, 3), dtype=np.int64)
 # Extensions that change the look of a surface but not its place, or that a reader may ignore.
@@ -27,7 +27,23 @@ HARMLESS = (
     "KHR_lights_",
     "KHR_mesh_quantization",
 )
-Piece = tuple[np.ndarray, np.ndarray]  # vertices and faces
+
+
+class Piece(NamedTuple):
+    """Triangles, and where they stand in the file."""
+
+    vertices: np.ndarray  # (n, 3)
+    faces: np.ndarray  # (f, 3)
+    rows: np.ndarray  # (n,) the row of each vertex in the accessors of its primitive
+    primitives: np.ndarray  # (f,) the number of each face's primitive in its mesh
+
+
+class Scene(NamedTuple):
+    """The triangles of all nodes in world coordinates, and where they stand in the file."""
+
+    piece: Piece
+    nodes: np.ndarray  # (f,) the node of each face
+    matrices: dict[int, np.ndarray]  # by node, from its coordinates to those of the world
 
 
 @dataclass(frozen=True)
@@ -83,7 +99,7 @@ def _decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -
             f"A GLB file must hold all its data; buffers[{index}] points outside, to {str(uri)[:80]!r}."
         )
     size = _whole(entry, "byteLength")
-    data = read_regular(_beside(index, str(uri), folder), "numbers")
+    data = read_regular(file_beside(index, str(uri), folder), "numbers")
     if len(data) < size:
         raise FileFormatError(
             f"buffers[{index}] must have {size} bytes; the file {str(uri)[:80]!r} has {len(data)}."
@@ -91,7 +107,7 @@ def _decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -
     return data[:size]
 
 
-def _beside(index: int, uri: str, folder: Path) -> Path:
+def file_beside(index: int, uri: str, folder: Path) -> Path:
     """Return the file of a relative URI; links resolved, it must be in or below the folder."""
     try:
         root = folder.resolve()
@@ -105,20 +121,24 @@ def _beside(index: int, uri: str, folder: Path) -> Path:
     return path
 
 
-def place_triangles(gltf: Gltf) -> Piece:
+def place_triangles(gltf: Gltf) -> Scene:
     """Gather the triangles of all nodes, in world coordinates."""
     _refuse_extensions(gltf)
     shapes: dict[int, Piece] = {}
-    places = []
+    matrices: dict[int, np.ndarray] = {}
+    meshes: dict[int, int] = {}  # by node
     total = 0
-    for index, matrix in _placed_meshes(gltf):
+    for node, index, matrix in _placed_meshes(gltf):
         mesh = gltf.entry("meshes", index)
         if index not in shapes:
             shapes[index] = _mesh(gltf, mesh)
-        total += sum(map(len, shapes[index]))
+        total += len(shapes[index].vertices) + len(shapes[index].faces)
         _require_few(total, gltf)  # before any copy is made
-        places.append((index, matrix))
-    return _merge_pieces([_transform(shapes[index], matrix) for index, matrix in places])
+        matrices[node], meshes[node] = matrix, index
+    placed = [_transform(shapes[meshes[node]], matrix) for node, matrix in matrices.items()]
+    n_faces = [len(piece.faces) for piece in placed]
+    nodes = np.repeat(np.array(list(matrices), dtype=np.int64), n_faces)
+    return Scene(_merge_pieces(placed), nodes, matrices)
 
 
 def _require_few(total: int, gltf: Gltf) -> None:
@@ -129,10 +149,15 @@ def _require_few(total: int, gltf: Gltf) -> None:
 
 
 def _merge_pieces(pieces: Sequence[Piece]) -> Piece:
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])[:-1]
-    vertices = [np.empty((0, 3)), *(vertices for vertices, _ in pieces)]
-    faces = [corners + start for (_, corners), start in zip(pieces, starts, strict=True)]
-    return np.concatenate(vertices), np.concatenate([NO_FACES, *faces])
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])[:-1]
+    faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=True)]
+    none = np.empty(0, dtype=np.int64)
+    return Piece(
+        np.concatenate([np.empty((0, 3)), *(piece.vertices for piece in pieces)]),
+        np.concatenate([NO_FACES, *faces]),
+        np.concatenate([none, *(piece.rows for piece in pieces)]),
+        np.concatenate([none, *(piece.primitives for piece in pieces)]),
+    )
 
 
 def _refuse_extensions(gltf: Gltf) -> None:
@@ -143,7 +168,7 @@ def _refuse_extensions(gltf: Gltf) -> None:
             )
 
 
-def _placed_meshes(gltf: Gltf) -> Iterator[tuple[Any, np.ndarray]]:
+def _placed_meshes(gltf: Gltf) -> Iterator[tuple[int, Any, np.ndarray]]:
     waiting = [(index, np.eye(4)) for index in reversed(_roots(gltf))]
     seen = set()
     while waiting:
@@ -156,7 +181,7 @@ def _placed_meshes(gltf: Gltf) -> Iterator[tuple[Any, np.ndarray]]:
         seen.add(index)
         matrix = above @ _local_matrix(node)
         if "mesh" in node:
-            yield node["mesh"], matrix
+            yield index, node["mesh"], matrix
         waiting.extend((child, matrix) for child in reversed(_list(node, "children")))
 
 
@@ -188,29 +213,33 @@ def _local_matrix(node: dict[str, Any]) -> np.ndarray:
 
 
 def _transform(piece: Piece, matrix: np.ndarray) -> Piece:
-    vertices, faces = piece
     # A reflection turns triangles inside out; by the format they must be turned back.
-    flipped = faces[:, ::-1] if np.linalg.slogdet(matrix[:3, :3])[0] < 0 else faces
-    return vertices @ matrix[:3, :3].T + matrix[:3, 3], flipped
+    flips = np.linalg.slogdet(matrix[:3, :3])[0] < 0
+    return piece._replace(
+        vertices=piece.vertices @ matrix[:3, :3].T + matrix[:3, 3],
+        faces=piece.faces[:, ::-1] if flips else piece.faces,
+    )
 
 
 def _mesh(gltf: Gltf, mesh: dict[str, Any]) -> Piece:
     """Read one mesh; parts that differ only in material share their vertices, as in the file."""
-    parts: dict[int, list[dict[str, Any]]] = {}
-    for part in _list(mesh, "primitives"):
-        if _whole(part, "mode", TRIANGLES) in (TRIANGLES, STRIP, FAN):
-            parts.setdefault(_whole(part.get("attributes"), "POSITION"), []).append(part)
+    parts: dict[int, list[int]] = {}
+    primitives = _list(mesh, "primitives")
+    for number, part in enumerate(primitives):
+        if _whole(part, "mode", TRIANGLES) in SURFACES:
+            parts.setdefault(_whole(part.get("attributes"), "POSITION"), []).append(number)
     pieces = []
     total = 0
     for position, sharing in parts.items():
-        vertices = _accessor(gltf, position, 3)
-        faces = [NO_FACES]
+        vertices = read_accessor(gltf, position, 3)
+        faces = []
         total += len(vertices)
-        for part in sharing:
-            faces.append(_faces(gltf, part, len(vertices)))
+        for number in sharing:
+            faces.append(_faces(gltf, primitives[number], len(vertices)))
             total += 1 + len(faces[-1])
             _require_few(total, gltf)
-        pieces.append((vertices, np.concatenate(faces)))
+        owners = np.repeat(sharing, [len(block) for block in faces])
+        pieces.append(Piece(vertices, np.concatenate(faces), np.arange(len(vertices)), owners))
     return _merge_pieces(pieces)
 
 
@@ -218,7 +247,7 @@ def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
     mode = _whole(part, "mode", TRIANGLES)
     if "indices" not in part:
         return _split(np.arange(n_vertices), mode)
-    corners = _accessor(gltf, part["indices"], 1)[:, 0]
+    corners = read_accessor(gltf, part["indices"], 1)[:, 0]
     bad = np.flatnonzero(
         ~((corners >= 0) & (corners < n_vertices) & (corners == np.floor(corners)))
     )
@@ -246,12 +275,23 @@ def _split(corners: np.ndarray, mode: int) -> np.ndarray:
     return np.column_stack([corners[place], corners[place + 1 + odd], corners[place + 2 - odd]])
 
 
-def _accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
+def read_accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
+    """Read an accessor as float64, with as many numbers a row as `width`."""
+    rows = raw_accessor(gltf, index, width)
+    if gltf.entry("accessors", index).get("normalized") is True and rows.dtype.kind in "iu":
+        return np.maximum(rows / np.iinfo(rows.dtype).max, -1.0)
+    return rows.astype(np.float64)
+
+
+def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarray:
+    """Return the rows of an accessor as they are stored, without a copy; `wanted` numbers each."""
     accessor = gltf.entry("accessors", index)
     kind = np.dtype(KINDS.get(_whole(accessor, "componentType"), "V0"))
-    if not kind.itemsize or WIDTHS.get(str(accessor.get("type"))) != width or "sparse" in accessor:
+    width = WIDTHS.get(str(accessor.get("type")), 0)
+    fits = width == wanted if wanted else width > 0
+    if not kind.itemsize or not fits or "sparse" in accessor:
         raise FileFormatError(
-            f"accessors[{index}] must be a plain list of {width} numbers each; it is not."
+            f"accessors[{index}] must be a plain list of {wanted or '1 to 4'} numbers each; it is not."
         )
     data, step = _view(gltf, accessor.get("bufferView"))
     row = kind.itemsize * width
@@ -261,10 +301,7 @@ def _accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
         raise FileFormatError(
             f"accessors[{index}] must lie in its buffer; {count} rows do not fit {len(data)} bytes."
         )
-    rows = np.ndarray((count, width), kind, data, start, (step, kind.itemsize)).astype(np.float64)
-    if accessor.get("normalized") is True and kind.kind in "iu":
-        return np.maximum(rows / np.iinfo(kind).max, -1.0)
-    return rows
+    return np.ndarray((count, width), kind, data, start, (step, kind.itemsize))
 
 
 def _view(gltf: Gltf, index: Any) -> tuple[memoryview, int]:

@@ -1,8 +1,11 @@
 """Read and write meshes. The content of a file is checked before a mesh is returned."""
 
+import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Literal, overload
 
 import numpy as np
 from jaxtyping import Int, UInt8
@@ -11,45 +14,82 @@ from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import as_path, read_regular, replace_file
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io import glb, obj, off, ply, stl
+from eigenshape.io import glb_attributes, obj_attributes, off, ply, stl
+from eigenshape.io.attributes import (
+    MeshAttributes,
+    SourceFile,
+    label_attributes,
+    loss_sentence,
+    plain_attributes,
+)
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.cells import require_kind
+from eigenshape.io.fields import FIELD_FORMATS, format_fields
 from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
 
-TEXT = {
+TEXT: dict[str, Callable[..., bytes]] = {
     ".off": off.format_mesh,
-    ".obj": obj.format_mesh,
     ".ply": ply.format_text,
     ".stl": stl.format_text,
 }
-BINARY = {".ply": ply.format_binary, ".stl": stl.format_binary, ".glb": glb.format_mesh}
-WRITTEN = tuple({**TEXT, **BINARY})
+BINARY: dict[str, Callable[..., bytes]] = {".ply": ply.format_binary, ".stl": stl.format_binary}
+WRITTEN = (".off", ".obj", ".ply", ".stl", ".glb", *FIELD_FORMATS)
+LABELED = (".ply", ".glb", ".obj")  # formats that hold parts
+TEXT_FORMATS = (*TEXT, ".obj")
+BINARY_FORMATS = (*BINARY, ".glb", *FIELD_FORMATS)
+GLTF = (".glb", ".gltf")
+WITH_ATTRIBUTES = (*GLTF, ".obj", ".ply")  # formats that hold more than positions and faces
 
 
+@overload
 def read_mesh(
-    path: str | Path, *, file_format: str | None = None, cells: CellKind | None = None
-) -> TriangleMesh:
+    path: str | Path,
+    *,
+    file_format: str | None = None,
+    cells: CellKind | None = None,
+    attributes: Literal[False] = False,
+) -> TriangleMesh: ...
+@overload
+def read_mesh(
+    path: str | Path,
+    *,
+    file_format: str | None = None,
+    cells: CellKind | None = None,
+    attributes: Literal[True],
+) -> tuple[TriangleMesh, MeshAttributes]: ...
+def read_mesh(
+    path: str | Path,
+    *,
+    file_format: str | None = None,
+    cells: CellKind | None = None,
+    attributes: bool = False,
+) -> TriangleMesh | tuple[TriangleMesh, MeshAttributes]:
     r"""Read a triangle mesh from a file.
 
     Vertices keep their order and are neither merged nor split. The exception is STL, which does not
     store shared vertices: there, corners with equal coordinates become one vertex. Polygons become
-    fans of triangles around their first corner. Colors, normals, textures and materials are
-    ignored. The whole file is read into memory.
+    fans of triangles around their first corner. Colors, normals, textures and materials come as
+    attributes, if they are requested. The whole file is read into memory.
 
     Parameters
     ----------
     path : str or Path
-        A file in OFF, OBJ, PLY, STL, GLB or glTF, or a surface in .mesh, .msh, .vtk or .vtu.
+        A file in OFF, OBJ, PLY, STL, GLB or glTF, or a surface in .mesh, .msh, .vtk, .vtu or .npz.
     file_format : str, optional
         Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
     cells : {"triangles", "quads", "tetrahedra"}, optional
         Kind of cells to read, if the file holds several kinds or does not name the kind; see
         `read_shape`.
+    attributes : bool
+        Whether to return also what the file holds besides: texture coordinates, materials, images,
+        colors, groups. OBJ, PLY, GLB and glTF files hold such content.
 
     Returns
     -------
     TriangleMesh
         With vertices (n, 3) in the unit of the file.
+    MeshAttributes
+        If `attributes` is True; see `write_mesh`.
 
     Raises
     ------
@@ -86,7 +126,31 @@ def read_mesh(
     with naming(path):
         points, simplices = parse_mesh(path, suffix, data, cells)
         require_surface(points, simplices)
-        return TriangleMesh(points, simplices)
+        mesh = TriangleMesh(points, simplices)
+        if not attributes:
+            return mesh
+        try:
+            return mesh, _read_attributes(SourceFile(path, suffix, data), mesh)
+        except FileFormatError:
+            raise
+        except (LookupError, TypeError, AttributeError, ValueError) as err:
+            raise FileFormatError(
+                f"Materials and other attributes must be whole; these are not: {err!r}. "
+                "Without attributes=True the file can be read."
+            ) from err
+
+
+def _read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
+    if source.suffix in GLTF:
+        return glb_attributes.read_attributes(source, mesh)
+    if source.suffix == ".obj":
+        return obj_attributes.read_attributes(source, mesh)
+    plain = plain_attributes(mesh)
+    if source.suffix == ".ply":
+        colors, others = ply.read_attributes(source.data, mesh)
+        at_corners = None if colors is None else colors[mesh.faces]
+        return replace(plain, colors=at_corners, others=others)
+    return plain
 
 
 def require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
@@ -117,6 +181,7 @@ def write_mesh(
     binary: bool | None = None,
     colors: UInt8[np.ndarray, "n 3"] | None = None,
     face_labels: Int[np.ndarray, " f"] | None = None,
+    attributes: MeshAttributes | None = None,
 ) -> None:
     """Write a mesh to a file, in the format of its suffix.
 
@@ -128,15 +193,21 @@ def write_mesh(
     mesh : MeshLike
         With n vertices and f faces.
     path : str or Path
-        Must end in .off, .obj, .ply, .stl or .glb.
+        Must end in .off, .obj, .ply, .stl, .glb, .vtu, .vtk or .npz.
     binary : bool, optional
         Whether to write binary data. By default True for PLY and STL. OFF and OBJ are always text,
-        GLB always binary.
+        GLB, VTU, VTK and NPZ always binary.
     colors : (n, 3) uint8, optional
-        Red, green and blue of each vertex; only for PLY.
+        Red, green and blue of each vertex; for PLY, OBJ and GLB.
     face_labels : (f,) int, optional
-        A whole number of 32 bits for each face, such as the number of its part. Only for PLY, where
-        it is the property `label` of faces.
+        A whole number of 32 bits for each face, such as the number of its part. In PLY it is the
+        property `label` of faces; OBJ and GLB get a material for each part, named part_0, part_1
+        and so on, in the mean color of its vertices.
+    attributes : MeshAttributes, optional
+        What the file that the mesh was read from holds besides, as `read_mesh` returns it. From OBJ
+        to OBJ and from glTF to GLB, everything but positions and normals is written again as it
+        was; normals are computed anew. To other formats goes what they can hold. A warning names
+        what is lost. After repairs `carry_attributes` comes first.
 
     Raises
     ------
@@ -144,14 +215,16 @@ def write_mesh(
         If the suffix is unknown, or the format has only single precision and coordinates do not fit
         into it.
     InvalidParameterError
-        If the format has no such binary or text form, if it takes no colors or labels, or if their
-        shapes are wrong.
+        If the format has no such binary or text form, if it takes no colors or labels, if
+        their shapes are wrong, or if attributes belong to other faces.
     OSError
         If the system cannot write the file.
 
     See Also
     --------
     read_mesh : Read a mesh.
+    eigenshape.io.carry_attributes : Carry attributes to a repaired mesh.
+    eigenshape.io.write_fields : Write a mesh with functions on vertices and faces.
     eigenshape.plot.value_colors, eigenshape.plot.part_colors : Compute colors.
 
     Examples
@@ -164,47 +237,117 @@ def write_mesh(
     >>> bool((es.read_mesh(path).vertices == mesh.vertices).all())
     True
     """
-    mesh = as_mesh(mesh)
-    path = as_path(path)
+    lost = save_mesh(
+        as_mesh(mesh),
+        as_path(path),
+        binary=binary,
+        colors=colors,
+        face_labels=face_labels,
+        attributes=attributes,
+    )
+    if lost:
+        warnings.warn(lost, stacklevel=2)
+
+
+def save_mesh(
+    mesh: TriangleMesh,
+    path: Path,
+    *,
+    binary: bool | None = None,
+    colors: UInt8[np.ndarray, "n 3"] | None = None,
+    face_labels: Int[np.ndarray, " f"] | None = None,
+    attributes: MeshAttributes | None = None,
+) -> str:
+    """Write a mesh as `write_mesh` does, and return a sentence that names what is lost, or none."""
     suffix = suffix_of(path, None, WRITTEN)
-    write = _writer(suffix, suffix in BINARY if binary is None else binary)
+    held = attributes or plain_attributes(mesh)
+    if not np.array_equal(held.mesh.faces, mesh.faces):
+        raise InvalidParameterError(
+            f"attributes must belong to the {mesh.n_faces} faces of the mesh; they belong to {held.mesh.n_faces} "
+            "other ones. Carry them by es.io.carry_attributes(attributes, repaired_mesh)."
+        )
+    is_binary = suffix in BINARY_FORMATS if binary is None else binary
+    kinds = BINARY_FORMATS if is_binary else TEXT_FORMATS
+    if suffix not in kinds:
+        raise InvalidParameterError(
+            f"binary={binary} is for {', '.join(kinds)}; the suffix is {suffix}."
+        )
     if colors is not None:
-        write = partial(write, colors=_colors(colors, mesh, suffix))
+        _require_colors(colors, mesh, suffix)
     if face_labels is not None:
-        write = partial(write, face_labels=_labels(face_labels, mesh, suffix))
+        _require_labels(face_labels, mesh, suffix)
+    lost: list[str] = []
+    if face_labels is not None and suffix != ".ply":
+        if held.contents["materials"]:
+            lost.append("materials and images, since each part has a material of its own")
+        gray = np.full((mesh.n_vertices, 3), 200, np.uint8)
+        held = label_attributes(held, face_labels, gray if colors is None else colors)
+        held = replace(held, source=None)
+    elif colors is not None:
+        opaque = np.column_stack([colors, np.full(len(colors), 255, np.uint8)])
+        held = replace(held, colors=opaque[mesh.faces], source=None)
     try:
-        data = write(mesh)
+        files = _encode(mesh, path, is_binary, face_labels, held, lost)
     except FileFormatError as err:
         raise FileFormatError(f"{path} cannot hold the mesh. {err}") from err
-    replace_file(path, data)
+    for place, data in files.items():
+        replace_file(place, data)
+    return loss_sentence(lost, path)
 
 
-def _writer(suffix: str, binary: bool) -> Callable[..., bytes]:
-    writers: dict[str, Callable[..., bytes]] = {**(BINARY if binary else TEXT)}
-    if suffix not in writers:
+def _encode(
+    mesh: TriangleMesh,
+    path: Path,
+    binary: bool,
+    face_labels: Int[np.ndarray, " f"] | None,
+    held: MeshAttributes,
+    lost: list[str],
+) -> dict[Path, bytes]:
+    """Return the files to write, and add to `lost` what they do not keep."""
+    suffix, source = path.suffix.lower(), held.source
+    if source and suffix == ".glb" and source.suffix in GLTF:
+        data, more = glb_attributes.rewrite(source, held, mesh)
+        lost += more
+        return {path: data}
+    if source and suffix == source.suffix == ".obj":
+        files, more = obj_attributes.rewrite(source, held, mesh, path)
+        lost += more
+        return files
+    lost += held.others
+    if suffix == ".obj":
+        return obj_attributes.write_new(held, mesh, path)
+    if suffix == ".glb":
+        return {path: glb_attributes.write_new(held, mesh)}
+    kept = ("vertex colors",) if suffix == ".ply" else ()
+    lost += [name for name, there in held.contents.items() if there and name not in kept]
+    if suffix in FIELD_FORMATS:
+        return {path: format_fields(mesh, suffix, {})}
+    write = (BINARY if binary else TEXT)[suffix]
+    if suffix == ".ply":
+        tints = None
+        if held.colors is not None:
+            tints = np.full((mesh.n_vertices, 3), 255, np.uint8)
+            tints[mesh.faces.ravel()] = held.colors.reshape(-1, 4)[:, :3]
+        write = partial(write, colors=tints, face_labels=face_labels)
+    return {path: write(mesh)}
+
+
+def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
+    if suffix not in LABELED or colors.dtype != np.uint8 or colors.shape != (mesh.n_vertices, 3):
         raise InvalidParameterError(
-            f"binary={binary} is for {', '.join(writers)}; the suffix is {suffix}."
+            f"colors must be ({mesh.n_vertices}, 3) uint8 and go to {', '.join(LABELED)}; they are {colors.shape} "
+            f"{colors.dtype} and go to {suffix}."
         )
-    return writers[suffix]
 
 
-def _colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> np.ndarray:
-    if suffix != ".ply" or colors.dtype != np.uint8 or colors.shape != (mesh.n_vertices, 3):
+def _require_labels(labels: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
+    if suffix not in LABELED or labels.shape != (mesh.n_faces,):
         raise InvalidParameterError(
-            f"colors must be ({mesh.n_vertices}, 3) uint8 and go to a PLY file; they are {colors.shape} {colors.dtype} "
-            f"and go to {suffix}."
-        )
-    return colors
-
-
-def _labels(labels: np.ndarray, mesh: TriangleMesh, suffix: str) -> np.ndarray:
-    if suffix != ".ply" or labels.shape != (mesh.n_faces,):
-        raise InvalidParameterError(
-            f"face_labels must be ({mesh.n_faces},) and go to a PLY file; they are {labels.shape} and go to {suffix}."
+            f"face_labels must be ({mesh.n_faces},) and go to {', '.join(LABELED)}; they are {labels.shape} and "
+            f"go to {suffix}."
         )
     beyond = np.flatnonzero(labels != labels.astype(np.int32))
     if beyond.size:
         raise InvalidParameterError(
             f"face_labels must fit into 32 bits; that of face {beyond[0]} is {labels[beyond[0]]}."
         )
-    return labels

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: positions and faces; textures, normals, groups and materials are ignored."""
+"""Wavefront OBJ: positions and faces. `obj_attributes` reads the rest."""
 
 import re
 from collections.abc import Sequence
@@ -7,14 +7,12 @@ from itertools import pairwise
 import numpy as np
 
 from eigenshape._errors import FileFormatError
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.text import (
     Line,
     coordinates,
     fans,
     lines_of,
     quote_line,
-    rows_text,
     whole,
     whole_table,
 )
@@ -100,9 +98,3 @@ def corner_index(word: bytes, line: Line, n_so_far: int) -> int:
             f"after {n_so_far} vertices."
         )
     return index - 1 if index > 0 else n_so_far + index
-
-
-def format_mesh(mesh: TriangleMesh) -> bytes:
-    """Write a mesh so that it reads back exactly."""
-    lines = [*rows_text("v ", mesh.vertices), *rows_text("f ", mesh.faces + 1)]
-    return ("\n".join(lines) + "\n").encode()

@@ -9,27 +9,34 @@ from itertools import permutations
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.attributes import unit_rows
 from eigenshape.io.obj import corner_index, join_lines
-from eigenshape.io.text import Line, coordinates, rows_text, whole
+from eigenshape.io.text import Line, coordinates, fans, rows_text, whole
 
 KEPT = (b"vt", b"o", b"g", b"s", b"usemtl", b"mtllib")
 ORDERS = tuple(permutations(range(3)))
 TURNED = ((0, 2, 1), (1, 0, 2), (2, 1, 0))  # the permutations in ORDERS that reverse a face
-Corner = tuple[int, str]  # a vertex, and "/7" where it has the texture coordinate 7
+# A vertex, "/7" where it has the texture coordinate 7, and the number of its normal or -1.
+Corner = tuple[int, str, int]
+# New vertices, the corners of the file that they belong to, and whether their order is reversed.
+Piece = tuple[Sequence[int], Sequence[Corner], bool]
 
 
 @dataclass(frozen=True, eq=False)
 class ObjSheet:
     """The content of an OBJ file that a triangle mesh does not store.
 
-    Normals, points, polylines and comments are dropped; normals are wrong after a change.
+    Points, polylines and comments are dropped. Normals are kept to tell where creases are.
 
     Attributes
     ----------
     vertices : (n, 3) float
     tails : tuple of str
         For each vertex, the text after its coordinates: a weight or a color.
+    normals : tuple
+        Three numbers each.
     polygons : tuple
         The corners of each face.
     rows : tuple
@@ -38,6 +45,7 @@ class ObjSheet:
 
     vertices: Float[np.ndarray, "n 3"]
     tails: tuple[str, ...]
+    normals: tuple[tuple[float, ...], ...]
     polygons: tuple[tuple[Corner, ...], ...]
     rows: tuple[str | int, ...]
 
@@ -54,6 +62,7 @@ def read_sheet(data: bytes) -> ObjSheet:
     tails: list[str] = []
     polygons: list[tuple[Corner, ...]] = []
     rows: list[str | int] = []
+    normals: list[Line] = []
     n_textures = 0
     for number, raw in enumerate(join_lines(data.removeprefix(codecs.BOM_UTF8)).splitlines(), 1):
         text = raw.partition(b"#")[0].strip()
@@ -64,22 +73,38 @@ def read_sheet(data: bytes) -> ObjSheet:
         elif keyword == b"f":
             rows.append(len(polygons))
             line = (number, text[1:])
-            corners = (_corner(word, line, len(positions), n_textures) for word in text.split()[1:])
+            counts = (len(positions), n_textures, len(normals))
+            corners = (_corner(word, line, counts) for word in text.split()[1:])
             polygons.append(tuple(corners))
+        elif keyword == b"vn":
+            normals.append((number, text[2:]))
         elif keyword in KEPT:
             n_textures += keyword == b"vt"
             rows.append(raw.strip().decode("latin-1"))  # names may contain #
-    return ObjSheet(coordinates(positions), tuple(tails), tuple(polygons), tuple(rows))
+    return ObjSheet(
+        coordinates(positions),
+        tuple(tails),
+        tuple(map(tuple, coordinates(normals).tolist())),
+        # A corner whose normal the file does not hold has none.
+        tuple(
+            tuple((v, t, n if 0 <= n < len(normals) else -1) for v, t, n in polygon)
+            for polygon in polygons
+        ),
+        tuple(rows),
+    )
 
 
-def _corner(word: bytes, line: Line, n_vertices: int, n_textures: int) -> Corner:
-    position, _, rest = word.partition(b"/")
-    texture = rest.partition(b"/")[0]
-    vertex = corner_index(position, line, n_vertices)
-    if not texture:
-        return vertex, ""
-    place = whole(texture, line, "A texture coordinate")
-    return vertex, f"/{place if place > 0 else n_textures + 1 + place}"
+def _corner(word: bytes, line: Line, counts: tuple[int, int, int]) -> Corner:
+    """Read a corner, after so many vertices, texture coordinates and normals."""
+    position, texture, normal = (*word.split(b"/"), b"", b"")[:3]
+    vertex = corner_index(position, line, counts[0])
+    place = whole(texture, line, "A texture coordinate") if texture else 0
+    number = whole(normal, line, "A normal") if normal else 0
+    return (
+        vertex,
+        f"/{place if place > 0 else counts[1] + 1 + place}" if texture else "",
+        (number - 1 if number > 0 else counts[2] + number) if normal else -1,
+    )
 
 
 def format_sheet(
@@ -112,11 +137,46 @@ def format_sheet(
     lines = [f"{row} {tail}".rstrip() for row, tail in zip(vertices, tails, strict=True)]
 
     triangles, added = _match_triangles(sheet, mesh.faces, old_places, new_places)
-    for row in sheet.rows:
-        lines += (
-            [row] if isinstance(row, str) else _polygon_rows(sheet.polygons[row], triangles[row])
-        )
-    return ("\n".join([*lines, *rows_text("f ", added + 1)]) + "\n").encode("latin-1")
+    rows: list[str | list[Corner]] = []
+    for line in sheet.rows:
+        rows += [line] if isinstance(line, str) else _pieces(sheet.polygons[line], triangles[line])
+    rows += [[(vertex, "", -1) for vertex in face] for face in added.tolist()]
+    normals, numbers = _normals(sheet, rows, mesh.vertices if moved is None else moved)
+    lines += rows_text("vn ", normals)
+    for row in rows:
+        if isinstance(row, str):
+            lines.append(row)
+            continue
+        lines.append("f")
+        for vertex, texture, normal in row:
+            number = numbers.get((vertex, sheet.normals[normal])) if normal >= 0 else None
+            tail = "" if number is None else f"{'' if texture else '/'}/{number + 1}"
+            lines[-1] += f" {vertex + 1}{texture}{tail}"
+    return ("\n".join(lines) + "\n").encode("latin-1")
+
+
+def _normals(
+    sheet: ObjSheet, rows: Sequence[str | list[Corner]], vertices: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "m 3"], dict[tuple[int, tuple[float, ...]], int]]:
+    """Compute a normal for each vertex and each normal that it had, so that creases stay."""
+    numbers: dict[tuple[int, tuple[float, ...]], int] = {}
+    owners, triangles = [], []
+    for row in rows:
+        if isinstance(row, str):
+            continue
+        corners = fans([[vertex for vertex, _, _ in row]]).tolist()
+        for vertex, _, normal in row:
+            if normal >= 0:
+                key = (vertex, sheet.normals[normal])
+                number = numbers.setdefault(key, len(numbers))
+                triangles += corners
+                owners += [number] * len(corners)
+    if not numbers:
+        return np.empty((0, 3)), numbers
+    vectors = area_vectors(vertices[np.array(triangles)])
+    sums = np.column_stack([np.bincount(owners, weights=column) for column in vectors.T])
+    units, old = unit_rows(sums), np.array([normal for _, normal in numbers])
+    return np.where(units.any(axis=1, keepdims=True), units, old), numbers
 
 
 def _places(
@@ -147,7 +207,7 @@ def _match_triangles(
         by_places[tuple(places)].append(face)
     found: list[Triangles] = []
     for polygon in sheet.polygons:
-        corners = [vertex for vertex, _ in polygon]
+        corners = [vertex for vertex, _, _ in polygon]
         triangles: Triangles = []
         for index in range(1, len(corners) - 1):
             wanted = old_places[[corners[0], corners[index], corners[index + 1]]].tolist()
@@ -169,23 +229,21 @@ def _fit_corners(
     return [face[place] for place in order], order in TURNED
 
 
-def _polygon_rows(polygon: Sequence[Corner], triangles: Triangles) -> list[str]:
-    """Write the remaining part of a polygon: the whole, perhaps reversed, or some triangles."""
-    textures = [texture for _, texture in polygon]
+def _pieces(polygon: Sequence[Corner], triangles: Triangles) -> list[list[Corner]]:
+    """Return the remaining part of a polygon: the whole, perhaps reversed, or some triangles."""
     whole_polygon = _whole(triangles)
     if whole_polygon is not None:
-        vertices, is_turned = whole_polygon
-        pieces = [([*zip(vertices, textures, strict=True)], is_turned)]
+        pieces: list[Piece] = [(whole_polygon[0], polygon, whole_polygon[1])]
     else:
-        pieces = []
-        for index, triangle in enumerate(triangles, 1):
-            if triangle is not None:
-                of_corners = (textures[0], textures[index], textures[index + 1])
-                pieces.append(([*zip(triangle[0], of_corners, strict=True)], triangle[1]))
+        pieces = [
+            (triangle[0], (polygon[0], polygon[index], polygon[index + 1]), triangle[1])
+            for index, triangle in enumerate(triangles, 1)
+            if triangle is not None
+        ]
     rows = []
-    for corners, is_turned in pieces:
-        turned = [corners[0], *corners[:0:-1]] if is_turned else corners
-        rows.append("f " + " ".join(f"{vertex + 1}{texture}" for vertex, texture in turned))
+    for vertices, old, is_turned in pieces:
+        corners = [(new, *corner[1:]) for new, corner in zip(vertices, old, strict=True)]
+        rows.append([corners[0], *corners[:0:-1]] if is_turned else corners)
     return rows
 
 

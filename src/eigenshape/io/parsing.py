@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape._files import require_regular
-from eigenshape.io import glb, gmsh, medit, obj, off, ply, stl, vtk_legacy, vtu
+from eigenshape.io import glb, gmsh, medit, npz, obj, off, ply, stl, vtk_legacy, vtu
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.cells import SEGMENTS, Blocks, select_cells
 
@@ -20,6 +20,7 @@ PARSERS = {
     ".ply": ply.parse,
     ".stl": stl.parse,
     ".glb": glb.parse,
+    ".npz": npz.parse,
 }
 NAMES = {2: SEGMENTS, 3: "triangles"}
 # Formats that are parsed to points, and cells by kind.
@@ -82,6 +83,6 @@ def _blocks(
         points, simplices = PARSERS[suffix](data)
         return points, {NAMES[simplices.shape[1]]: simplices}
     if suffix == ".gltf":
-        points, simplices = glb.parse_text(data, path.parent)
+        points, simplices = glb.parse(data, path.parent)
         return points, {"triangles": simplices}
     return vtk_legacy.parse(data, cells) if suffix == ".vtk" else GRIDS[suffix](data)

@@ -26,6 +26,7 @@ from eigenshape.io.text import (
 
 AXES = ("x", "y", "z")
 CORNERS = ("vertex_indices", "vertex_index")
+TINTS = ("red", "green", "blue")
 LABEL = "label"  # the property of faces that holds the number of their part
 Table = dict[str, Any]  # the values of each column, by name
 
@@ -51,6 +52,30 @@ def _tables(data: bytes) -> dict[str, Table]:
     if header.order == TEXT:
         return _text_tables(lines_of(body, first=header.n_lines + 1), elements)
     return _binary_tables(body, elements, header.order)
+
+
+def read_attributes(data: bytes, mesh: TriangleMesh) -> tuple[np.ndarray | None, tuple[str, ...]]:
+    """Read colors of vertices, (n, 4) uint8 or None, and name the columns that nothing reads."""
+    elements = {element.name: element for element in parse_header(data).elements}
+    table = _tables(data)["vertex"]
+    known = {*AXES, *CORNERS}
+    colors = None
+    if {*TINTS} <= table.keys():
+        kinds = {column.name: column for column in elements["vertex"].columns}
+        names = [name for name in (*TINTS, "alpha") if name in table]
+        known |= {*names}
+        colors = np.full((mesh.n_vertices, 4), 255, np.uint8)
+        for place, name in enumerate(names):
+            scale = 1 if kinds[name].is_whole else 255
+            values = scale * np.asarray(table[name]).astype(np.float64)
+            colors[:, place] = np.rint(np.nan_to_num(values).clip(0, 255))
+    others = [
+        f"{column.name} of {element.name}"
+        for element in elements.values()
+        for column in element.columns
+        if element.count and column.name not in known
+    ]
+    return colors, tuple(others)
 
 
 def _lists(tables: dict[str, Table], name: str) -> Any:
@@ -313,7 +338,7 @@ def _header_text(
     colors: np.ndarray | None,
     face_labels: Int[np.ndarray, " f"] | None,
 ) -> bytes:
-    tints = [f"property uchar {name}" for name in ("red", "green", "blue") if colors is not None]
+    tints = [f"property uchar {name}" for name in TINTS if colors is not None]
     lines = [
         "ply", f"format {order} 1.0",
         f"element vertex {mesh.n_vertices}", *(f"property double {axis}" for axis in AXES), *tints,

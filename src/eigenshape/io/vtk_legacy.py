@@ -1,4 +1,4 @@
-"""Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID, without attribute data."""
+"""Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID, and functions on them."""
 
 from collections.abc import Sequence
 
@@ -17,6 +17,8 @@ KINDS = {
 }  # fmt: skip
 # Fewest points of a cell of each section.
 SECTIONS = {b"VERTICES": 1, b"LINES": 2, b"POLYGONS": 3, b"TRIANGLE_STRIPS": 3, b"CELLS": 1}
+DATA_SECTIONS = (b"POINT_DATA", b"CELL_DATA")
+WIDTHS = {b"VECTORS": 3, b"NORMALS": 3, b"TENSORS": 9}  # numbers a row
 DATASETS = (b"POLYDATA", b"UNSTRUCTURED_GRID")
 
 
@@ -130,13 +132,16 @@ def _sections(cursor: _Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[byte
     points, types = None, None
     lists: dict[bytes, CellLists] = {}
     seen: set[bytes] = set()
+    start = cursor.place
     while text := cursor.line():
         words = text.split()
         name = words[0].upper()
-        if name in (b"POINT_DATA", b"CELL_DATA"):
+        if name in DATA_SECTIONS:
+            cursor.place = start
             break
         n_words = {b"CELL_TYPES": 2}.get(name, 3)
         if len(words) != n_words or name not in (b"POINTS", b"CELL_TYPES", *SECTIONS):
+            start = cursor.place
             continue
         if name in seen:
             raise FileFormatError(f"A VTK file must have one section {name.decode()}; it has two.")
@@ -149,9 +154,53 @@ def _sections(cursor: _Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[byte
             types = cursor.wholes(count, b"int")
         else:
             lists[name] = _cells(cursor, name, count, _count(words[2]))
+        start = cursor.place
     if points is None:
         raise FileFormatError("A VTK file must have a section POINTS; it has none.")
     return points, types, lists
+
+
+def parse_fields(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return the functions on points and those on cells, by name; see `parse`.
+
+    Raises
+    ------
+    FileFormatError
+        If the content differs from the header.
+    """
+    cursor = _Cursor(data)
+    cursor.line()
+    _sections(cursor)
+    fields: dict[bytes, dict[str, np.ndarray]] = {name: {} for name in DATA_SECTIONS}
+    section, count = DATA_SECTIONS[0], 0
+    n_arrays = 0  # that the current FIELD still holds
+    while text := cursor.line():
+        words = text.split()
+        keyword = words[0].upper()
+        if n_arrays and len(words) == 4 and words[1].isdigit():
+            width, rows, kind = int(words[1]), _count(words[2]), words[3].lower()
+            name = words[0]
+            n_arrays -= 1
+        elif keyword in DATA_SECTIONS and len(words) == 2:
+            section, count = keyword, _count(words[1])
+            continue
+        elif keyword == b"FIELD" and len(words) == 3:
+            n_arrays = _count(words[2])
+            continue
+        elif keyword == b"SCALARS" and len(words) >= 3:
+            name, kind, rows = words[1], words[2].lower(), count
+            width = _count(words[3]) if len(words) > 3 else 1
+            cursor.line()  # LOOKUP_TABLE
+        elif keyword in WIDTHS and len(words) == 3:
+            name, kind, rows, width = words[1], words[2].lower(), count, WIDTHS[keyword]
+        else:
+            continue
+        values = cursor.numbers(rows * width, kind)
+        values = values.astype(values.dtype.newbyteorder("="))
+        held = fields[section]
+        held[name.decode("latin-1")] = values if width == 1 else values.reshape(-1, width)
+    of_points, of_cells = fields.values()
+    return of_points, of_cells
 
 
 def _polydata_cells(

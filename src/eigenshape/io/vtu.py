@@ -1,4 +1,4 @@
-"""XML files of unstructured grids; only points and cells are unpacked, after a check of sizes."""
+"""XML files of unstructured grids; only what is requested is unpacked, after a check of sizes."""
 
 import base64
 import binascii
@@ -166,6 +166,36 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarr
     FileFormatError
         If the content differs from the tags, or they declare more than the file can hold.
     """
+    piece, packing, n_points, n_cells = _parse_piece(data)
+    return _points(piece, packing, n_points), _cells(piece, packing, n_cells)
+
+
+def parse_fields(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return the functions on points and those on cells, by name; arrays of text are left out.
+
+    Raises
+    ------
+    FileFormatError
+        If the content differs from the tags, or they declare more than the file can hold.
+    """
+    piece, packing, n_points, n_cells = _parse_piece(data)
+    found: list[dict[str, np.ndarray]] = []
+    for section, count in (("PointData", n_points), ("CellData", n_cells)):
+        arrays = {}
+        for array in piece.findall(f"./{section}/DataArray"):
+            width = array.get("NumberOfComponents", "1")
+            if array.get("type") not in NUMBERS or not re.fullmatch(r"[0-9]{1,9}", width):
+                continue
+            values = packing.numbers(array, count * int(width))
+            values = values.astype(values.dtype.newbyteorder("="))
+            name = array.get("Name", section)
+            arrays[name] = values if width == "1" else values.reshape(count, int(width))
+        found.append(arrays)
+    return found[0], found[1]
+
+
+def _parse_piece(data: bytes) -> tuple[ElementTree.Element, _Packing, int, int]:
+    """Return the one piece that has cells, its encoding, and its numbers of points and cells."""
     root, packing = _parse_tags(data)
     pieces = root.findall("./UnstructuredGrid/Piece")
     counts = [(piece.get("NumberOfPoints", ""), piece.get("NumberOfCells", "")) for piece in pieces]
@@ -182,8 +212,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarr
         )
     piece = filled[0] if filled else pieces[0]
     n_points, n_cells = int(piece.get("NumberOfPoints", "")), int(piece.get("NumberOfCells", ""))
-    points = _points(piece, packing, n_points)
-    return points, _cells(piece, packing, n_cells)
+    return piece, packing, n_points, n_cells
 
 
 def _parse_tags(data: bytes) -> tuple[ElementTree.Element, _Packing]:

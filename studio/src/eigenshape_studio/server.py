@@ -5,6 +5,7 @@ import secrets
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import anyio.to_thread
@@ -196,5 +197,11 @@ def _first_workspace(
         creature = es.make_creature("quadruped", n_vertices=2500)
         return Workspace(creature, "quadruped", index=index, shared=True)
     if isinstance(mesh, str | Path):
-        return Workspace(es.io.read_surface(mesh).mesh, Path(mesh).name, index=index, shared=True)
+        path, surface = Path(mesh), es.io.read_surface(mesh).mesh
+        first = Workspace(surface, path.name, index=index, shared=True)
+        if path.suffix.lower() in (".glb", ".gltf", ".obj", ".ply"):
+            with suppress(es.FileFormatError):  # points have no attributes
+                attributes = es.read_mesh(path, attributes=True)[1]
+                first.attributes = es.io.carry_attributes(attributes, surface)
+        return first
     return Workspace(mesh, index=index, shared=True)

@@ -4,7 +4,7 @@ import json
 import threading
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -102,6 +102,8 @@ class Workspace:
         shared: bool = False,
     ) -> None:
         surface = es.as_mesh(mesh)
+        # What the file of the shape holds besides; whoever reads a file may set it.
+        self.attributes: es.io.MeshAttributes | None = None
         self.fields = _fields(values or {}, surface.n_vertices)
         title = display_name(name)
         self.analysis = Analysis(surface, title, n_modes=n_modes, shared=shared)
@@ -334,7 +336,9 @@ class Workspace:
                 session = self._require_session()
                 es.io.write_edits(session.edits, self.analysis.mesh, path)
             else:
-                es.write_mesh(self.mesh, path)
+                # A file of materials beside an OBJ file would not be sent.
+                kept = None if tail == "obj" else self.attributes
+                es.write_mesh(self.mesh, path, attributes=kept)
             return np.frombuffer(path.read_bytes(), np.uint8)
 
     def _require_session(self) -> es.DeformationSession:
@@ -496,7 +500,9 @@ class Workspace:
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise RequestError("names must be a list of the names of repairs.")
         done, side = es.repair(self.mesh, names), self.analysis.side
+        kept = self.attributes and replace(self.attributes, mesh=self.mesh)
         self._show(done.mesh, self.analysis.name)
+        self.attributes = kept and es.io.carry_attributes(kept, done.mesh)
         self.analysis.look_from(*side)
         self._warnings += done.report
 
@@ -534,6 +540,7 @@ class Workspace:
         self.analysis.cancel()
         self.analysis = Analysis(mesh, name)
         self.session, self.bound, self.mode, self.fields = None, None, "graded", {}
+        self.attributes = None
         self.pose += 1
         self.shape += 1
 

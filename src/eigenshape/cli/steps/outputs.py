@@ -3,19 +3,16 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from jaxtyping import Float
+from jaxtyping import Float, Int, UInt8
 from matplotlib.figure import Figure
 from numpy import ndarray
 
-from eigenshape._errors import InvalidParameterError
-from eigenshape._files import read_regular, replace_file
-from eigenshape.cli.console import print_written
+from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape.cli.console import err, escape_text, print_written
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.mesh_files import WRITTEN, write_mesh
-from eigenshape.io.obj_sheet import format_sheet, read_sheet
+from eigenshape.io.attributes import carry_attributes
+from eigenshape.io.mesh_files import WITH_ATTRIBUTES, WRITTEN, read_mesh, save_mesh
 from eigenshape.plot.save import require_picture_path, save_figure
-
-OBJ = ".obj"
 
 
 def require_picture(path: Path | None) -> None:
@@ -51,25 +48,39 @@ def require_output(path: Path | None, suffixes: Sequence[str], what: str) -> Non
 
 
 def save_like(
-    source: Path, mesh: TriangleMesh, path: Path, moved: Float[ndarray, "n 3"] | None = None
+    source: Path,
+    mesh: TriangleMesh,
+    path: Path,
+    moved: Float[ndarray, "n 3"] | None = None,
+    *,
+    colors: UInt8[ndarray, "n 3"] | None = None,
+    face_labels: Int[ndarray, " f"] | None = None,
 ) -> None:
-    """Write a mesh and print so on stderr. From OBJ to OBJ, polygons, textures and groups are kept.
+    """Write a mesh with all else that its file holds, and print so, and what is lost, on stderr.
 
     Parameters
     ----------
     source : Path
         The file that the mesh was read from.
     mesh : TriangleMesh
-        After repairs, which leave vertices in place.
+        After repairs.
     path : Path
     moved : (n, 3) float, optional
         Where its vertices are to be written.
+    colors, face_labels : optional
+        Colors and labels to write, as in `write_mesh`.
     """
-    if source.suffix.lower() == path.suffix.lower() == OBJ:
-        replace_file(path, format_sheet(read_sheet(read_regular(source)), mesh, moved))
-    else:
-        write_mesh(mesh if moved is None else TriangleMesh(moved, mesh.faces), path)
+    attributes = None
+    if source.suffix.lower() in WITH_ATTRIBUTES:
+        try:
+            attributes = carry_attributes(read_mesh(source, attributes=True)[1], mesh)
+        except FileFormatError as error:  # the shape was read; only the rest is broken
+            err.print(f"[yellow]lost:[/] all but the shape. {escape_text(error)}")
+    written = mesh if moved is None else TriangleMesh(moved, mesh.faces)
+    lost = save_mesh(written, path, colors=colors, face_labels=face_labels, attributes=attributes)
     print_written(path)
+    if lost:
+        err.print(f"[yellow]lost:[/] {escape_text(lost)}")
 
 
 def save_picture(figure: Figure, path: Path) -> None:

@@ -8,12 +8,12 @@ import numpy as np
 from jaxtyping import Int, UInt8
 
 from eigenshape.cli.console import print_table, print_written
-from eigenshape.cli.steps.outputs import require_output
+from eigenshape.cli.steps.outputs import require_output, save_like
 from eigenshape.features.segmentation import Segmentation
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.labels import write_labels
-from eigenshape.io.mesh_files import write_mesh
+from eigenshape.io.mesh_files import LABELED, write_mesh
 from eigenshape.plot.fields import part_colors
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 from eigenshape.retrieval.labels.transfer import LabelTransfer
@@ -33,12 +33,12 @@ SHOWN: dict[str, Callable[[Any], str]] = {
 
 def require_colored_path(path: Path | None) -> None:
     """Raise an error if no mesh with colors can be written to a path, before any work is done."""
-    require_output(path, (".ply",), "A mesh with colors")
+    require_output(path, LABELED, "A mesh with colors")
 
 
 def require_label_path(path: Path | None) -> None:
     """Raise an error if no labels can be written to a path, before any work is done."""
-    require_output(path, (".ply", *LABEL_LISTS), "A mesh with labels")
+    require_output(path, (*LABELED, *LABEL_LISTS), "A mesh with labels")
 
 
 def save_colors(mesh: TriangleMesh, colors: UInt8[np.ndarray, "n 3"], path: Path) -> None:
@@ -48,17 +48,18 @@ def save_colors(mesh: TriangleMesh, colors: UInt8[np.ndarray, "n 3"], path: Path
 
 
 def save_labels(
+    source: Path,
     mesh: TriangleMesh,
     labels: Int[np.ndarray, " f"],
     colors: UInt8[np.ndarray, "n 3"],
     path: Path,
 ) -> None:
-    """Write labels of faces, with the mesh and its colors (.ply) or alone, and print so on stderr."""
+    """Write labels of faces, with the mesh of a file or alone, and print so on stderr."""
     if path.suffix.lower() in LABEL_LISTS:
         write_labels(labels, path)
+        print_written(path)
     else:
-        write_mesh(mesh, path, colors=colors, face_labels=labels)
-    print_written(path)
+        save_like(source, mesh, path, colors=colors, face_labels=labels)
 
 
 def label_colors(

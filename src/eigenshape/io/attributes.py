@@ -1,0 +1,258 @@
+"""What a mesh file holds besides positions and faces: texture coordinates, materials, colors, groups."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from scipy.spatial import cKDTree
+
+from eigenshape._arrays import freeze
+from eigenshape._text import html_repr, short_repr
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.mesh import TriangleMesh
+
+# Weight of the directions of faces beside their places, in units of the size of the mesh: it only
+# tells the two sides of a sheet apart.
+DIRECTION = 1e-3
+SAME_NORMAL = 1000  # steps from 0 to 1; normals that agree to a step are one
+
+
+@dataclass(frozen=True)
+class Material:
+    """The color of a surface, and perhaps an image on it.
+
+    Attributes
+    ----------
+    name : str
+    color : tuple of four float
+        Red, green, blue (sRGB, as on a screen) and opacity, from 0 to 1.
+    image : bytes, optional
+        The PNG or JPEG file of the base color.
+    image_name : str
+        Name of the image file, without a folder.
+    """
+
+    name: str = ""
+    color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    image: bytes | None = field(default=None, repr=False)
+    image_name: str = ""
+
+    _repr_html_ = html_repr
+
+
+@dataclass(frozen=True, eq=False)
+class SourceFile:
+    """A mesh file as it was read, of which a file of the same format is made again."""
+
+    path: Path
+    suffix: str
+    data: bytes = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshAttributes:
+    r"""What a mesh file holds besides positions and faces.
+
+    `read_mesh(path, attributes=True)` returns it, `carry_attributes` carries it to a repaired mesh,
+    and `write_mesh(mesh, path, attributes=...)` writes it.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        The mesh that the attributes belong to.
+    corners : (f, 3) int
+        For each corner of a face, the corner of the file that it comes from: 3 times its face, plus
+        0, 1 or 2.
+    texture_coordinates : (f, 3, 2) float, optional
+        At each corner of a face; v goes up, as in OBJ.
+    normals : (f, 3, 3) float, optional
+        At each corner, as in the file.
+    colors : (f, 3, 4) uint8, optional
+        Red, green, blue (sRGB) and opacity at each corner.
+    face_materials, face_groups : (f,) int
+        Number of the material and the group of each face; -1 for none.
+    materials : tuple of Material
+    groups : tuple of str
+        Names of groups (OBJ) or nodes (glTF).
+    others : tuple of str
+        Names of further content, which only a file of the same format keeps.
+    source : SourceFile, optional
+        The file.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "a.obj")
+    >>> _ = path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n")
+    >>> mesh, attributes = es.read_mesh(path, attributes=True)
+    >>> attributes.texture_coordinates[0].tolist()
+    [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
+    """
+
+    mesh: TriangleMesh
+    corners: Int[np.ndarray, "f 3"]
+    face_materials: Int[np.ndarray, " f"]
+    face_groups: Int[np.ndarray, " f"]
+    texture_coordinates: Float[np.ndarray, "f 3 2"] | None = None
+    normals: Float[np.ndarray, "f 3 3"] | None = None
+    colors: UInt8[np.ndarray, "f 3 4"] | None = None
+    materials: tuple[Material, ...] = ()
+    groups: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+    source: SourceFile | None = None
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for name, value in [*vars(self).items()]:
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, name, freeze(value))
+
+    @property
+    def contents(self) -> dict[str, bool]:
+        """What there may be besides positions and faces, and whether there is."""
+        used = {self.materials[number] for number in np.unique(self.face_materials) if number >= 0}
+        return {
+            "texture coordinates": self.texture_coordinates is not None,
+            "normals": self.normals is not None,
+            "vertex colors": self.colors is not None,
+            "materials": bool(used),
+            "images": any(material.image for material in used),
+            "names of groups": any(self.groups),
+        }
+
+
+def plain_attributes(mesh: TriangleMesh) -> MeshAttributes:
+    """Return the attributes of a mesh of which nothing but positions and faces is known."""
+    none = np.full(mesh.n_faces, -1)
+    corners = np.arange(3 * mesh.n_faces).reshape(-1, 3)
+    return MeshAttributes(mesh, corners, none, none.copy())
+
+
+def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttributes:
+    """Carry the attributes of a mesh to a repaired one, from face to face.
+
+    Each face takes the attributes of the old face that lies nearest to it, and each corner those of
+    the nearest corner of that face. So faces and vertices may have been dropped, welded, reordered
+    or turned over, and new faces, such as those of a filled hole, look as what is beside them.
+
+    Parameters
+    ----------
+    attributes : MeshAttributes
+        Of the mesh before the repair.
+    mesh : MeshLike
+        The mesh after the repair, and before it is bent.
+
+    Returns
+    -------
+    MeshAttributes
+        Of `mesh`.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "a.ply")
+    >>> es.write_mesh(es.icosphere(1), path)
+    >>> mesh, attributes = es.read_mesh(path, attributes=True)
+    >>> done = es.repair(es.TriangleMesh(mesh.vertices, mesh.faces[5:]), ["fill_holes"])
+    >>> es.io.carry_attributes(attributes, done.mesh).mesh.n_faces == done.mesh.n_faces
+    True
+    """
+    mesh = as_mesh(mesh)
+    old = attributes.mesh
+    if np.array_equal(old.faces, mesh.faces) and np.array_equal(old.vertices, mesh.vertices):
+        return attributes
+    size = float(np.abs(old.vertices).max()) or 1.0
+    places = old.vertices[old.faces] / size
+    wanted = mesh.vertices[mesh.faces] / size
+    faces = cKDTree(_face_keys(places)).query(_face_keys(wanted))[1]
+    gaps = np.linalg.norm(wanted[:, :, None] - places[faces][:, None], axis=3)  # (f, 3, 3)
+    corners = (3 * faces[:, None] + gaps.argmin(axis=2)).ravel()
+    taken = {
+        name: values.reshape(-1, *values.shape[2:])[corners].reshape(-1, 3, *values.shape[2:])
+        for name in ("corners", "texture_coordinates", "normals", "colors")
+        if (values := getattr(attributes, name)) is not None
+    }
+    return replace(
+        attributes,
+        mesh=mesh,
+        face_materials=attributes.face_materials[faces],
+        face_groups=attributes.face_groups[faces],
+        **taken,
+    )
+
+
+def _face_keys(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 6"]:
+    """Return the middle and the direction of each face, of which the direction weighs little."""
+    vectors = area_vectors(corners)
+    return np.column_stack([corners.mean(axis=1), DIRECTION * unit_rows(vectors)])
+
+
+def label_attributes(
+    attributes: MeshAttributes, labels: Int[np.ndarray, " f"], colors: UInt8[np.ndarray, "n 3"]
+) -> MeshAttributes:
+    """Replace the materials by one for every label, in the color of its vertices."""
+    distinct, numbers = np.unique(labels, return_inverse=True)
+    tints = colors[attributes.mesh.faces]  # (f, 3, 3)
+    materials = []
+    for number, label in enumerate(distinct.tolist()):
+        # Vertices at the border of a part may have the color of its neighbor.
+        red, green, blue = np.median(tints[numbers == number].reshape(-1, 3), axis=0) / 255
+        materials.append(Material(f"part_{label}", (float(red), float(green), float(blue), 1.0)))
+    return replace(
+        attributes,
+        face_materials=numbers.ravel(),
+        materials=tuple(materials),
+        colors=None,
+    )
+
+
+def corner_normals(
+    attributes: MeshAttributes, mesh: TriangleMesh
+) -> Float[np.ndarray, "f 3 3"] | None:
+    """Compute the normals of a bent mesh at corners; None if the file had none.
+
+    Corners at one place that had one normal get one again, so that creases stay sharp and seams of
+    the texture stay smooth.
+    """
+    if attributes.normals is None:
+        return None
+    _, places = np.unique(attributes.mesh.vertices, axis=0, return_inverse=True)
+    steps = np.rint(attributes.normals.reshape(-1, 3) * SAME_NORMAL)
+    keys = np.column_stack([places.ravel()[attributes.mesh.faces.ravel()], steps])
+    _, groups = np.unique(keys, axis=0, return_inverse=True)
+    vectors = np.repeat(area_vectors(mesh.vertices[mesh.faces]), 3, axis=0)
+    sums = [np.bincount(groups.ravel(), weights=column) for column in vectors.T]
+    normals = unit_rows(np.column_stack(sums)[groups.ravel()])
+    # A corner of faces without area keeps its old normal.
+    old = attributes.normals.reshape(-1, 3)
+    return np.where(normals.any(axis=1, keepdims=True), normals, old).reshape(-1, 3, 3)
+
+
+def unit_rows(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """Give vectors the length 1, and leave those of length 0."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1.0)
+
+
+def loss_sentence(names: Sequence[str], path: Path) -> str:
+    """Name in one sentence what a written file does not keep; empty if it keeps everything."""
+    return f"{path.name} does not keep: {', '.join(dict.fromkeys(names))}." if names else ""
+
+
+def linear_colors(colors: Float[np.ndarray, "*rows"]) -> Float[np.ndarray, "*rows"]:
+    """Convert sRGB from 0 to 1 to linear light, which glTF stores (IEC 61966-2-1)."""
+    return np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+
+
+def screen_colors(light: Float[np.ndarray, "*rows"]) -> Float[np.ndarray, "*rows"]:
+    """Convert linear light to sRGB: the inverse of `linear_colors`."""
+    light = light.clip(0.0, 1.0)
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)

@@ -1,0 +1,495 @@
+"""Attributes of glTF files: read, written again beside all else that a file holds, or written anew."""
+
+import copy
+import json
+import mimetypes
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import FileFormatError
+from eigenshape._files import read_regular
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.attributes import (
+    Material,
+    MeshAttributes,
+    SourceFile,
+    corner_normals,
+    linear_colors,
+    screen_colors,
+    unit_rows,
+)
+from eigenshape.io.glb import pack, read_gltf, read_scene
+from eigenshape.io.gltf import (
+    SURFACES,
+    Gltf,
+    Scene,
+    decode_buffers,
+    file_beside,
+    raw_accessor,
+    read_accessor,
+)
+from eigenshape.io.stl import single_precision
+
+COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+# What a document may hold besides a scene with materials.
+EXTRAS = ("skins", "animations", "cameras", "extensions")
+TANGENTS = "tangents, which viewers compute anew"
+DRACO = "KHR_draco_mesh_compression"
+
+
+def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
+    """Return the attributes of the triangles of a scene, by face as in the mesh that was read."""
+    gltf, scene = _open(source)
+    n_faces = len(scene.piece.faces)
+    corner_rows = scene.piece.rows[scene.piece.faces]
+    found: dict[str, np.ndarray] = {}
+    materials = [_material(gltf, source, entry) for entry in gltf.tree.get("materials", [])]
+    face_materials = np.full(n_faces, -1)
+    for _, primitive, chosen in _placed_primitives(gltf, scene):
+        named = primitive["attributes"]
+        number = primitive.get("material", -1)
+        face_materials[chosen] = number
+        coordinate = f"TEXCOORD_{_texture(gltf, number).get('texCoord', 0)}"
+        columns = {"normals": ("NORMAL", (3,)), "texture_coordinates": (coordinate, (2,)),
+                   "colors": ("COLOR_0", (3, 4))}  # fmt: skip
+        for key, (name, widths) in columns.items():
+            if name not in named:
+                continue
+            width = raw_accessor(gltf, named[name]).shape[1]
+            if width not in widths:
+                raise FileFormatError(
+                    f"{name} of a primitive must have {widths[0]} numbers each; it has {width}."
+                )
+            rows = read_accessor(gltf, named[name], width)
+            if key == "colors" and width == 3:
+                rows = np.column_stack([rows, np.ones(len(rows))])
+            default = 1.0 if key == "colors" else 0.0
+            table = found.setdefault(key, np.full((n_faces, 3, max(widths)), default))
+            table[chosen] = _take(rows, corner_rows[chosen], name)
+    if "texture_coordinates" in found:
+        found["texture_coordinates"][..., 1] = 1.0 - found["texture_coordinates"][..., 1]
+    if "colors" in found:
+        found["colors"][..., :3] = screen_colors(found["colors"][..., :3])
+        found["colors"] = np.rint(255 * found["colors"].clip(0, 1)).astype(np.uint8)
+    owners = np.array(list(scene.matrices), dtype=np.int64)
+    names = [_node_name(gltf, int(node)) for node in owners]
+    groups = np.searchsorted(np.sort(owners), scene.nodes)
+    return MeshAttributes(
+        mesh=mesh,
+        corners=np.arange(3 * n_faces).reshape(-1, 3),
+        face_materials=face_materials,
+        face_groups=np.argsort(owners)[groups],
+        materials=tuple(materials),
+        groups=tuple(names),
+        others=_others(gltf),
+        source=source,
+        **found,
+    )
+
+
+def _open(source: SourceFile) -> tuple[Gltf, Scene]:
+    gltf = read_gltf(source.data, source.path.parent if source.suffix == ".gltf" else None)
+    return gltf, read_scene(gltf)
+
+
+def _placed_primitives(
+    gltf: Gltf, scene: Scene
+) -> Iterator[tuple[int, dict[str, Any], Int[np.ndarray, " k"]]]:
+    """Give each primitive of each node, with its faces."""
+    for node in scene.matrices:
+        primitives = gltf.entry("meshes", gltf.entry("nodes", node)["mesh"])["primitives"]
+        for number, primitive in enumerate(primitives):
+            chosen = (scene.nodes == node) & (scene.piece.primitives == number)
+            if chosen.any():
+                yield node, primitive, np.flatnonzero(chosen)
+
+
+def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
+    if corners.max() >= len(rows):
+        raise FileFormatError(
+            f"{name} of a primitive must have a row for each position; it has {len(rows)}, and row "
+            f"{corners.max()} is used."
+        )
+    return rows[corners]
+
+
+def _texture(gltf: Gltf, material: int) -> dict[str, Any]:
+    if material < 0:
+        return {}
+    pbr = gltf.entry("materials", material).get("pbrMetallicRoughness", {})
+    texture: dict[str, Any] = pbr.get("baseColorTexture", {})
+    return texture
+
+
+def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material:
+    pbr = entry.get("pbrMetallicRoughness", {})
+    *light, alpha = pbr.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])
+    red, green, blue = screen_colors(np.array(light, dtype=np.float64)).tolist()
+    image, image_name = None, ""
+    if "baseColorTexture" in pbr:
+        texture = gltf.entry("textures", pbr["baseColorTexture"].get("index"))
+        if "source" in texture:
+            number = texture["source"]
+            held = gltf.entry("images", number)
+            image, kind = _image(gltf, source, held)
+            ending = ".jpg" if kind == "image/jpeg" else mimetypes.guess_extension(kind) or ""
+            stem = Path(str(held.get("name") or held.get("uri", "")[:80])).name
+            stem = Path(stem).stem if not stem.startswith("data:") else ""
+            image_name = f"{stem or f'image{number}'}{ending}"
+    return Material(str(entry.get("name", "")), (red, green, blue, alpha), image, image_name)
+
+
+def _image(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> tuple[bytes | None, str]:
+    """Return the bytes of an image, None if its file is missing, and its type."""
+    if "bufferView" in entry:
+        return _view_bytes(gltf, entry["bufferView"]), entry.get("mimeType", "image/png")
+    uri = str(entry.get("uri", ""))
+    kind = entry.get("mimeType") or mimetypes.guess_type(uri)[0] or "image/png"
+    if uri.startswith("data:"):
+        return decode_buffers({"buffers": [{"uri": uri}]}, b"")[0], uri[5:].partition(";")[
+            0
+        ] or kind
+    try:
+        return read_regular(file_beside(0, uri, source.path.parent), "an image"), kind
+    except (OSError, FileFormatError):
+        return None, kind
+
+
+def _view_bytes(gltf: Gltf, index: int) -> bytes:
+    view = gltf.entry("bufferViews", index)
+    start = view.get("byteOffset", 0)
+    return bytes(gltf.buffers[view["buffer"]][start : start + view["byteLength"]])
+
+
+def _node_name(gltf: Gltf, node: int) -> str:
+    entry = gltf.entry("nodes", node)
+    return str(entry.get("name") or gltf.entry("meshes", entry["mesh"]).get("name", ""))
+
+
+def _others(gltf: Gltf) -> tuple[str, ...]:
+    """Name what only a glTF file keeps."""
+    tree = gltf.tree
+    names = [kind for kind in EXTRAS if tree.get(kind)]
+    primitives = [part for mesh in tree.get("meshes", []) for part in mesh.get("primitives", [])]
+    if any("targets" in part for part in primitives):
+        names.append("morph targets")
+    if any(part.get("mode", 4) not in SURFACES for part in primitives):
+        names.append("lines and points")
+    plain_pbr = {"baseColorFactor", "baseColorTexture", "metallicFactor"}
+    for entry in tree.get("materials", []):
+        pbr = entry.get("pbrMetallicRoughness", {})
+        is_metal = pbr.get("metallicFactor", 1.0) != 0.0  # our own files say 0
+        is_clear = pbr.get("baseColorFactor", [1.0])[-1] < 1
+        plain = {"name", "pbrMetallicRoughness", *(["alphaMode"] if is_clear else [])}
+        if is_metal or set(entry) - plain or set(pbr) - plain_pbr:
+            names.append("properties of materials other than color and image")
+            break
+    if len(tree.get("nodes", [])) > len(tree.get("meshes", [])):
+        names.append("nodes without a mesh")
+    return tuple(names)
+
+
+class _Document:
+    """A glTF tree and its one buffer, to which accessors are added."""
+
+    def __init__(self, tree: dict[str, Any], binary: bytes = b"") -> None:
+        self.tree, self.pieces, self.length = tree, [binary], len(binary)
+
+    def add_view(self, data: bytes, **entry: Any) -> int:
+        padding = -self.length % 4
+        self.pieces += [b"\0" * padding, data]
+        views = self.tree.setdefault("bufferViews", [])
+        start = self.length + padding
+        views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data), **entry})
+        self.length = start + len(data)
+        return len(views) - 1
+
+    def add_accessor(self, rows: np.ndarray, *, name: str = "", normalized: bool = False) -> int:
+        """Add the rows of an attribute, or without a name indices."""
+        kind = rows.dtype.str[1:]
+        size = rows.dtype.itemsize * rows.shape[1]
+        entry: dict[str, Any] = {
+            "componentType": COMPONENTS[kind],
+            "count": len(rows),
+            "type": TYPES[rows.shape[1]],
+        }
+        if name:
+            step = size + -size % 4  # rows of attributes begin at multiples of four bytes
+            padded = np.zeros((len(rows), step), np.uint8)
+            padded[:, :size] = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), size)
+            entry["bufferView"] = self.add_view(padded.tobytes(), byteStride=step, target=34962)
+        else:
+            entry["bufferView"] = self.add_view(rows.tobytes(), target=34963)
+        if name == "POSITION":
+            entry |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+        if normalized:
+            entry["normalized"] = True
+        accessors = self.tree.setdefault("accessors", [])
+        accessors.append(entry)
+        return len(accessors) - 1
+
+    def pack(self) -> bytes:
+        """Write the document, without the parts of its buffer that nothing uses."""
+        views, binary = self.tree.get("bufferViews", []), b"".join(self.pieces)
+        users = list(_view_users(self.tree))
+        used = sorted({user["bufferView"] for user in users})
+        kept: list[bytes] = []
+        length = 0
+        for index in used:
+            view = views[index]
+            start = view.get("byteOffset", 0)
+            data = binary[start : start + view["byteLength"]]
+            view["byteOffset"] = length
+            kept += [data, b"\0" * (-len(data) % 4)]
+            length += len(data) + -len(data) % 4
+        places = {index: place for place, index in enumerate(used)}
+        for user in users:
+            user["bufferView"] = places[user["bufferView"]]
+        self.tree["bufferViews"] = [views[index] for index in used]
+        self.tree["buffers"] = [{"byteLength": length}]
+        return pack(self.tree, b"".join(kept))
+
+
+def _view_users(value: Any) -> Iterator[dict[str, Any]]:
+    """Give all objects of a tree that name a view; extensions do so by the same key."""
+    if isinstance(value, dict):
+        if type(value.get("bufferView")) is int:
+            yield value
+        value = list(value.values())
+    if isinstance(value, list):
+        for part in value:
+            yield from _view_users(part)
+
+
+def rewrite(
+    source: SourceFile, attributes: MeshAttributes, mesh: TriangleMesh
+) -> tuple[bytes, list[str]]:
+    """Write a glTF file again as GLB with other positions and triangles, and name what is lost.
+
+    Everything else in the file stays as it is: nodes, materials, images, skins, animations and
+    extensions. Every attribute of vertices is carried, whatever it means, but tangents.
+    """
+    gltf, scene = _open(source)
+    lost: list[str] = []
+    document = _copy_document(gltf, source, lost)
+    old_faces, old_corners = np.divmod(attributes.corners, 3)
+    rows = scene.piece.rows[scene.piece.faces[old_faces, old_corners]]
+    owners = old_faces[:, 0]
+    places, normals = (
+        single_precision(mesh, "GLB").astype(np.float64),
+        corner_normals(attributes, mesh),
+    )
+    written: dict[int, list[dict[str, Any]]] = {}
+    old_entries: list[dict[str, Any]] = []
+    for node, matrix in scene.matrices.items():
+        primitives = gltf.entry("meshes", gltf.entry("nodes", node)["mesh"])["primitives"]
+        # A reflection turns triangles over, and the reader has turned them back.
+        is_mirrored = np.linalg.slogdet(matrix[:3, :3])[0] < 0
+        order = [2, 1, 0] if is_mirrored else [0, 1, 2]
+        written[node] = [part for part in primitives if part.get("mode", 4) not in SURFACES]
+        for numbers in _sharing(primitives):
+            shared = primitives[numbers[0]]
+            old_entries += [primitives[number] for number in numbers]
+            in_family = (scene.nodes == node) & np.isin(scene.piece.primitives, numbers)
+            chosen = np.flatnonzero(in_family[owners])
+            if not chosen.size:
+                continue
+            columns = [rows[chosen][:, order].ravel(), mesh.faces[chosen][:, order].ravel()]
+            normal = None
+            if normals is not None and "NORMAL" in shared["attributes"]:
+                normal = normals[chosen][:, order].reshape(-1, 3)
+            first, indices = _split_corners(columns, normal)
+            old_rows, vertices = columns[0][first], columns[1][first]
+            table: dict[str, Any] = {}
+            for name, index in shared["attributes"].items():
+                if name == "POSITION":
+                    local = (places[vertices] - matrix[:3, 3]) @ np.linalg.pinv(matrix[:3, :3]).T
+                    table[name] = document.add_accessor(local.astype("<f4"), name=name)
+                elif name == "NORMAL" and normal is not None:
+                    local = unit_rows(normal[first] @ matrix[:3, :3])
+                    table[name] = document.add_accessor(local.astype("<f4"), name=name)
+                elif name == "TANGENT":
+                    lost.append(TANGENTS)
+                else:
+                    table[name] = _gather(document, gltf, index, old_rows, name)
+            targets = [
+                {
+                    key: _gather(document, gltf, index, old_rows, key)
+                    for key, index in target.items()
+                }
+                for target in shared.get("targets", [])
+            ]
+            for number in numbers:
+                of_part = np.repeat(scene.piece.primitives[owners[chosen]] == number, 3)
+                if not of_part.any():
+                    continue
+                entry = copy.deepcopy(primitives[number])
+                entry.pop("mode", None)
+                entry.get("extensions", {}).pop(DRACO, None)
+                entry |= {"attributes": table, "indices": document.add_accessor(indices[of_part])}
+                if targets:
+                    entry["targets"] = targets
+                written[node].append(entry)
+    _replace_meshes(document, written, old_entries)
+    return document.pack(), lost
+
+
+def _sharing(primitives: list[dict[str, Any]]) -> list[list[int]]:
+    """Return the numbers of surfaces that share their vertices and differ in material alone."""
+    families: dict[str, list[int]] = {}
+    for number, part in enumerate(primitives):
+        if part.get("mode", 4) in SURFACES:
+            key = json.dumps([part["attributes"], part.get("targets")], sort_keys=True)
+            families.setdefault(key, []).append(number)
+    return list(families.values())
+
+
+def _split_corners(
+    columns: list[np.ndarray], normals: Float[np.ndarray, "c 3"] | None
+) -> tuple[Int[np.ndarray, " n"], np.ndarray]:
+    """Make one vertex of all corners that agree; return its first corner, and the indices."""
+    keys = columns + ([] if normals is None else list(np.rint(normals.T * 1e5)))
+    _, first, indices = np.unique(
+        np.column_stack(keys), axis=0, return_index=True, return_inverse=True
+    )
+    kind = "<u2" if len(first) < 2**16 - 1 else "<u4"
+    return first, indices.astype(kind).reshape(-1, 1)
+
+
+def _gather(document: "_Document", gltf: Gltf, index: int, rows: np.ndarray, name: str) -> int:
+    normalized = gltf.entry("accessors", index).get("normalized") is True
+    taken = _take(raw_accessor(gltf, index), rows, name)
+    return document.add_accessor(taken, name=name, normalized=normalized)
+
+
+def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document:
+    """Copy a tree, with all buffers and images of other files in one buffer."""
+    tree = copy.deepcopy(gltf.tree)
+    starts, binary = [], b""
+    for data in gltf.buffers:
+        starts.append(len(binary))
+        binary += bytes(data) + b"\0" * (-len(data) % 4)
+    for view in tree.get("bufferViews", []):
+        view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
+        view["buffer"] = 0
+    document = _Document(tree, binary)
+    for entry in tree.get("images", []):
+        uri = str(entry.get("uri", "data:"))
+        if uri.startswith("data:"):
+            continue
+        data_of_file, kind = _image(gltf, source, entry)
+        if data_of_file is None:
+            lost.append(f"the image {uri[:80]!r}, which is not in the folder of the file")
+            continue
+        del entry["uri"]
+        entry.setdefault("name", Path(uri).name)
+        entry |= {"bufferView": document.add_view(data_of_file), "mimeType": kind}
+    return document
+
+
+def _replace_meshes(
+    document: _Document, written: dict[int, list[dict[str, Any]]], old: list[dict[str, Any]]
+) -> None:
+    """Give each node a mesh of its new primitives, and empty the accessors of the old ones."""
+    tree = document.tree
+    users: dict[int, list[int]] = {}
+    for node, entry in enumerate(tree["nodes"]):
+        users.setdefault(entry.get("mesh", -1), []).append(node)
+    originals = copy.deepcopy(tree["meshes"])
+    for node, primitives in written.items():
+        index = tree["nodes"][node]["mesh"]
+        if not primitives:
+            del tree["nodes"][node]["mesh"]  # all its faces were dropped
+            tree["nodes"][node].pop("skin", None)
+            continue
+        mesh = {**originals[index], "primitives": primitives}
+        if users[index][0] == node:
+            tree["meshes"][index] = mesh
+        else:  # several nodes shared a mesh, and each has its own positions now
+            tree["meshes"].append(mesh)
+            tree["nodes"][node]["mesh"] = len(tree["meshes"]) - 1
+    still_used = {
+        index
+        for mesh in tree["meshes"]
+        for part in mesh["primitives"]
+        for index in _accessors_of(part)
+    }
+    for animation in tree.get("animations", []):
+        still_used |= {s[key] for s in animation.get("samplers", []) for key in ("input", "output")}
+    still_used |= {skin.get("inverseBindMatrices") for skin in tree.get("skins", [])}
+    before = {index for part in old for index in _accessors_of(part)}
+    for index in before - still_used:
+        for key in ("bufferView", "byteOffset", "sparse", "min", "max"):
+            tree["accessors"][index].pop(key, None)  # its data are left out when packed
+
+
+def _accessors_of(part: dict[str, Any]) -> list[int]:
+    values = [part.get("indices"), *part["attributes"].values()]
+    values += [index for target in part.get("targets", []) for index in target.values()]
+    return [index for index in values if type(index) is int]
+
+
+def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
+    """Write a GLB file with a node for each group and a primitive for each of its materials."""
+    document = _Document({"asset": {"version": "2.0", "generator": "eigenshape"}, "scene": 0})
+    tree = document.tree
+    tree |= {"scenes": [{"nodes": []}], "nodes": [], "meshes": []}
+    places, normals = single_precision(mesh, "GLB"), corner_normals(attributes, mesh)
+    if attributes.materials:
+        tree["materials"] = [_write_material(document, m) for m in attributes.materials]
+    tables: dict[str, np.ndarray] = {}
+    if normals is not None:
+        tables["NORMAL"] = normals.astype("<f4")
+    if attributes.texture_coordinates is not None:
+        tables["TEXCOORD_0"] = ([0, 1] + attributes.texture_coordinates * [1, -1]).astype("<f4")
+    if attributes.colors is not None:
+        tints = attributes.colors / 255
+        tints[..., :3] = linear_colors(tints[..., :3])
+        tables["COLOR_0"] = np.rint(tints * (2**16 - 1)).astype("<u2")
+    groups = np.unique(attributes.face_groups)
+    for group in groups:
+        in_group = np.flatnonzero(attributes.face_groups == group)
+        corners = mesh.faces[in_group].ravel()
+        rows = {name: table[in_group].reshape(-1, table.shape[2]) for name, table in tables.items()}
+        first, indices = _split_corners([corners, *(c for t in rows.values() for c in t.T)], None)
+        vertices = corners[first]
+        if not tables and len(groups) == 1:  # vertices keep their order, also those without a face
+            vertices, indices = np.arange(mesh.n_vertices), corners.astype("<u4").reshape(-1, 1)
+        table = {"POSITION": document.add_accessor(places[vertices].astype("<f4"), name="POSITION")}
+        for name, values in rows.items():
+            is_color = name == "COLOR_0"
+            table[name] = document.add_accessor(values[first], name=name, normalized=is_color)
+        materials = attributes.face_materials[in_group]
+        primitives: list[dict[str, Any]] = []
+        for material in np.unique(materials):
+            of_part = np.repeat(materials == material, 3)
+            entry = {"attributes": table, "indices": document.add_accessor(indices[of_part])}
+            primitives.append(entry | ({"material": int(material)} if material >= 0 else {}))
+        named = (
+            {"name": attributes.groups[group]} if group >= 0 and attributes.groups[group] else {}
+        )
+        tree["scenes"][0]["nodes"].append(len(tree["nodes"]))
+        tree["nodes"].append({"mesh": len(tree["meshes"]), **named})
+        tree["meshes"].append({"primitives": primitives})
+    return document.pack()
+
+
+def _write_material(document: _Document, material: Material) -> dict[str, Any]:
+    *tint, alpha = material.color
+    color = [*linear_colors(np.array(tint)).tolist(), alpha]
+    pbr: dict[str, Any] = {"baseColorFactor": color, "metallicFactor": 0.0}
+    if material.image is not None:
+        tree = document.tree
+        images, textures = tree.setdefault("images", []), tree.setdefault("textures", [])
+        kind = mimetypes.guess_type(material.image_name)[0] or "image/png"
+        view = document.add_view(material.image)
+        images.append({"bufferView": view, "mimeType": kind, "name": material.image_name})
+        textures.append({"source": len(images) - 1})
+        pbr["baseColorTexture"] = {"index": len(textures) - 1}
+    see_through = {"alphaMode": "BLEND"} if material.color[3] < 1 else {}
+    return {"name": material.name, "pbrMetallicRoughness": pbr, **see_through}
