@@ -12,7 +12,7 @@ import numpy as np
 
 from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._files import read_regular, replace_file
+from eigenshape._files import as_path, read_regular, replace_file
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
@@ -70,7 +70,7 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     >>> es.io.read_fields(path)["area"].shape
     (80,)
     """
-    mesh, path = as_mesh(mesh), Path(path)
+    mesh, path = as_mesh(mesh), as_path(path)
     suffix = suffix_of(path, None, FIELD_FORMATS)
     replace_file(path, format_fields(mesh, suffix, fields))
 
@@ -193,7 +193,7 @@ def read_fields(path: str | Path) -> Fields:
     >>> es.io.read_fields(path)["height"].shape
     (42,)
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = suffix_of(path, None, FIELD_FORMATS)
     data = read_regular(path)
     with naming(path):
