@@ -32,8 +32,8 @@ def spectrum(
         int | None,
         typer.Option(
             "-k",
-            help=f"Number of eigenpairs, from the lowest one. By default {USUAL}, or all if there are "
-            "fewer, unless --below is given.",
+            help=f"Number of eigenpairs, from the lowest one, or all if there are fewer. By default "
+            f"{USUAL}, unless --below is given.",
         ),
     ] = None,
     below: Annotated[
@@ -181,7 +181,8 @@ def spectrum(
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
         laplacian = es.build_laplacian(found, name, **options)
-        n_pairs = steps.usual_pairs(laplacian, fixed, USUAL) if k is None and below is None else k
+        wanted = USUAL if k is None and below is None else k
+        n_pairs = None if wanted is None else steps.limit_pairs(laplacian, fixed, wanted)
         solved = es.solve_spectrum(
             laplacian,
             n_pairs,

@@ -56,6 +56,7 @@ from .simplices import dual_volumes as dual_volumes
 from .simplices import mean_side_length as mean_side_length
 from .simplices import simplex_volumes as simplex_volumes
 from .simplicial import SimplicialMesh as SimplicialMesh
+from .solids import split_solids as split_solids
 from .subdivision import subdivide as subdivide
 from .surface_points import SurfacePoints as SurfacePoints
 from .surface_points import sample_surface as sample_surface

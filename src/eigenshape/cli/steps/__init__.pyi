@@ -56,11 +56,11 @@ from .sheets import explanation as explanation
 from .spectra import boundary_points as boundary_points
 from .spectra import draw_eigenfunctions as draw_eigenfunctions
 from .spectra import draw_eigenvalues as draw_eigenvalues
+from .spectra import limit_pairs as limit_pairs
 from .spectra import operator_name as operator_name
 from .spectra import print_spectrum as print_spectrum
 from .spectra import require_bracketable as require_bracketable
 from .spectra import require_drawable as require_drawable
 from .spectra import spectrum_facts as spectrum_facts
-from .spectra import usual_pairs as usual_pairs
 from .views import Side as Side
 from .views import parse_side as parse_side

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import as_array
-from eigenshape._errors import ConvergenceError, InvalidParameterError, try_auto
+from eigenshape._errors import ConvergenceError, InvalidParameterError, try_auto_or_robust
 from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
@@ -268,7 +268,7 @@ def _require_eigenpairs(pencil: Pencil, pairs: Pairs) -> float:
     if not relative[worst] <= LARGEST_RESIDUAL:
         raise ConvergenceError(
             f"Every pair must satisfy Wφ = λBφ to {LARGEST_RESIDUAL:.0e} of the largest eigenvalue; pair {worst} is "
-            f"off by {relative[worst]:.2e}. Nearly degenerate elements do this. {try_auto()}"
+            f"off by {relative[worst]:.2e}. Nearly degenerate elements do this. {try_auto_or_robust()}"
         )
     return float(relative[worst])
 

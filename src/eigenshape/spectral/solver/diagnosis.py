@@ -3,8 +3,9 @@
 from contextlib import suppress
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError, try_auto
+from eigenshape._errors import ConvergenceError, InvalidParameterError, try_auto_or_robust
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.pairs import Pairs
@@ -42,10 +43,16 @@ def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
     soft, stiff = int(np.nanargmin(scales)), int(np.nanargmax(scales))
     if scales[stiff] > DIGITS * scales[soft]:
         low, high = pencil.values_out(scales[[soft, stiff]])
+        _, component = connected_components(pencil.stiffness, directed=False)
+        remedy = try_auto_or_robust()
+        if component[soft] != component[stiff]:
+            remedy = (
+                "They are in separate pieces, which can be solved one by one. Try repair(mesh, "
+                '["largest_component"]), or --repair largest_component on the command line.'
+            )
         raise InvalidParameterError(
             f"W_ii/B_ii must not span more digits than floats have; it is {high:.3g} at point {stiff} and {low:.3g} at "
-            f"point {soft}, and rounding at the one hides the eigenvalues of the other. Solve parts of such different "
-            f"sizes separately, or repair nearly degenerate elements. {try_auto()}"
+            f"point {soft}, and rounding at the one hides the eigenvalues of the other. {remedy}"
         ) from error
 
 
