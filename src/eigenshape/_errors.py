@@ -119,11 +119,3 @@ class MissingExtraError(EigenshapeError, ImportError):
 def try_auto(shape: str = "mesh") -> str:
     """Return the remedy for a fault that the repair "auto" fixes, as the end of a message."""
     return f'Try repair({shape}, ["auto"]), or --repair auto on the command line.'
-
-
-def try_auto_or_robust() -> str:
-    """Return the remedies for elements that no repair may be able to mend, as the end of a message."""
-    return (
-        'Try repair(mesh, ["auto"]) or robust_laplacian(mesh); on the command line, --repair auto '
-        "or --operator robust."
-    )

@@ -77,7 +77,11 @@ def spectrum(
         ),
     ] = False,
     mass: Annotated[
-        Mass | None, typer.Option(help="Mass matrix of the cotangent operator.")
+        Mass | None,
+        typer.Option(
+            help="Mass matrix of the cotangent operator: by default averaged for tetrahedra, and "
+            "otherwise lumped."
+        ),
     ] = None,
     t: Annotated[
         float | None, typer.Option(help="Heat time of a kernel operator, in length².")
@@ -177,6 +181,8 @@ def spectrum(
     steps.require_drawable(found, eigenfunctions)
     bounded = steps.require_bracketable(found) if brackets else None
     name = steps.operator_name(found, operator)
+    if accuracy is not None and name == "cotangent":
+        options.setdefault("mass", "lumped")  # approximate eigenpairs need a diagonal
     fixed = steps.boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")

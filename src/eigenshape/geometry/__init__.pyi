@@ -33,6 +33,7 @@ from .mesh import TriangleMesh as TriangleMesh
 from .normalize import normalize_area as normalize_area
 from .normalize import normalize_box as normalize_box
 from .normalize import normalize_diameter as normalize_diameter
+from .one_sided import cut_one_sided as cut_one_sided
 from .orientation import orient_outward as orient_outward
 from .quadrature import Quadrature as Quadrature
 from .quadrature import mesh_quadrature as mesh_quadrature
