@@ -11,6 +11,8 @@ from .crossings import self_intersections as self_intersections
 from .curvature import PrincipalCurvatures as PrincipalCurvatures
 from .curvature import gaussian_curvature as gaussian_curvature
 from .curvature import principal_curvatures as principal_curvatures
+from .decimation import DecimatedMesh as DecimatedMesh
+from .decimation import decimate as decimate
 from .enclosing_ball import EnclosingBall as EnclosingBall
 from .enclosing_ball import enclosing_ball as enclosing_ball
 from .facet_lists import FacetTable as FacetTable

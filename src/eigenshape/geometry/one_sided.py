@@ -53,7 +53,7 @@ def cut_one_sided(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
         pairs = face_neighbors(mesh)
         against = (turned[pairs.one] == turned[pairs.two]) != pairs.agree
         cut[pairs.edges[against & ~turns.orientable[pairs.one]]] = True
-    opened = _cut_edges(mesh, cut)
+    opened = cut_edges(mesh, cut)
     n_new = opened.mesh.n_vertices - mesh.n_vertices
     report = (
         f"cut_one_sided cut {count_nouns(len(patches), 'piece')} with one side only along "
@@ -62,8 +62,10 @@ def cut_one_sided(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
     return RepairedMesh(turn_faces(opened.mesh, turned), (report,), opened.source_vertices)
 
 
-def _cut_edges(mesh: TriangleMesh, cut: Bool[np.ndarray, " e"]) -> RepairedMesh[TriangleMesh]:
-    """Cut a mesh open along some of its edges.
+def cut_edges(
+    mesh: TriangleMesh, cut: Bool[np.ndarray, " e"], apart: Int[np.ndarray, " k"] | None = None
+) -> RepairedMesh[TriangleMesh]:
+    """Cut a mesh open along some of its edges, and at vertices `apart` where only corners touch.
 
     Corners of faces stay one vertex if edges that are not cut join them around it. The first such
     group of a vertex keeps its number, and the others follow after the last vertex.
@@ -78,9 +80,11 @@ def _cut_edges(mesh: TriangleMesh, cut: Bool[np.ndarray, " e"]) -> RepairedMesh[
     is_second = vertices[ends] == table.edges[at_edge, 1][:, None]
     nodes = len(vertices) + 2 * at_edge[:, None] + is_second
     kept = ~cut[at_edge]
-    # A vertex that no cut edge touches stays one, also where only corners touch.
+    # Other vertices stay one, also where only corners touch.
     whole = np.ones(n, dtype=bool)
     whole[table.edges[cut]] = False
+    if apart is not None:
+        whole[apart] = False
     corners = np.flatnonzero(whole[vertices])
     first = len(vertices) + 2 * len(cut)
     rows = np.concatenate([ends[kept].ravel(), corners])
