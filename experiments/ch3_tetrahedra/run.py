@@ -31,11 +31,14 @@ COLUMNS = ("points", *MASSES, "P2")
 
 
 def irregular_box(n: int) -> es.SimplicialMesh:
-    """Return a unit cube of Delaunay tetrahedra, its inner points moved by up to 0.3 of their distance."""
+    """Return a unit cube of Delaunay tetrahedra, its points moved by up to 0.3 of their distance.
+
+    Points on the sides move along them, so that no four lie on a circle, where rounding would decide.
+    """
     axis = np.linspace(0, 1, n + 1)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
-    inner = ((points > 0) & (points < 1)).all(axis=1, keepdims=True)
-    points = points + inner * np.random.default_rng(0).uniform(-0.3, 0.3, points.shape) / n
+    free = (points > 0) & (points < 1)
+    points = points + free * np.random.default_rng(0).uniform(-0.3, 0.3, points.shape) / n
     mesh = es.SimplicialMesh(points, Delaunay(points).simplices)
     # Of four points in one plane Delaunay's method makes a flat tetrahedron.
     solid = es.geometry.simplex_volumes(mesh) > 1e-6 / n**3
