@@ -16,10 +16,12 @@ from broken_meshes import (
 from typer.testing import CliRunner
 
 from eigenshape.cli import app
+from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair_names import MESH_REPAIRS
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.io.shape_files import write_points
 from eigenshape.operators.choices import OPERATOR_NAMES
 from eigenshape.shapes.surfaces import icosphere
 
@@ -88,7 +90,14 @@ def with_fine_spot(ratio, depth):
         corners = np.array([vertices[i] for i in faces[0]])
         i = len(vertices)
         vertices += [*(corners.mean(axis=0) + ratio * (corners - corners.mean(axis=0)))]
-        ring = [(a, b, i + 1), (a, i + 1, i), (b, c, i + 2), (b, i + 2, i + 1), (c, a, i), (c, i, i + 2)]
+        ring = [
+            (a, b, i + 1),
+            (a, i + 1, i),
+            (b, c, i + 2),
+            (b, i + 2, i + 1),
+            (c, a, i),
+            (c, i, i + 2),
+        ]
         faces = [(i, i + 1, i + 2), *faces[1:], *ring]
     return TriangleMesh(vertices, faces)
 
@@ -105,7 +114,9 @@ def broken():
 
 
 @pytest.mark.parametrize("verb", ["spectrum", "features", "segment"])
-@pytest.mark.parametrize(("name", "mesh"), [*broken()], ids=lambda part: part if isinstance(part, str) else "")
+@pytest.mark.parametrize(
+    ("name", "mesh"), [*broken()], ids=lambda part: part if isinstance(part, str) else ""
+)
 def test_remedies_of_messages_end_in_an_answer(tmp_path, verb, name, mesh):
     path = tmp_path / "broken.ply"
     write_mesh(mesh, path)
@@ -130,3 +141,15 @@ def test_real_files_are_answered_or_refused_for_a_known_reason(data, verb):
             refused.append((path.name, applied, message))
     assert count > 80
     assert not refused
+
+
+def test_a_scan_of_uneven_spacing_is_answered(tmp_path):
+    # A corridor seen from its end: the spacing grows with the square of the distance.
+    angles = np.linspace(0.05, 1.2, 40)
+    across, turn = np.meshgrid(1 / np.tan(angles), np.linspace(0, 2 * np.pi, 40, endpoint=False))
+    points = np.stack([across, np.cos(turn), np.sin(turn)], axis=-1).reshape(-1, 3)
+    far = np.array([[60.0, 1, 0], [60.0, -1, 0], [60.0, 0, 1]])
+    write_points(PointCloud(np.concatenate([points, far])), tmp_path / "corridor.pts")
+    message, applied = answer("spectrum", tmp_path / "corridor.pts")
+    assert message is None, message
+    assert applied == {"--operator": "robust"}

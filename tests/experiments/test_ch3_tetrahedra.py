@@ -1,16 +1,10 @@
-"""The default mass of tetrahedra is the one with the least errors: the README shows the folder's figures."""
+"""The default mass of tetrahedra is the one with the least errors."""
 
 import json
-import runpy
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_tetrahedra"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text(encoding="utf-8"))
-
-
-def test_the_readme_shows_the_table():
-    markdown = runpy.run_path(str(FOLDER / "run.py"))["markdown"]
-    assert markdown(EXPECTED["full"]) in (FOLDER / "README.md").read_text(encoding="utf-8")
 
 
 def test_averaged_mass_errs_least_on_most_shapes():

@@ -32,7 +32,11 @@ def test_topology_stays_and_twice_gives_the_same(mesh):
     assert topology(done.mesh) == topology(mesh)
     assert done.mesh.n_faces in (round(mesh.n_faces / 4), round(mesh.n_faces / 4) - 1)
     assert surface_area(done.mesh) == pytest.approx(surface_area(mesh), rel=0.05)
-    assert not set(suggest_repairs(done.mesh)) & {"drop_degenerate", "drop_duplicate_faces", "orient"}
+    assert not set(suggest_repairs(done.mesh)) & {
+        "drop_degenerate",
+        "drop_duplicate_faces",
+        "orient",
+    }
     assert np.array_equal(decimate(mesh, ratio=0.25).mesh.vertices, done.mesh.vertices)
 
 
@@ -52,7 +56,9 @@ def test_values_and_labels_are_carried():
     middles = done.mesh.vertices[done.mesh.faces].mean(axis=1)[:, 2]
     clear = np.abs(middles) > 0.1
     assert np.array_equal(done.carry_labels(upper)[clear], middles[clear] > 0)
-    with pytest.raises(InvalidShapeError, match="a row for each of the 642 vertices of the original"):
+    with pytest.raises(
+        InvalidShapeError, match="a row for each of the 642 vertices of the original"
+    ):
         done.carry_values(np.ones(3))
     with pytest.raises(InvalidShapeError, match="a row for each of the 1280 faces of the original"):
         done.carry_labels(np.ones(3))
@@ -80,7 +86,9 @@ def test_what_cannot_become_fewer_is_said():
 
 
 def test_bad_requests_are_refused(monkeypatch):
-    with pytest.raises(InvalidParameterError, match="Exactly one of n_faces and ratio must be given"):
+    with pytest.raises(
+        InvalidParameterError, match="Exactly one of n_faces and ratio must be given"
+    ):
         decimate(BALL)
     with pytest.raises(InvalidParameterError, match=r"n_faces must lie in 4\.\.1279; it is 1280"):
         decimate(BALL, 1280)

@@ -62,7 +62,11 @@ def test_what_cannot_be_split_is_named():
     solids[5] = solids[5, [4, 5, 6, 7, 0, 1, 2, 3]]
     with pytest.raises(InvalidShapeError, match=r"hexahedron 5 with the corners .* \(1 such\)"):
         split_solids(points, solids)
-    with pytest.raises(InvalidShapeError, match=r"must be indices of the 8 points; solid 0 is \[1, 2"):
+    with pytest.raises(
+        InvalidShapeError, match=r"must be indices of the 8 points; solid 0 is \[1, 2"
+    ):
         split_solids(CUBE, [[1, 2, 3, 4, 5, 6, 7, 8]])
-    with pytest.raises(InvalidShapeError, match=r"8, 6 or 5 whole numbers a row; it is int64 of shape \(1, 7\)"):
+    with pytest.raises(
+        InvalidShapeError, match=r"8, 6 or 5 whole numbers a row; it is int64 of shape \(1, 7\)"
+    ):
         split_solids(CUBE, [list(range(7))])

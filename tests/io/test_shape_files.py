@@ -105,8 +105,12 @@ def test_solids_are_split_into_tetrahedra(tmp_path, suffix):
     solid = read_shape(path)
     assert solid.n_simplices == 6
     assert simplex_volumes(solid).sum() == pytest.approx(1)
-    inverted = written(tmp_path / f"b{suffix}", corners, [("hexahedron", [[0, 1, 2, 3, 4, 6, 5, 7]])])
-    with pytest.raises(InvalidShapeError, match=r"b\..* hexahedron 0 with the corners \[0, 1, 2, 3, 4, 6"):
+    inverted = written(
+        tmp_path / f"b{suffix}", corners, [("hexahedron", [[0, 1, 2, 3, 4, 6, 5, 7]])]
+    )
+    with pytest.raises(
+        InvalidShapeError, match=r"b\..* hexahedron 0 with the corners \[0, 1, 2, 3, 4, 6"
+    ):
         read_shape(inverted)
 
 

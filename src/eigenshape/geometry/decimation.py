@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import as_array, freeze, whole_number
+from eigenshape._arrays import as_array, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, MissingExtraError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike, Integer
@@ -38,6 +38,7 @@ class DecimatedMesh:
         For each vertex, the nearest point of the original.
     source_faces : (f,) int
         For each face, the face of the original that is nearest to its middle.
+    original : TriangleMesh
 
     Examples
     --------
@@ -176,7 +177,9 @@ def decimate(
         ]
     points, scale = size_one(opened.vertices)
     center = points.mean(axis=0)
-    kept, faces, _, _ = qslim(np.asfortranarray(points - center), np.asfortranarray(opened.faces), wanted)
+    kept, faces, _, _ = qslim(
+        np.asfortranarray(points - center), np.asfortranarray(opened.faces), wanted
+    )
     if not len(faces):
         raise InvalidShapeError(
             "Edges must be able to collapse; libigl refuses this mesh. Try repair(mesh, "
@@ -189,10 +192,16 @@ def decimate(
     )
     if thinned.n_faces > wanted:
         report.append(f"fewer faces, such as {wanted:,}, would change the topology")
-    middles = thinned.vertices[thinned.faces].mean(axis=1)
-    places = closest_points(mesh, thinned.vertices)
-    source_faces = freeze(closest_points(mesh, middles).simplices.copy())
-    return DecimatedMesh(thinned, tuple(report), places, source_faces, mesh)
+    return place_on(mesh, thinned, tuple(report))
+
+
+def place_on(original: TriangleMesh, mesh: TriangleMesh, report: tuple[str, ...]) -> DecimatedMesh:
+    """Find the nearest points and faces of the original for a mesh with fewer faces."""
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    places = closest_points(original, mesh.vertices)
+    return DecimatedMesh(
+        mesh, report, places, closest_points(original, middles).simplices, original
+    )
 
 
 def _wanted_faces(mesh: TriangleMesh, n_faces: Integer | None, ratio: float | None) -> int:
