@@ -1,7 +1,7 @@
-"""Which mass matrix should linear elements on tetrahedra have? (thesis 1.1.2)
+"""Compare mass matrices of linear elements on tetrahedra (thesis 1.1.2).
 
-Twenty eigenvalues above zero by lumped, consistent and averaged mass and by quadratic elements, on boxes and balls, whose
-eigenvalues are known, and on real meshes, where quadratic elements stand for them.
+Twenty eigenvalues above zero by lumped, consistent and averaged mass and by quadratic elements, on boxes and balls,
+whose eigenvalues are known, and on real meshes, where quadratic elements stand for them.
 """
 
 import argparse

@@ -35,16 +35,17 @@ REMEDIES = {
 }
 # What cannot be answered, and why.
 UNANSWERABLE = {
-    r"must hold a mesh; it is empty|must have points; it has none|STL file must hold triangles; it holds none": "empty",
-    r"must hold the (triangles|rows) (it|they) declares?|must have three (numbers|corners)|must declare an element": "cut off or against its format",
-    r"holds (no|\d) points and no face|must have at least \d+ points|must have over \d+ points": "a few points are no surface",
-    r"it holds \d+ segments": "curves have no parts",
-    r"no face would remain|Try a cloud": "no face has an area",
+    "empty": r"must hold a mesh; it is empty|must have points; it has none|must hold triangles; it holds none",
+    "cut off": r"must hold the (triangles|rows) (it|they) declares?",
+    "against its format": r"must have three (numbers|corners)|must declare an element",
+    "a few points": r"holds (no|\d) points and no face|must have at least \d+ points|must have over \d+ points",
+    "curves have no parts": r"it holds \d+ segments",
+    "no face has an area": r"no face would remain|Try a cloud",
 }
 
 
 def is_unanswerable(message):
-    return any(re.search(pattern, message) for pattern in UNANSWERABLE)
+    return any(re.search(pattern, message) for pattern in UNANSWERABLE.values())
 
 
 def named_remedies(verb, message):

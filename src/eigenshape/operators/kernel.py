@@ -218,7 +218,8 @@ def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKern
         raise InvalidShapeError(
             f"The kernel must connect each component of the shape; at t = {kernel.t:.4g} "
             f"component {torn[0]} falls into "
-            f"{np.count_nonzero(pairs[:, 0] == torn[0])} parts ({parts.max() + 1} in all). Choose a larger t. {OR_ROBUST}"
+            f"{np.count_nonzero(pairs[:, 0] == torn[0])} parts ({parts.max() + 1} in all). Choose a larger t. "
+            f"{OR_ROBUST}"
         )
 
 
