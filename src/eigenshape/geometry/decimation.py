@@ -213,11 +213,11 @@ def _wanted_faces(mesh: TriangleMesh, n_faces: Integer | None, ratio: float | No
         raise InvalidShapeError(
             f"A mesh must have more than {FEWEST_FACES} faces to be decimated; it has {mesh.n_faces}."
         )
-    if ratio is not None:
-        if not 0 < ratio < 1:
-            raise InvalidParameterError(f"ratio must lie between 0 and 1; it is {ratio}.")
-        n_faces = max(FEWEST_FACES, round(ratio * mesh.n_faces))
-    return whole_number(n_faces, "n_faces", FEWEST_FACES, mesh.n_faces - 1)
+    if ratio is None:
+        return whole_number(n_faces or 0, "n_faces", FEWEST_FACES, mesh.n_faces - 1)
+    if not 0 < ratio < 1:
+        raise InvalidParameterError(f"ratio must lie between 0 and 1; it is {ratio}.")
+    return min(max(FEWEST_FACES, round(ratio * mesh.n_faces)), mesh.n_faces - 1)
 
 
 def _require_rows(rows: np.ndarray, count: int, name: str, noun: str) -> None:
