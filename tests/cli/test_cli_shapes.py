@@ -197,7 +197,6 @@ def test_operators_are_listed():
             ("info", "sphere.xyz", "--repair", "weld"),
             "must be among auto, drop_duplicate_points; name 0 is 'weld'",
         ),
-        (("features", "sphere.xyz"), "must be of a known format, .off, .obj"),
         (("info", "sphere.xyz", "--dim", "4"), "dim must lie in 1..3; it is 4"),
     ],
 )

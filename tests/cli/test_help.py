@@ -126,6 +126,7 @@ def test_the_main_output_of_every_verb_is_called_output():
     written = [verb for verb, parameter in ALL if parameter.name == "output"]
     assert written == [
         "repair",
+        "decimate",
         "spectrum",
         "features",
         "segment",

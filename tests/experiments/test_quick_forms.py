@@ -23,6 +23,7 @@ MADE_UP = (  # what needs no real shapes
     "ch3_accuracy/run.py",
     "ch3_invariance/run.py",
     "ch3_sphere/run.py",
+    "ch3_tetrahedra/run.py",
     "ch4_bound/run.py",
     "ch4_bridge/run.py",
     "ch4_handle/run.py",

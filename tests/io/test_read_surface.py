@@ -1,5 +1,6 @@
 """Meshes as they are, and surfaces of clouds and frames, from files."""
 
+import meshio
 import numpy as np
 import pytest
 
@@ -85,3 +86,11 @@ def test_what_is_no_surface_is_refused_by_the_name_of_its_file(tmp_path):
     (tmp_path / "curve.obj").write_text("v 0 0 0\nv 1 0 0\nl 1 2\n")
     with pytest.raises(es.FileFormatError, match="it holds 1 segments"):
         es.io.read_surface(tmp_path / "curve.obj")
+
+
+def test_the_boundary_of_tetrahedra_is_their_surface(tmp_path):
+    solid = es.shapes.box(2, 2, 2)
+    meshio.write_points_cells(tmp_path / "box.vtu", solid.points, [("tetra", solid.simplices)])
+    made = es.io.read_surface(tmp_path / "box.vtu")
+    assert made.report == ("boundary_surface took the 48 triangles around 48 tetrahedra",)
+    assert np.array_equal(made.mesh.vertices, solid.points[made.source_vertices])

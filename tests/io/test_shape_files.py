@@ -12,6 +12,7 @@ from eigenshape._errors import (
 )
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io.lzf_loops import decompress
 from eigenshape.io.mesh_files import read_mesh
@@ -97,13 +98,27 @@ def test_a_curve_and_bare_points(tmp_path):
     assert cloud.dim == 1
 
 
-def test_other_cells_are_named(tmp_path):
-    path = written(
-        tmp_path / "a.vtk", CUBE.points[:8], [("hexahedron", [[0, 1, 2, 3, 4, 5, 6, 7]])]
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".msh", ".mesh"])
+def test_solids_are_split_into_tetrahedra(tmp_path, suffix):
+    corners = [[x, y, z] for z in (0.0, 1.0) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    path = written(tmp_path / f"a{suffix}", corners, [("hexahedron", [list(range(8))])])
+    solid = read_shape(path)
+    assert solid.n_simplices == 6
+    assert simplex_volumes(solid).sum() == pytest.approx(1)
+    inverted = written(
+        tmp_path / f"b{suffix}", corners, [("hexahedron", [[0, 1, 2, 3, 4, 6, 5, 7]])]
     )
     with pytest.raises(
+        InvalidShapeError, match=r"b\..* hexahedron 0 with the corners \[0, 1, 2, 3, 4, 6"
+    ):
+        read_shape(inverted)
+
+
+def test_other_cells_are_named(tmp_path):
+    path = written(tmp_path / "a.vtk", CUBE.points[:6], [("triangle6", [[0, 1, 2, 3, 4, 5]])])
+    with pytest.raises(
         FileFormatError,
-        match=r"must be simplices, quads or polylines; it holds hexahedron\. Split them first",
+        match=r"hexahedra, wedges or pyramids; it holds quadratic triangle\. Save it with those",
     ):
         read_shape(path)
 

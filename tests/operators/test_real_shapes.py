@@ -70,7 +70,8 @@ def test_all_tetrahedra_curves_and_clouds_are_read(data):
     }
     assert counts == {
         "bunny.mesh": (5433, 3),
+        "ellipsoid.mesh": (7293, 3),
         "octopus-low.mesh": (452, 3),
         "sphere.mesh": (4505, 3),
         "track1.binary.vtk": (16267, 1),
-    }  # ellipsoid.mesh has hexahedra, and is refused by that name
+    }

@@ -4,11 +4,18 @@ import meshio
 import numpy as np
 import pytest
 
-from eigenshape._errors import FileFormatError
 from eigenshape.io.parsing import GRIDS
 
-KINDS = {"tetra": "tetrahedra", "triangle": "triangles", "quad": "quads", "line": "segments"}
-DIMENSIONS = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3}
+KINDS = {
+    "tetra": "tetrahedra", "triangle": "triangles", "quad": "quads", "line": "segments",
+    "hexahedron": "hexahedra", "wedge": "wedges", "pyramid": "pyramids",
+}  # fmt: skip
+DIMENSIONS = {
+    "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3,
+}  # fmt: skip
+CORNERS = {
+    "tetra": 4, "triangle": 3, "quad": 4, "line": 2, "vertex": 1, "hexahedron": 8, "wedge": 6, "pyramid": 5,
+}  # fmt: skip
 FORMATS = {
     "medit text": (".mesh", "medit", {}),
     "medit binary": (".meshb", "medit", {}),
@@ -21,10 +28,7 @@ FORMATS = {
 
 def cells_of(kind, count, rng):
     """Return cells between 12 points, no corner twice."""
-    n_corners = {"tetra": 4, "triangle": 3, "quad": 4, "line": 2, "vertex": 1, "hexahedron": 8}[
-        kind
-    ]
-    return kind, np.array([rng.permutation(12)[:n_corners] for _ in range(count)])
+    return kind, np.array([rng.permutation(12)[: CORNERS[kind]] for _ in range(count)])
 
 
 def written(path, name, options, points, cells):
@@ -52,6 +56,7 @@ def written(path, name, options, points, cells):
         ["triangle", "quad"],
         ["line"],
         ["triangle", "tetra", "triangle", "vertex", "quad", "line"],
+        ["tetra", "hexahedron", "wedge", "pyramid"],
     ],
 )
 def test_points_and_cells_are_those_of_meshio(tmp_path, form, dtype, kinds):
@@ -70,16 +75,3 @@ def test_points_and_cells_are_those_of_meshio(tmp_path, form, dtype, kinds):
         if block in blocks:
             expected = [part.data for part in theirs.cells if part.type == kind]
             np.testing.assert_array_equal(blocks[block], np.concatenate(expected))
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_solids_of_more_corners_are_refused(tmp_path, form):
-    rng = np.random.default_rng(0)
-    suffix, name, options = FORMATS[form]
-    cells = [cells_of("tetra", 3, rng), cells_of("hexahedron", 2, rng)]
-    path = written(tmp_path / f"a{suffix}", name, options, rng.normal(size=(12, 3)), cells)
-    with pytest.raises(
-        FileFormatError,
-        match=r"must hold simplices .* or quads, .* it holds hexahedron\. Split them",
-    ):
-        GRIDS[suffix](path.read_bytes())

@@ -314,7 +314,7 @@ def _of_mesh(mesh: Mesh, factor: float) -> HeatGeodesics:
     require_sound(mesh)
     points, scale = size_one(mesh.points)
     unit = SimplicialMesh(points, mesh.simplices)
-    laplacian = cotangent_laplacian(unit)
+    laplacian = cotangent_laplacian(unit, "lumped")
     tails, heads = edges_of(mesh).T
     length = float(np.linalg.norm(points[tails] - points[heads], axis=1).mean())
     products = elements.gradient_products(unit)

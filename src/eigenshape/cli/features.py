@@ -79,7 +79,7 @@ def features(
     steps.require_picture(picture)
     side = steps.parse_side(view, up)
     steps.require_colored_path(output)
-    surface = steps.load_mesh(mesh, repair)
+    surface = steps.load_surface(mesh, repair)
     with progress_bar("features") as progress:
         shape = steps.find_features(surface, recipe, accuracy, progress)
     if shape.error is not None:

@@ -32,8 +32,8 @@ def spectrum(
         int | None,
         typer.Option(
             "-k",
-            help=f"Number of eigenpairs, from the lowest one. By default {USUAL}, or all if there are "
-            "fewer, unless --below is given.",
+            help=f"Number of eigenpairs, from the lowest one, or all if there are fewer. By default "
+            f"{USUAL}, unless --below is given.",
         ),
     ] = None,
     below: Annotated[
@@ -77,7 +77,11 @@ def spectrum(
         ),
     ] = False,
     mass: Annotated[
-        Mass | None, typer.Option(help="Mass matrix of the cotangent operator.")
+        Mass | None,
+        typer.Option(
+            help="Mass matrix of the cotangent operator: by default averaged for tetrahedra, and "
+            "otherwise lumped."
+        ),
     ] = None,
     t: Annotated[
         float | None, typer.Option(help="Heat time of a kernel operator, in length².")
@@ -177,11 +181,14 @@ def spectrum(
     steps.require_drawable(found, eigenfunctions)
     bounded = steps.require_bracketable(found) if brackets else None
     name = steps.operator_name(found, operator)
+    if accuracy is not None and name == "cotangent":
+        options.setdefault("mass", "lumped")  # approximate eigenpairs need a diagonal
     fixed = steps.boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
         laplacian = es.build_laplacian(found, name, **options)
-        n_pairs = steps.usual_pairs(laplacian, fixed, USUAL) if k is None and below is None else k
+        wanted = USUAL if k is None and below is None else k
+        n_pairs = None if wanted is None else steps.limit_pairs(laplacian, fixed, wanted)
         solved = es.solve_spectrum(
             laplacian,
             n_pairs,

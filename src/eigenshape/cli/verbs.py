@@ -20,6 +20,7 @@ VERBS = {
     "info": "Show the size, topology and faults of a shape, and which repairs would help.",
     "repair": "Repair a mesh and write it, and report what was done. From OBJ to OBJ, polygons, "
     "textures and groups stay.",
+    "decimate": "Write a mesh with fewer faces and the same topology, by collapsing edges.",
     "spectrum": "Compute the lowest eigenvalues of a shape and prove that none is missing.",
     "operators": "List the operators that `spectrum --operator` takes, with the shapes and options "
     "of each.",

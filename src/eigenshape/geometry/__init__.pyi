@@ -11,6 +11,8 @@ from .crossings import self_intersections as self_intersections
 from .curvature import PrincipalCurvatures as PrincipalCurvatures
 from .curvature import gaussian_curvature as gaussian_curvature
 from .curvature import principal_curvatures as principal_curvatures
+from .decimation import DecimatedMesh as DecimatedMesh
+from .decimation import decimate as decimate
 from .enclosing_ball import EnclosingBall as EnclosingBall
 from .enclosing_ball import enclosing_ball as enclosing_ball
 from .facet_lists import FacetTable as FacetTable
@@ -33,6 +35,7 @@ from .mesh import TriangleMesh as TriangleMesh
 from .normalize import normalize_area as normalize_area
 from .normalize import normalize_box as normalize_box
 from .normalize import normalize_diameter as normalize_diameter
+from .one_sided import cut_one_sided as cut_one_sided
 from .orientation import orient_outward as orient_outward
 from .quadrature import Quadrature as Quadrature
 from .quadrature import mesh_quadrature as mesh_quadrature
@@ -56,6 +59,7 @@ from .simplices import dual_volumes as dual_volumes
 from .simplices import mean_side_length as mean_side_length
 from .simplices import simplex_volumes as simplex_volumes
 from .simplicial import SimplicialMesh as SimplicialMesh
+from .solids import split_solids as split_solids
 from .subdivision import subdivide as subdivide
 from .surface_points import SurfacePoints as SurfacePoints
 from .surface_points import sample_surface as sample_surface

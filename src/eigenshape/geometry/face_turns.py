@@ -58,23 +58,53 @@ def face_turns(mesh: TriangleMesh) -> FaceTurns:
     look the same way are linked. A patch can be oriented if and only if no chain of links leads
     from one side of a face to its other side.
     """
-    table, f = edge_table(mesh), mesh.n_faces
-    at_edge = table.face_edges.ravel()
-    order = np.argsort(at_edge, kind="stable")
-    one, two = order[table.n_faces[at_edge[order]] == 2].reshape(-1, 2).T
-    sides = half_edges(mesh).reshape(3, f, 2).transpose(1, 0, 2).reshape(-1, 2)
-    opposed = sides[one, 0] == sides[two, 1]
-    one, two = one // 3, two // 3
-    front, back = np.where(opposed, two, two + f), np.where(opposed, two + f, two)
-    ends = (np.concatenate([one, one + f]), np.concatenate([front, back]))
-    links = sp.coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(2 * f, 2 * f))
-    count, labels = connected_components(links, directed=False)
+    f = mesh.n_faces
+    count, labels = connected_components(double_cover(mesh), directed=False)
     as_is, over = labels[:f].astype(np.int64), labels[f:].astype(np.int64)
     # Components are numbered in the order of their first side, so of the two halves of a patch the
     # one with the lower number contains the first face unturned.
     n_kept = np.bincount(as_is, minlength=count)
     turned = np.where(n_kept[as_is] == n_kept[over], as_is > over, n_kept[as_is] < n_kept[over])
     return FaceTurns(turned, np.minimum(as_is, over), as_is != over)
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbors:
+    """Pairs of faces that share an edge without a third face.
+
+    Attributes
+    ----------
+    edges : (k,) int
+        The edge of each pair.
+    one, two : (k,) int
+        The two faces.
+    agree : (k,) bool
+        Whether they traverse the edge in opposite directions, as faces that are turned alike do.
+    """
+
+    edges: Int[np.ndarray, " k"]
+    one: Int[np.ndarray, " k"]
+    two: Int[np.ndarray, " k"]
+    agree: Bool[np.ndarray, " k"]
+
+
+def face_neighbors(mesh: TriangleMesh) -> Neighbors:
+    """List the pairs of neighboring faces."""
+    table = edge_table(mesh)
+    at_edge = table.face_edges.ravel()
+    order = np.argsort(at_edge, kind="stable")
+    one, two = order[table.n_faces[at_edge[order]] == 2].reshape(-1, 2).T
+    sides = half_edges(mesh).reshape(3, mesh.n_faces, 2).transpose(1, 0, 2).reshape(-1, 2)
+    return Neighbors(at_edge[one], one // 3, two // 3, sides[one, 0] == sides[two, 1])
+
+
+def double_cover(mesh: TriangleMesh) -> sp.coo_array:
+    """Link the sides of neighboring faces that look the same way; face i has the sides i and f + i."""
+    pairs, f = face_neighbors(mesh), mesh.n_faces
+    front = np.where(pairs.agree, pairs.two, pairs.two + f)
+    back = np.where(pairs.agree, pairs.two + f, pairs.two)
+    ends = (np.concatenate([pairs.one, pairs.one + f]), np.concatenate([front, back]))
+    return sp.coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(2 * f, 2 * f))
 
 
 def turn_faces(mesh: TriangleMesh, turned: Bool[np.ndarray, " f"]) -> TriangleMesh:

@@ -11,6 +11,7 @@ from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_shape
 from eigenshape.geometry.holes import fill_holes
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.one_sided import cut_one_sided
 from eigenshape.geometry.repair_names import (
     CLOUD_REPAIRS,
     MESH_REPAIRS,
@@ -74,6 +75,7 @@ REPAIRS: dict[str, Callable[[Any], RepairedMesh[Any]]] = {
     "orient": orient,
     "largest_component": largest_component,
     "fill_holes": fill_holes,
+    "cut_one_sided": cut_one_sided,
 }
 
 
@@ -102,7 +104,8 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
     names : sequence of str
         Names of the repairs, in the order in which they are applied. For meshes of any dimension:
         "auto", `weld`, `weld_seams`, `collapse_needles`, `drop_degenerate`, `drop_duplicate_faces`,
-        `drop_unreferenced`. For triangle meshes also `orient`, `largest_component`, `fill_holes`.
+        `drop_unreferenced`. For triangle meshes also `orient`, `largest_component`, `fill_holes`,
+        `cut_one_sided`.
         For clouds: "auto", `drop_duplicate_points`.
 
     Returns

@@ -16,8 +16,9 @@ MESH_REPAIRS = (
     "orient",
     "largest_component",
     "fill_holes",
+    "cut_one_sided",
 )
-SURFACE_REPAIRS = ("orient", "largest_component", "fill_holes")  # of surfaces only
+SURFACE_REPAIRS = ("orient", "largest_component", "fill_holes", "cut_one_sided")  # of surfaces only
 CLOUD_REPAIRS = ("auto", "drop_duplicate_points")
 
 

@@ -107,8 +107,8 @@ def require_oriented(mesh: TriangleMesh) -> None:
     if not orientable.all():
         one_sided = int(np.argmin(orientable))
         remedy = (
-            f"No repair helps: the piece of face {one_sided} has one side only, "
-            "like a Möbius strip."
+            f"The piece of face {one_sided} has one side only, like a Möbius strip. Try repair(mesh, "
+            '["cut_one_sided"]), or --repair cut_one_sided on the command line.'
         )
     raise InvalidShapeError(
         "Neighboring faces must be turned the same way; "

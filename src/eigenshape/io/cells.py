@@ -7,10 +7,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape.geometry.solids import split_solids
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.text import fans
 
 SEGMENTS = "segments"
+SOLIDS = ("hexahedra", "wedges", "pyramids")
 Blocks = Mapping[str, Int[np.ndarray, "_ _"]]  # by CellKind, or SEGMENTS
 SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
 # Largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7.
@@ -33,7 +35,7 @@ def require_kind(cells: str | None) -> CellKind | None:
 
 
 def require_splittable(others: Sequence[str]) -> None:
-    """Raise an error that names the cells that are neither simplices nor quads.
+    """Raise an error that names the cells that can neither be taken nor split.
 
     Raises
     ------
@@ -42,25 +44,33 @@ def require_splittable(others: Sequence[str]) -> None:
     """
     if others:
         raise FileFormatError(
-            "A file must hold simplices (tetra, triangle or line) or quads, with straight sides; "
-            f"it holds {', '.join(others)}. Split them first."
+            "A file must hold simplices, quads, hexahedra, wedges or pyramids, with straight sides; "
+            f"it holds {', '.join(others)}. Save it with simplices, or with straight sides."
         )
 
 
-def select_cells(blocks: Blocks, cells: CellKind | None) -> Int[np.ndarray, "s corners"]:
+def select_cells(
+    points: Float[np.ndarray, "n d"], blocks: Blocks, cells: CellKind | None
+) -> Int[np.ndarray, "s corners"]:
     """Return the simplices of the requested kind, where each quad becomes two triangles.
 
-    The kind "quads" includes the triangles between them. Without cells the shape is (0, 3).
+    The kind "quads" includes the triangles between them, and "tetrahedra" those of hexahedra,
+    wedges and pyramids. Without cells the shape is (0, 3).
 
     Raises
     ------
     FileFormatError
         If the file has no cells of the requested kind.
+    InvalidShapeError
+        If a hexahedron, wedge or pyramid cannot be split.
     """
     quads = fans(blocks["quads"]) if "quads" in blocks else np.empty((0, 3), dtype=np.int64)
     triangles = blocks.get("triangles", quads[:0])
     surface = np.concatenate([triangles, quads])
     tetrahedra = blocks.get("tetrahedra", np.empty((0, 4), dtype=np.int64))
+    if cells in (None, "tetrahedra"):
+        split = [split_solids(points, blocks[name]).simplices for name in SOLIDS if name in blocks]
+        tetrahedra = np.concatenate([tetrahedra, *split])
     found = {"tetrahedra": tetrahedra, "quads": surface, "triangles": triangles}
     if cells is not None:
         if not len(found[cells]):

@@ -15,9 +15,10 @@ from eigenshape.io.text import numbers_of, quote_line, wholes
 
 VERSIONS = {b"2": 2, b"2.1": 2, b"2.2": 2, b"4": 4, b"4.1": 4}
 POINT = 15  # elements of one node, which are ignored
-KINDS = {1: SEGMENTS, 2: "triangles", 3: "quads", 4: "tetrahedra"}
-CORNERS = {1: 2, 2: 3, 3: 4, 4: 4, POINT: 1}
-SOLIDS = {5: "hexahedron", 6: "wedge", 7: "pyramid"}
+KINDS = {
+    1: SEGMENTS, 2: "triangles", 3: "quads", 4: "tetrahedra", 5: "hexahedra", 6: "wedges", 7: "pyramids",
+}  # fmt: skip
+CORNERS = {1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, POINT: 1}
 NODE = np.dtype([("tag", "<i4"), ("place", "<f8", 3)])  # of a binary file of version 2
 RULE = "Nodes and elements of a gmsh file must be as it declares them"
 
@@ -72,7 +73,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarr
     ------
     FileFormatError
         If a section is missing or occurs twice, nodes and elements are not as declared, or an
-        element is neither a simplex nor a quadrilateral.
+        element has curved sides.
     """
     words, _, order = _section(data, b"MeshFormat").partition(b"\n")
     version, form, n_bytes = [*words.split(), b"", b"", b""][:3]
@@ -220,13 +221,7 @@ def _element_blocks(numbers: _Numbers, size: str) -> Rows:
 
 
 def _require_known(kinds: list[int]) -> None:
-    require_splittable(
-        [
-            SOLIDS.get(kind, f"elements of gmsh's type {kind}")
-            for kind in kinds
-            if kind not in CORNERS
-        ]
-    )
+    require_splittable([f"elements of gmsh's type {kind}" for kind in kinds if kind not in CORNERS])
 
 
 def _require_total(found: int, declared: int, what: str) -> None:

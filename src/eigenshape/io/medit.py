@@ -1,4 +1,4 @@
-"""Medit files, text (.mesh) or binary (.meshb): vertices, simplices and quadrilaterals.
+"""Medit files, text (.mesh) or binary (.meshb): vertices and cells with straight sides.
 
 Keywords, their numbers and the binary layout are those of libMeshb:
 https://github.com/LoicMarechal/libMeshb
@@ -18,18 +18,20 @@ CELLS = {
     "Triangles": 3,
     "Quadrilaterals": 4,
     "Tetrahedra": 4,
+    "Prisms": 6,
+    "Pyramids": 5,
+    "Hexahedra": 8,
+    "Hexaedra": 8,
 }  # corners; a label follows them
 KINDS = {
     "Edges": SEGMENTS,
     "Triangles": "triangles",
     "Quadrilaterals": "quads",
     "Tetrahedra": "tetrahedra",
-}
-SOLIDS = {
-    "Prisms": "wedge",
-    "Pyramids": "pyramid",
-    "Hexahedra": "hexahedron",
-    "Hexaedra": "hexahedron",
+    "Prisms": "wedges",
+    "Pyramids": "pyramids",
+    "Hexahedra": "hexahedra",
+    "Hexaedra": "hexahedra",
 }
 # Sections that are ignored. An unknown keyword is an error: it could be misspelt cells.
 PASSED_OVER = {
@@ -61,8 +63,7 @@ def parse_text(data: bytes) -> Found:
     Raises
     ------
     FileFormatError
-        If a keyword is unknown, a section does not hold what it declares, or a cell is neither a
-        simplex nor a quadrilateral.
+        If a keyword is unknown, or a section does not hold what it declares.
     """
     text = NO_NUMBERS.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n"))
     keywords = list(KEYWORD.finditer(text))
@@ -84,8 +85,6 @@ def parse_text(data: bytes) -> Found:
         elif name in CELLS:
             rows = _rows(_numbers(body, name), CELLS[name] + 1, name)
             tables.setdefault(name, []).append(wholes(rows.ravel(), name).reshape(rows.shape))
-        elif name in SOLIDS:
-            require_splittable([] if body[:1] == [b"0"] else [SOLIDS[name]])
         elif name not in PASSED_OVER:
             raise FileFormatError(
                 f"Keywords of a Medit file must be known; {quote_line((0, match[1]))} is not. "
@@ -152,7 +151,7 @@ def parse_binary(data: bytes) -> Found:
     Raises
     ------
     FileFormatError
-        If the file ends early, or a cell is neither a simplex nor a quadrilateral.
+        If the file ends early, or a cell has curved sides or any number of corners.
     """
     order = {1: "<", 2**24: ">"}.get(int.from_bytes(data[:4], "little"), "")
     version = int(_read_items(data, 4, order + "i4", 1)[0]) if order else 0
@@ -180,8 +179,6 @@ def parse_binary(data: bytes) -> Found:
             name = CODES.get(code, "Vertices")
             count = int(_read_items(data, place, whole, 1)[0])
             place += np.dtype(whole).itemsize
-            if name in SOLIDS:
-                require_splittable([SOLIDS[name]] if count else [])
             width = CELLS.get(name, 0) + 1
             row = np.dtype(
                 [("point", real, (dimension,)), ("label", whole)]

@@ -73,7 +73,7 @@ def parse_mesh(
 ) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "s corners"]]:
     """Return points and the selected simplices, of shape (0, 3) if there are only points."""
     points, blocks = _blocks(path, suffix, data, cells)
-    return points, select_cells(blocks, cells)
+    return points, select_cells(points, blocks, cells)
 
 
 def _blocks(

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Int, UInt8
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
@@ -278,6 +278,16 @@ def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
         ) from err
     n_triangles = [len(polygon) - 2 for polygon in _lists(tables, "face")]
     return np.repeat(values, n_triangles)
+
+
+def parse_colors(data: bytes) -> UInt8[np.ndarray, "n 3"] | None:
+    """Read red, green and blue of vertices, or return None if they are not bytes or missing."""
+    table = _tables(data)["vertex"]
+    if not {"red", "green", "blue"} <= table.keys():
+        return None
+    colors = np.column_stack([np.asarray(table[name]) for name in ("red", "green", "blue")])
+    is_byte = np.all((colors >= 0) & (colors <= 255) & (colors == np.round(colors)))
+    return colors.astype(np.uint8) if is_byte else None
 
 
 def format_text(

@@ -1,4 +1,4 @@
-"""Read a surface from a file of any kind: a mesh as it is, and one made of points."""
+"""Read a surface from a file of any kind: a mesh as it is, one made of points, or the boundary of tetrahedra."""
 
 from pathlib import Path
 
@@ -6,9 +6,12 @@ import numpy as np
 
 from eigenshape._files import as_path, read_regular
 from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair, suggest_repairs
 from eigenshape.geometry.repair_report import RepairedMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.io import pcd
 from eigenshape.io.mesh_files import require_surface
 from eigenshape.io.parsing import naming, parse_mesh, suffix_of
@@ -18,14 +21,14 @@ from eigenshape.scans.reconstruction import reconstruct_surface
 
 
 def read_surface(path: str | Path, *, file_format: str | None = None) -> RepairedMesh[TriangleMesh]:
-    r"""Read a mesh, or make a surface of a point cloud or of a frame of a depth camera.
+    r"""Read a mesh, or make a surface of tetrahedra, a point cloud or a frame of a depth camera.
 
     A frame is a PCD file with more than one row: pixels that are neighbors on its grid and in space
     are joined, as a camera at the origin sees them, and the surface faces the camera. Points
     without an order become the surface whose normals fit theirs (Poisson reconstruction). It is
     closed where they leave only small holes, and rounds off what is thinner than a few times the
     distance between them. Points that are not finite, and all but the first of equal points, are
-    left out.
+    left out. Of tetrahedra it is the boundary.
 
     Parameters
     ----------
@@ -37,7 +40,7 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
     Returns
     -------
     RepairedMesh
-        The surface, with a report that says what was made of points and is empty for a mesh. The
+        The surface, with a report that says what it was made of and is empty for a mesh. The
         source of a vertex is its point in the file, or the nearest one.
 
     Raises
@@ -71,6 +74,8 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
             points = POINTS[suffix](data)
         else:
             points, simplices = parse_mesh(path, suffix, data, None)
+            if simplices.shape[1] == 4:
+                return _surface_of_solid(SimplicialMesh(points, simplices))
             if len(simplices):
                 require_surface(points, simplices)
                 return RepairedMesh(TriangleMesh(points, simplices), (), np.arange(len(points)))
@@ -78,6 +83,15 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
         if n_rows > 1:
             return triangulate_frame(points.reshape(n_rows, -1, 3))
         return _surface_of_cloud(points)
+
+
+def _surface_of_solid(solid: SimplicialMesh) -> RepairedMesh[TriangleMesh]:
+    surface = boundary_surface(solid)
+    report = (
+        f"boundary_surface took the {surface.n_faces:,} triangles around "
+        f"{solid.n_simplices:,} tetrahedra"
+    )
+    return RepairedMesh(surface, (report,), boundary_vertices(solid))
 
 
 def _surface_of_cloud(points: np.ndarray) -> RepairedMesh[TriangleMesh]:

@@ -9,14 +9,18 @@ from eigenshape._errors import FileFormatError
 from eigenshape.io.cells import SEGMENTS
 
 VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, QUAD, TETRAHEDRON = 1, 2, 3, 4, 5, 9, 10
+HEXAHEDRON, WEDGE, PYRAMID = 12, 13, 14
 KINDS = {
     LINE: (SEGMENTS, 2),
     TRIANGLE: ("triangles", 3),
     QUAD: ("quads", 4),
     TETRAHEDRON: ("tetrahedra", 4),
+    HEXAHEDRON: ("hexahedra", 8),
+    WEDGE: ("wedges", 6),
+    PYRAMID: ("pyramids", 5),
 }
 NAMES = {
-    6: "triangle strip", 7: "polygon", 8: "pixel", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid",
+    6: "triangle strip", 7: "polygon", 8: "pixel", 11: "voxel",
     21: "quadratic edge", 22: "quadratic triangle", 23: "quadratic quad", 24: "quadratic tetrahedron", 42: "polyhedron",
 }  # fmt: skip
 
@@ -47,7 +51,7 @@ class CellLists:
 def cells_of_types(
     lists: CellLists, types: Int[np.ndarray, " c"]
 ) -> dict[str, Int[np.ndarray, "_ _"]]:
-    """Sort cells into segments, triangles, quads and tetrahedra; ignore cells that are points.
+    """Sort cells by their kind; ignore cells that are points.
 
     Raises
     ------
@@ -58,7 +62,8 @@ def cells_of_types(
     if others.size:
         named = ", ".join(NAMES.get(int(kind), f"VTK's type {kind}") for kind in others)
         raise FileFormatError(
-            f"Cells of a VTK file must be simplices, quads or polylines; it holds {named}. Split them first."
+            "Cells of a VTK file must be simplices, quads, polylines, hexahedra, wedges or pyramids; "
+            f"it holds {named}. Save it with those."
         )
     blocks = {}
     for kind, (name, length) in KINDS.items():

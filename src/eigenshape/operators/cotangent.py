@@ -11,8 +11,11 @@ from eigenshape.operators import elements
 from eigenshape.operators.choices import Mass
 from eigenshape.operators.laplacian import Laplacian
 
+# Dimension in which the default mass is averaged: experiments/ch3_tetrahedra chose it.
+TETRAHEDRA = 3
 
-def cotangent_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
+
+def cotangent_laplacian(mesh: MeshLike, mass: Mass | None = None) -> Laplacian:
     """Build the cotangent Laplacian: linear finite elements on a mesh of any dimension.
 
     On triangles w_ij = (cot α_ij + cot β_ij) / 2, with the angles opposite to the edge (thesis
@@ -24,10 +27,11 @@ def cotangent_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     ----------
     mesh : MeshLike
         Triangles, tetrahedra, segments, or m-simplices in R^d.
-    mass : {"lumped", "consistent", "averaged"}
+    mass : {"lumped", "consistent", "averaged"}, optional
         "lumped": B is diagonal, 1/(m+1) of the volume of the incident simplices. "consistent": the
         full matrix ∫ φ_i φ_j; its eigenvalues are upper bounds for those of the surface.
-        "averaged": the mean of the two, whose leading errors cancel.
+        "averaged": the mean of the two, whose leading errors cancel. By default "averaged" for
+        tetrahedra, which are rarely fine enough for another, and otherwise "lumped".
 
     Returns
     -------
@@ -59,6 +63,7 @@ def cotangent_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     1.0
     """
     mesh = as_simplicial(mesh)
+    mass = mass or ("averaged" if mesh.dim == TETRAHEDRA else "lumped")
     require_mass(mass)
     require_sound(mesh)
     products = elements.gradient_products(mesh)

@@ -40,6 +40,8 @@ LAST = 2.9
 SAMPLED_ROWS = 512
 # Bytes per entry while the matrix is built and checked.
 PEAK = 30
+# It joins each point with its nearest ones, whatever the spacing.
+OR_ROBUST = "On a surface in R^3 robust_laplacian(shape) fits any spacing; on the command line, --operator robust."
 
 
 @dataclass(frozen=True)
@@ -203,7 +205,7 @@ def _require_partners(measure: Quadrature, n_partners: np.ndarray, kernel: Gauss
         raise InvalidShapeError(
             f"Every point must have another one within the cutoff of the kernel; point {alone[0]} at "
             f"{measure.points[alone[0]].tolist()} has none within {kernel.cutoff * kernel.width:.4g} ({alone.size} "
-            f"such). Choose a larger t than {kernel.t:.4g}, or remove such points."
+            f"such). Choose a larger t than {kernel.t:.4g}, or remove such points. {OR_ROBUST}"
         )
 
 
@@ -216,7 +218,8 @@ def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKern
         raise InvalidShapeError(
             f"The kernel must connect each component of the shape; at t = {kernel.t:.4g} "
             f"component {torn[0]} falls into "
-            f"{np.count_nonzero(pairs[:, 0] == torn[0])} parts ({parts.max() + 1} in all). Choose a larger t."
+            f"{np.count_nonzero(pairs[:, 0] == torn[0])} parts ({parts.max() + 1} in all). Choose a larger t. "
+            f"{OR_ROBUST}"
         )
 
 

@@ -12,9 +12,9 @@ from eigenshape.shapes.creature_plans import CREATURES, PLANS
 from eigenshape.shapes.isosurface import find_spacing, isosurface, relax
 from eigenshape.shapes.limbs import Body, distance_to_body, nearest_limbs, place_limbs
 from eigenshape.shapes.skinning import Joints, bend_at_joints, diffuse
-from eigenshape.shapes.thinning import decimate
+from eigenshape.shapes.thinning import collapse_shortest_edges
 
-# The first mesh has this multiple of the requested number of vertices. The surplus lets `decimate`
+# The first mesh has this multiple of the requested number of vertices. The surplus lets `collapse_shortest_edges`
 # remove the shortest edges; a larger surplus takes longer.
 SURPLUS = 1.06
 # Standard deviation of a bend along the skin, in radii of the limb. Smaller values fold the skin at
@@ -94,7 +94,7 @@ def _skin(body: Body, n_vertices: int) -> TriangleMesh:
 
     wanted = find_spacing(field, *body.box, round(SURPLUS * n_vertices))
     spacing = min(wanted, body.thinnest)
-    mesh = decimate(isosurface(field, *body.box, spacing), n_vertices)
+    mesh = collapse_shortest_edges(isosurface(field, *body.box, spacing), n_vertices)
     return relax(field, mesh, spacing)
 
 

@@ -14,7 +14,7 @@ from eigenshape.geometry.topology import edge_table
 FEWEST_NEIGHBORS, MOST_NEIGHBORS = 4, 8
 
 
-def decimate(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
+def collapse_shortest_edges(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
     """Collapse the shortest edges of a closed manifold until it has at most `n_vertices` vertices.
 
     An edge collapses to its midpoint if its ends have exactly two neighbors in common, so that the

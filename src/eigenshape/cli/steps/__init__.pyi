@@ -4,6 +4,8 @@ from .bending import read_edits_for as read_edits_for
 from .comparison import print_stability as print_stability
 from .comparison import scale_shape as scale_shape
 from .comparison import stability_facts as stability_facts
+from .decimation import decimate_file as decimate_file
+from .decimation import save_decimated as save_decimated
 from .facts import mesh_facts as mesh_facts
 from .facts import shape_facts as shape_facts
 from .heat import count_fragments as count_fragments
@@ -57,11 +59,11 @@ from .sheets import explanation as explanation
 from .spectra import boundary_points as boundary_points
 from .spectra import draw_eigenfunctions as draw_eigenfunctions
 from .spectra import draw_eigenvalues as draw_eigenvalues
+from .spectra import limit_pairs as limit_pairs
 from .spectra import operator_name as operator_name
 from .spectra import print_spectrum as print_spectrum
 from .spectra import require_bracketable as require_bracketable
 from .spectra import require_drawable as require_drawable
 from .spectra import spectrum_facts as spectrum_facts
-from .spectra import usual_pairs as usual_pairs
 from .views import Side as Side
 from .views import parse_side as parse_side

@@ -26,14 +26,12 @@ from eigenshape.spectral.spectrum import Spectrum
 N_PICTURED = 8  # eigenfunctions in a picture: two rows of four
 
 
-def usual_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None, usual: int) -> int:
-    """Return the default number of pairs, with a note on stderr if the shape has fewer."""
-    most = laplacian.n_points - (0 if fixed is None else len(fixed))
-    if most < usual:
-        err.print(
-            f"[yellow]note:[/] the default is {usual} pairs; this shape has {most}, and all are computed"
-        )
-    return max(1, min(usual, most))
+def limit_pairs(laplacian: Laplacian, fixed: Int[np.ndarray, " c"] | None, k: int) -> int:
+    """Return the requested number of pairs, or all with a note on stderr if the shape has fewer."""
+    most = max(1, laplacian.n_points - (0 if fixed is None else len(fixed)))
+    if most < k:
+        err.print(f"[yellow]note:[/] this shape has {most} eigenpairs, not {k}; all are computed")
+    return min(k, most)
 
 
 def operator_name(shape: Shape, requested: str | None) -> str:

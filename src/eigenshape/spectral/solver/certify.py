@@ -7,10 +7,11 @@ from jaxtyping import Float
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import as_array
-from eigenshape._errors import ConvergenceError, InvalidParameterError, try_auto
+from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
+from eigenshape.spectral.solver.diagnosis import remedy_for
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.kernel_values import to_pencil, user_certificate
@@ -268,7 +269,7 @@ def _require_eigenpairs(pencil: Pencil, pairs: Pairs) -> float:
     if not relative[worst] <= LARGEST_RESIDUAL:
         raise ConvergenceError(
             f"Every pair must satisfy Wφ = λBφ to {LARGEST_RESIDUAL:.0e} of the largest eigenvalue; pair {worst} is "
-            f"off by {relative[worst]:.2e}. Nearly degenerate elements do this. {try_auto()}"
+            f"off by {relative[worst]:.2e}. Nearly degenerate elements do this. {remedy_for(pencil)}"
         )
     return float(relative[worst])
 

@@ -3,8 +3,10 @@
 from contextlib import suppress
 
 import numpy as np
+from jaxtyping import Float
+from scipy.sparse.csgraph import connected_components
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError, try_auto
+from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.pairs import Pairs
@@ -34,9 +36,30 @@ def require_solvable(pencil: Pencil, error: ConvergenceError) -> None:
     _require_semidefinite(pencil, error)
 
 
-def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
+def remedy_for(pencil: Pencil) -> str:
+    """Return what to try where points of very different scales cannot be solved together."""
+    scales = _scales(pencil)
+    if not np.isnan(scales).all():
+        _, component = connected_components(pencil.stiffness, directed=False)
+        if component[np.nanargmin(scales)] != component[np.nanargmax(scales)]:
+            return (
+                "The smallest and the largest elements are in separate pieces. Try repair(mesh, "
+                '["auto", "largest_component"]), or --repair auto,largest_component on the command line.'
+            )
+    return (
+        'Try repair(mesh, ["auto"]) or robust_laplacian(mesh); on the command line, --repair auto '
+        "or --operator robust."
+    )
+
+
+def _scales(pencil: Pencil) -> Float[np.ndarray, " n"]:
+    """Return W_ii/B_ii, and nan where it is not positive."""
     ratios = pencil.stiffness.diagonal() / pencil.mass_diagonal
-    scales = np.where(ratios > 0, ratios, np.nan)
+    return np.where(ratios > 0, ratios, np.nan)
+
+
+def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
+    scales = _scales(pencil)
     if np.isnan(scales).all():
         return
     soft, stiff = int(np.nanargmin(scales)), int(np.nanargmax(scales))
@@ -44,8 +67,7 @@ def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
         low, high = pencil.values_out(scales[[soft, stiff]])
         raise InvalidParameterError(
             f"W_ii/B_ii must not span more digits than floats have; it is {high:.3g} at point {stiff} and {low:.3g} at "
-            f"point {soft}, and rounding at the one hides the eigenvalues of the other. Solve parts of such different "
-            f"sizes separately, or repair nearly degenerate elements. {try_auto()}"
+            f"point {soft}, and rounding at the one hides the eigenvalues of the other. {remedy_for(pencil)}"
         ) from error
 
 

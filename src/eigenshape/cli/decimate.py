@@ -1,0 +1,44 @@
+"""eigenshape decimate: the same surface by fewer faces."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from eigenshape._errors import InvalidParameterError
+from eigenshape.cli import steps
+from eigenshape.cli.console import escape_text, out, print_json
+from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption
+
+
+def decimate(
+    mesh: MeshArgument,
+    *,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL or GLB.")
+    ],
+    faces: Annotated[int | None, typer.Option(help="Number of faces to keep.")] = None,
+    ratio: Annotated[
+        float | None,
+        typer.Option(help="Instead of --faces: the share of faces to keep, between 0 and 1."),
+    ] = None,
+    repair: RepairOption = "",
+    as_json: JsonOption = False,
+) -> None:
+    """Write a mesh with fewer faces and the same topology, by collapsing edges.
+
+    For instance: eigenshape decimate scan.ply --ratio 0.1 -o small.ply
+    """
+    steps.require_mesh_path(output)
+    if (faces is None) == (ratio is None):
+        raise InvalidParameterError(
+            "The number of faces must be given by one of --faces and --ratio."
+        )
+    done = steps.decimate_file(mesh, repair, faces, ratio)
+    steps.save_decimated(mesh, done, output)
+    if as_json:
+        facts = {"n_vertices": done.mesh.n_vertices, "n_faces": done.mesh.n_faces}
+        print_json({"path": str(mesh), "output": str(output), "report": done.report, **facts})
+    else:
+        for sentence in done.report:
+            out.print(escape_text(sentence))

@@ -1,0 +1,156 @@
+"""Every remedy that a message names is applied to the file, and ends in an answer."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from broken_meshes import (
+    flipped,
+    moebius,
+    soup,
+    with_duplicates,
+    with_flat_simplices,
+    with_loose_points,
+)
+from typer.testing import CliRunner
+
+from eigenshape.cli import app
+from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repair_names import MESH_REPAIRS
+from eigenshape.geometry.union import disjoint_union
+from eigenshape.io.mesh_files import write_mesh
+from eigenshape.io.shape_files import write_points
+from eigenshape.operators.choices import OPERATOR_NAMES
+from eigenshape.shapes.surfaces import icosphere
+
+MOST_REMEDIES = 3
+LARGEST = 300_000  # bytes of a file; larger ones are slow, and other tests read them
+NAMES = "|".join(MESH_REPAIRS)
+REMEDIES = {
+    "--repair": rf"--repair ((?:{NAMES})(?:,(?:{NAMES}))*)",
+    "--operator": rf"--operator ({'|'.join(OPERATOR_NAMES)})",
+    "--drop-missing": "--drop-missing()",
+}
+# What cannot be answered, and why.
+UNANSWERABLE = {
+    "empty": r"must hold a mesh; it is empty|must have points; it has none|must hold triangles; it holds none",
+    "cut off": r"must hold the (triangles|rows) (it|they) declares?",
+    "against its format": r"must have three (numbers|corners)|must declare an element",
+    "a few points": r"holds (no|\d) points and no face|must have at least \d+ points|must have over \d+ points",
+    "curves have no parts": r"it holds \d+ segments",
+    "no face has an area": r"no face would remain|Try a cloud",
+}
+
+
+def is_unanswerable(message):
+    return any(re.search(pattern, message) for pattern in UNANSWERABLE.values())
+
+
+def named_remedies(verb, message):
+    """Return the options that a message names, without those that the verb does not have."""
+    found = {option: re.search(pattern, message) for option, pattern in REMEDIES.items()}
+    if verb != "spectrum":
+        found["--operator"] = None
+    return {option: match[1] for option, match in found.items() if match}
+
+
+def answer(verb, path, *options):
+    """Apply the remedies of each refusal; return the last message, or None for an answer, and what was applied."""
+    applied = {}
+    for _ in range(MOST_REMEDIES + 1):
+        words = [word for pair in applied.items() for word in pair if word]
+        done = CliRunner().invoke(app, [verb, str(path), *options, *words, "--json"])
+        if done.exit_code == 0:
+            return None, applied
+        assert isinstance(done.exception, SystemExit), f"{path.name}: {done.exception!r}"
+        message = done.stderr.rsplit("error:", 1)[-1]
+        remedies = named_remedies(verb, message)
+        new = {option: value for option, value in remedies.items() if applied.get(option) != value}
+        if not new:
+            break
+        option, value = next(iter(new.items()))
+        before = applied.get(option)
+        applied[option] = ",".join([before, value]) if before and option == "--repair" else value
+    return message, applied
+
+
+def beside_a_speck(share):
+    ball = icosphere(3)
+    speck = TriangleMesh(share * ball.vertices + 3, ball.faces)
+    return disjoint_union(ball, speck)
+
+
+def with_fine_spot(ratio, depth):
+    """Put a smaller triangle into the first face, so many times."""
+    mesh = icosphere(3)
+    vertices, faces = [*mesh.vertices], [tuple(face) for face in mesh.faces]
+    for _ in range(depth):
+        a, b, c = faces[0]
+        corners = np.array([vertices[i] for i in faces[0]])
+        i = len(vertices)
+        vertices += [*(corners.mean(axis=0) + ratio * (corners - corners.mean(axis=0)))]
+        ring = [
+            (a, b, i + 1),
+            (a, i + 1, i),
+            (b, c, i + 2),
+            (b, i + 2, i + 1),
+            (c, a, i),
+            (c, i, i + 2),
+        ]
+        faces = [(i, i + 1, i + 2), *faces[1:], *ring]
+    return TriangleMesh(vertices, faces)
+
+
+def broken():
+    rng = np.random.default_rng(0)
+    whole = icosphere(3)
+    yield "soup", soup(whole)
+    yield "flipped", flipped(whole, rng)
+    yield "ugly", with_loose_points(with_flat_simplices(with_duplicates(whole, rng), rng), rng, 9)
+    yield "strip", moebius()
+    yield "speck", beside_a_speck(1e-6)
+    yield "fine spot", with_fine_spot(1e-3, 4)
+
+
+@pytest.mark.parametrize("verb", ["spectrum", "features", "segment"])
+@pytest.mark.parametrize(
+    ("name", "mesh"), [*broken()], ids=lambda part: part if isinstance(part, str) else ""
+)
+def test_remedies_of_messages_end_in_an_answer(tmp_path, verb, name, mesh):
+    path = tmp_path / "broken.ply"
+    write_mesh(mesh, path)
+    message, applied = answer(verb, path)
+    assert message is None, (applied, message)
+    if verb == "spectrum" and name in ("ugly", "speck", "fine spot"):
+        assert applied, "this shape is refused as it is"
+
+
+@pytest.mark.data
+@pytest.mark.long
+@pytest.mark.parametrize("verb", ["spectrum", "features"])
+def test_real_files_are_answered_or_refused_for_a_known_reason(data, verb):
+    options = ["-k", "20"] if verb == "spectrum" else []
+    refused, count = [], 0
+    for path in sorted(Path(data / "nasty").rglob("*")):
+        if not path.is_file() or path.stat().st_size > LARGEST:
+            continue
+        count += 1
+        message, applied = answer(verb, path, *options)
+        if message is not None and not is_unanswerable(message):
+            refused.append((path.name, applied, message))
+    assert count > 80
+    assert not refused
+
+
+def test_a_scan_of_uneven_spacing_is_answered(tmp_path):
+    # A corridor seen from its end: the spacing grows with the square of the distance.
+    angles = np.linspace(0.05, 1.2, 40)
+    across, turn = np.meshgrid(1 / np.tan(angles), np.linspace(0, 2 * np.pi, 40, endpoint=False))
+    points = np.stack([across, np.cos(turn), np.sin(turn)], axis=-1).reshape(-1, 3)
+    far = np.array([[60.0, 1, 0], [60.0, -1, 0], [60.0, 0, 1]])
+    write_points(PointCloud(np.concatenate([points, far])), tmp_path / "corridor.pts")
+    message, applied = answer("spectrum", tmp_path / "corridor.pts")
+    assert message is None, message
+    assert applied == {"--operator": "robust"}
