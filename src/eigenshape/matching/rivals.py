@@ -5,13 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape.geometry.measure import edge_lengths
 from eigenshape.matching.evidence import FittedMap
 from eigenshape.matching.fitting import FitPlan
 from eigenshape.matching.growth import grow_maps
 
-# Misfit of a fit that leaves nothing but the spacing of vertices. The best maps of different animals
-# have 3e-3 and more, those of a symmetric shape turned into itself up to 2e-3.
+# Misfit of a best map that leaves hardly more than the spacing of vertices: the best maps of pairs of
+# different shapes have 3.1e-3 and more; balls, rings and cubes turned into themselves up to 1e-3.
 PERFECT = 2e-3
+# Largest misfit of its rivals, which are less settled, and the same in mean edges of the whole, which
+# is more on coarse meshes. Rivals have 0.8e-3 to 2.8e-3 on round shapes of 600 to 2,600 vertices and
+# 6e-3 and more on a ball of 160 (edges of 0.07); on animals of 300 vertices they have 14e-3 and more.
+EQUALLY_GOOD, EQUALLY_GOOD_IN_EDGES = 3e-3, 0.12
 # Two places differ if they are farther apart, in units: 0.05 √area, as in the confidence.
 DIFFERENT = 0.06
 MOST_OF_AREA = 0.5  # two maps differ if they do over this share of the part
@@ -32,9 +37,11 @@ def equally_good_maps(
     ends = plan.whole.nearest[best.fit.places[plan.part.points]]
     taken = plan.whole.between[ends] < NEAR
     elsewhere = grow_maps(plan, differences + np.median(differences) * taken)
+    edge = float(edge_lengths(plan.whole.mesh).mean())
+    most = max(EQUALLY_GOOD, EQUALLY_GOOD_IN_EDGES * edge)
     found = [best]
     for one in [*maps[1:], *elsewhere]:
-        if one.fit.misfit <= PERFECT and all(_differ(plan, one, other) for other in found):
+        if one.fit.misfit <= most and all(_differ(plan, one, other) for other in found):
             found.append(one)
     return found[1:]
 
