@@ -140,7 +140,9 @@ def torn(names: list[str], folder: Path) -> list[dict[str, object]]:
 def main() -> None:
     """Match all, print and save the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="three awkward files and one torn part")
+    parser.add_argument(
+        "--quick", action="store_true", help="three awkward files and one torn part"
+    )
     parser.add_argument("--out", type=output_file, default="ch7-awkward.json")
     arguments = parser.parse_args()
     require_data()
@@ -149,12 +151,16 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         if arguments.quick:
             few = [path for path in files if path.stem in ("fox", "moebius", "cylinder")]
-            give_out({"awkward": awkward(few), "torn": torn(names[:2], Path(folder))}, arguments.out)
+            give_out(
+                {"awkward": awkward(few), "torn": torn(names[:2], Path(folder))}, arguments.out
+            )
             return
         results: dict[str, object] = {}
         for what, measure in {
             "torn": lambda: torn(names, Path(folder)),
-            "skulls": lambda: skulls(sorted(p.stem for p in (DATA / "mice" / "full").glob("*.ply"))),
+            "skulls": lambda: skulls(
+                sorted(p.stem for p in (DATA / "mice" / "full").glob("*.ply"))
+            ),
             "awkward": lambda: awkward(files),
         }.items():
             results[what] = measure()

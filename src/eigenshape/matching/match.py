@@ -89,10 +89,13 @@ def match_shapes(
     part : MeshLike
         A part of the whole, or a whole shape. Each piece that is not tiny is matched by itself.
     whole : MeshLike or MatchTarget
-        A connected surface; prepare it once with `prepare_target` to match many parts.
-    scale : "known", "unknown" or float
+        Prepare it once with `prepare_target` to match many parts. Each piece of the part is placed on
+        the piece of the whole where its map has the highest score.
+    scale : "auto", "known", "unknown" or float
         "known": both shapes have one unit of length. A number: lengths of the part are multiplied
-        by it first. "unknown": seven sizes are tried, which takes five times as long.
+        by it first. "unknown": seven sizes are tried, which takes five times as long. "auto": the
+        root of the ratio of areas if both shapes are complete and differ in size by more than
+        10 %; else "known", or "unknown" if the part is too large or too small for that.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -103,10 +106,11 @@ def match_shapes(
     Raises
     ------
     InvalidParameterError
-        If `scale` is none of these, or the part has more than 1.5 times the area of the whole.
+        If `scale` is none of these; or it is "known" or a number, and the part has more than 1.5
+        times the area of the whole, or several pieces and none with 1 % of that area.
     InvalidShapeError
         If a mesh has a face without area or twice, a vertex without face, or neighboring faces that
-        disagree in orientation; or the whole has several components.
+        disagree in orientation.
 
     See Also
     --------
@@ -117,7 +121,9 @@ def match_shapes(
     Notes
     -----
     Nothing is found where part and whole have nothing in common, but a map is returned all the
-    same: look at `confidence`. A part of 5,000 vertices takes about 3 s on one core.
+    same: look at `confidence`. If the shape can be turned into itself, there are several maps:
+    look at `n_equally_good`. A piece of more than 16,000 vertices or with needles is matched by way
+    of a copy with fewer vertices, and the map is carried over. A part of 5,000 vertices takes about 3 s on one core.
 
     Examples
     --------

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from eigenshape.geometry.measure import face_areas, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
