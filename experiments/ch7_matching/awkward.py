@@ -21,9 +21,9 @@ from real_shapes import DATA, require_data
 
 # A turn, so that awkward files are not matched to themselves in place
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-N_HOLES, HOLE = 8, 0.08  # holes of a part, and their radius in roots of the area
-LEFT_OUT = 0.3  # share of the vertices of a part that a plane removes
-GAP = 0.5, 0.55  # the share of the vertices below the two planes between which a part is torn
+N_HOLES, HOLE = 5, 0.05  # holes of a part, and their radius in roots of the area
+LEFT_OUT = 0.2  # share of the vertices of a part that a plane removes
+GAP = 0.55, 0.58  # the share of the vertices below the two planes between which a part is torn
 
 
 def prepare(path: Path) -> es.TriangleMesh:
@@ -123,13 +123,21 @@ def torn(names: list[str], folder: Path) -> list[dict[str, object]]:
         match = es.match_shapes(done.mesh, whole)
         truth = whole.vertices[done.source_vertices]
         gaps = np.linalg.norm(match.pull(whole.vertices) - truth, axis=1)
+        errors = 100 * gaps / np.sqrt(es.geometry.surface_area(whole))
+        n_pieces, piece = es.geometry.vertex_components(done.mesh)
+        areas = np.bincount(piece, weights=es.geometry.dual_volumes(done.mesh))
+        large = piece == areas.argmax()
         rows.append(
             {
                 "part": one,
                 "whole": two,
-                "pieces": es.geometry.vertex_components(done.mesh)[0],
-                "mean error": float(100 * gaps.mean() / np.sqrt(es.geometry.surface_area(whole))),
-                "mean confidence": float(match.confidence.mean()),
+                "pieces": n_pieces,
+                "error of the largest piece": float(errors[large].mean()),
+                "confidence of the largest piece": float(match.confidence[large].mean()),
+                "error of the others": float(errors[~large].mean()) if n_pieces > 1 else None,
+                "confidence of the others": float(match.confidence[~large].mean())
+                if n_pieces > 1
+                else None,
                 "repairs": list(done.report),
                 "report": list(match.report),
             }
@@ -157,10 +165,10 @@ def main() -> None:
             return
         results: dict[str, object] = {}
         for what, measure in {
-            "torn": lambda: torn(names, Path(folder)),
             "skulls": lambda: skulls(
                 sorted(p.stem for p in (DATA / "mice" / "full").glob("*.ply"))
             ),
+            "torn": lambda: torn(names, Path(folder)),
             "awkward": lambda: awkward(files),
         }.items():
             results[what] = measure()
