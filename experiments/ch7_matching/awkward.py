@@ -37,12 +37,12 @@ def landmarks(path: Path) -> dict[str, list[float]]:
     return {point["label"]: point["position"] for point in points}
 
 
-def skulls(names: list[str]) -> list[dict[str, object]]:
+def skulls(names: list[str]) -> dict[str, dict[str, object]]:
     """Match each two skulls, and measure the error at landmarks in mm."""
     folder = DATA / "mice"
     meshes = {name: prepare(folder / "full" / f"{name}.ply") for name in names}
     marks = {name: landmarks(folder / f"{name}.mrk.json") for name in names}
-    rows: list[dict[str, object]] = []
+    rows: dict[str, dict[str, object]] = {}
     for one, two in track(list(combinations(names, 2)), "skulls"):
         start = time.process_time()
         match = es.match_shapes(meshes[one], meshes[two])
@@ -52,20 +52,16 @@ def skulls(names: list[str]) -> list[dict[str, object]]:
         on_part = es.geometry.closest_points(meshes[one], starts)
         images = match.pull(meshes[two].vertices)[meshes[one].faces[on_part.simplices]]
         gaps = np.linalg.norm(np.einsum("pc,pcd->pd", on_part.weights, images) - ends, axis=1)
-        rows.append(
-            {
-                "part": one,
-                "whole": two,
-                "vertices": [meshes[one].n_vertices, meshes[two].n_vertices],
-                "landmarks": len(both),
-                "mean error, mm": float(gaps.mean()),
-                "median error, mm": float(np.median(gaps)),
-                "worst error, mm": float(gaps.max()),
-                "mean confidence": float(match.confidence.mean()),
-                "CPU seconds": seconds,
-                "report": list(match.report),
-            }
-        )
+        rows[f"{one} on {two}"] = {
+            "vertices": [meshes[one].n_vertices, meshes[two].n_vertices],
+            "landmarks": len(both),
+            "mean": float(gaps.mean()),
+            "median": float(np.median(gaps)),
+            "worst": float(gaps.max()),
+            "confidence": float(match.confidence.mean()),
+            "seconds": seconds,
+            "report": list(match.report),
+        }
     return rows
 
 
