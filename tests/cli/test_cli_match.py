@@ -59,9 +59,37 @@ def test_a_map_says_how_sure_it_is(folder):
 def test_a_scale_is_a_word_or_a_number(folder):
     arguments = "match", folder / "scan.ply", folder / "posed.ply", "--scale"
     assert json.loads(run(*arguments, "0.9", "--json").stdout)["scale"] == 0.9
-    assert "--scale takes known, unknown or a number; it is 'big'" in run(
+    assert "--scale takes auto, known, unknown or a number; it is 'big'" in run(
         *arguments, "big", code=2
     ).output.replace("\n", " ")
+
+
+def test_a_raw_file_is_repaired_and_loose_pieces_are_named(folder):
+    mesh = es.read_mesh(folder / "scan.ply")
+    n = mesh.n_vertices
+    speck = mesh.vertices[0] + 1e-3 * np.eye(3)
+    raw = es.TriangleMesh(
+        np.vstack([mesh.vertices, speck]),
+        np.vstack([mesh.faces, mesh.faces[:1], [[n, n + 1, n + 2]]]),
+    )
+    es.write_mesh(raw, folder / "raw.ply")
+    done = run("match", folder / "raw.ply", folder / "posed.ply")
+    assert "drop_duplicate_faces removed 1 face" in done.stderr
+    assert "1 loose piece of" in done.stdout
+    assert "of the area of the part was left out." in done.stdout
+    refused = run(
+        "match", folder / "raw.ply", folder / "posed.ply", "--repair", "none", code=1
+    ).output.replace("\n", " ")
+    assert "--repair auto" in refused
+
+
+def test_a_shape_that_turns_into_itself_says_so(folder):
+    es.write_mesh(es.shapes.torus(30, 12), folder / "ring.ply")
+    found = json.loads(run("match", folder / "ring.ply", folder / "ring.ply", "--json").stdout)
+    assert found["n_equally_good"] > 3
+    assert found["mean_confidence"] < 0.3
+    text = run("match", folder / "ring.ply", folder / "ring.ply").stdout
+    assert "maps that differ fit equally well" in text.replace("\n", " ")
 
 
 def test_a_map_is_written_to_known_files_only(folder):

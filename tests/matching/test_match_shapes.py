@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.topology import submesh
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.target import prepare_target
@@ -162,23 +162,87 @@ def test_a_match_is_a_list_of_vertices_for_other_functions(match, target, cut):
     assert one.closeness.displacement.max() == two.closeness.displacement.max()
 
 
-def test_a_whole_of_two_pieces_is_refused_and_the_repair_works(target):
+def test_a_whole_of_two_pieces_is_matched_piece_by_piece(target):
+    """An animal and a ring, matched to another pose of the animal and the same ring."""
+    ring = es.shapes.torus(30, 15)
+    size = np.sqrt(es.geometry.surface_area(target.mesh) / es.geometry.surface_area(ring))
+    ring = es.TriangleMesh(0.7 * size * ring.vertices + 9.0, ring.faces)
+    whole = es.geometry.disjoint_union(ring, target.mesh)
+    part = es.geometry.disjoint_union(moved(creature(0)), ring)
+    match = match_shapes(part, whole)
+    n = target.mesh.n_vertices
+    gaps = match.pull(whole.vertices)[:n] - target.mesh.vertices
+    assert np.median(np.linalg.norm(gaps, axis=1)) < 0.05 * size
+    assert (match.vertices[n:] < ring.n_vertices).all()
+    assert "piece 0 of the part was placed on piece 0 of the whole" in match.report
+
+
+def test_a_speck_beside_a_whole_is_left_out_by_name(target, cut):
+    speck = es.TriangleMesh(1e-3 * np.eye(3), [[0, 1, 2]])
+    whole = prepare_target(es.geometry.disjoint_union(speck, target.mesh))
+    (sentence,) = whole.report
+    assert sentence.startswith("1 loose piece of ")
+    assert sentence.endswith(" % of the area of the whole was left out")
+    alone, beside = match_shapes(cut.mesh, target), match_shapes(cut.mesh, whole)
+    assert np.array_equal(beside.vertices, alone.vertices + 3)
+    assert beside.report == whole.report
+
+
+def test_a_whole_whose_faces_look_inward_gives_the_same_places(target, cut):
+    inward = es.TriangleMesh(target.mesh.vertices, target.mesh.faces[:, ::-1])
+    one, two = match_shapes(cut.mesh, target), match_shapes(cut.mesh, inward)
+    assert np.allclose(one.pull(target.mesh.vertices), two.pull(target.mesh.vertices))
+
+
+def test_a_surface_with_needles_is_matched_as_if_it_had_none(target, cut):
+    """Smoothing shrinks faces at needles until no operator can be solved."""
     mesh = target.mesh
-    far = es.TriangleMesh(
-        np.vstack([mesh.vertices, mesh.vertices + 9]),
-        np.vstack([mesh.faces, mesh.faces[:-50] + mesh.n_vertices]),
+    # Split faces near one of their corners, by far less than smoothing moves a vertex.
+    chosen = np.arange(0, mesh.n_faces, 40)
+    a, b, c = (mesh.vertices[mesh.faces[chosen, k]] for k in range(3))
+    new = np.arange(len(chosen)) + mesh.n_vertices
+    corners = mesh.faces[chosen].T
+    split = [np.column_stack([corners[i], corners[(i + 1) % 3], new]) for i in range(3)]
+    faces = np.vstack([np.delete(mesh.faces, chosen, axis=0), *split])
+    needles = es.TriangleMesh(
+        np.vstack([mesh.vertices, a + 1e-6 * (b - a) + 1e-6 * (c - a)]), faces
     )
-    whole = es.geometry.drop_unreferenced(far).mesh
-    with pytest.raises(InvalidShapeError, match=r"must be connected; it has 2 components"):
-        prepare_target(whole)
-    assert (
-        prepare_target(es.repair(whole, ["largest_component"]).mesh).mesh.n_vertices == N_VERTICES
-    )
+    match = match_shapes(cut.mesh, needles)
+    gaps = match.pull(needles.vertices) - mesh.vertices[cut.source_vertices]
+    unit = np.sqrt(es.geometry.surface_area(mesh))
+    assert np.median(np.linalg.norm(gaps, axis=1)) < 0.03 * unit
+
+
+def test_another_individual_is_scaled_by_the_root_of_the_ratio_of_areas(target):
+    match = match_shapes(moved(creature(0), 2.0), target)
+    assert match.scale == pytest.approx(0.5, rel=0.05)
+    assert "the root of the ratio of areas: both shapes are complete" in match.report[0]
+    assert np.median(errors(match, target, np.arange(N_VERTICES))) < 3
+
+
+def test_a_part_in_another_unit_is_searched_for_by_itself(target, cut):
+    match = match_shapes(moved(cut.mesh, 1000.0), target)
+    assert match.scale == pytest.approx(1e-3, rel=0.15)
+    assert "which fits best" in match.report[0]
+
+
+@pytest.mark.parametrize(
+    ("shape", "least"), [(es.icosphere(3), 4), (es.shapes.torus(40, 20), 4)], ids=["ball", "ring"]
+)
+def test_a_shape_that_turns_into_itself_has_several_maps(shape, least):
+    match = match_shapes(moved(shape), shape)
+    assert match.n_equally_good >= least
+    assert match.confidence.mean() < 0.3
+
+
+def test_an_animal_has_one_map(match, target):
+    assert match.n_equally_good == 1
+    assert match_shapes(moved(target.mesh), target).n_equally_good == 1
 
 
 def test_a_part_that_is_larger_than_the_whole_is_refused(target):
     with pytest.raises(InvalidParameterError, match=r"more than 1\.5 times the area of the whole"):
-        match_shapes(moved(creature(0), 2.0), target)
+        match_shapes(moved(creature(0), 2.0), target, scale="known")
 
 
 def test_a_part_whose_noise_adds_to_its_area_is_not_refused(target):
@@ -197,13 +261,13 @@ def test_pieces_that_are_all_tiny_are_refused(target, cut):
     faces = es.icosphere(0).faces
     two = es.TriangleMesh(np.vstack([dots, dots + 1]), np.vstack([faces, faces + len(dots)]))
     with pytest.raises(InvalidParameterError, match="a piece with 1% of the area of the whole"):
-        match_shapes(two, target)
+        match_shapes(two, target, scale="known")
 
 
 @pytest.mark.parametrize("scale", ["guess", 0.0, -1.0, np.nan, np.inf])
 def test_a_scale_that_is_none_is_refused(target, cut, scale):
     with pytest.raises(
-        InvalidParameterError, match=r'scale must be "known", "unknown" or a positi'
+        InvalidParameterError, match=r'scale must be "auto", "known", "unknown" or a positi'
     ):
         match_shapes(cut.mesh, target, scale=scale)
 

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
+from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
     err,
@@ -15,7 +16,7 @@ from eigenshape.cli.console import (
     print_written,
     progress_bar,
 )
-from eigenshape.cli.inputs import JsonOption
+from eigenshape.cli.inputs import AutoRepairOption, JsonOption
 
 
 def fuse(
@@ -29,6 +30,7 @@ def fuse(
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Write the surface to this mesh file.")
     ],
+    repair: AutoRepairOption = "auto",
     as_json: JsonOption = False,
 ) -> None:
     """Join scans of one shape from several sides, in any places, to one surface.
@@ -38,7 +40,7 @@ def fuse(
 
     For instance: eigenshape fuse frame1.pcd frame2.pcd frame3.pcd -o whole.ply
     """
-    meshes = [es.io.read_surface(path).mesh for path in scans]
+    meshes = [steps.load_surface(path, repair) for path in scans]
     with progress_bar("fuse") as progress:
         fused = es.matching.fuse_scans(meshes, progress=progress)
     es.write_mesh(fused.mesh, output)

@@ -40,6 +40,18 @@ IndexRepairOption = Annotated[
         ),
     ),
 ]
+AutoRepairOption = Annotated[
+    str,
+    typer.Option(
+        "--repair",
+        metavar="NAMES",
+        help=(
+            "Repairs to apply to each mesh first, in this order, separated by commas: "
+            f"{', '.join(MESH_REPAIRS)}. auto does what is needed, but fills no hole and "
+            "drops no component; none refuses meshes that need repair. By default auto."
+        ),
+    ),
+]
 MeshArgument = Annotated[
     Path,
     typer.Argument(

@@ -10,7 +10,7 @@ import typer
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import SOME_FAILED, print_json, progress_bar
-from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, UpOption, ViewOption
+from eigenshape.cli.inputs import AutoRepairOption, JsonOption, MeshArgument, UpOption, ViewOption
 
 COLUMNS = {
     "part": "part",
@@ -49,7 +49,7 @@ def label(
             "one, has the name of label 0 in the first line, of label 1 in the second, and so on.",
         ),
     ] = None,
-    repair: RepairOption = "",
+    repair: AutoRepairOption = "auto",
     output: Annotated[
         Path | None,
         typer.Option(
@@ -77,7 +77,7 @@ def label(
     side = steps.parse_side(view, up)
     steps.require_label_path(output)
     examples, names, left_out = steps.read_examples(like or [], labels or [], library)
-    target = steps.load_mesh(mesh, repair)
+    target = steps.load_surface(mesh, repair)
     with progress_bar("label") as progress:
         found = es.transfer_labels(list(examples.values()), target, progress=progress)
     rows = steps.label_rows(target, found, names)

@@ -8,23 +8,25 @@ import typer
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import out, print_json, progress_bar
-from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, UpOption, ViewOption
+from eigenshape.cli.inputs import AutoRepairOption, JsonOption, ShapeArgument, UpOption, ViewOption
 
 
 def match(
-    mesh: MeshArgument,
-    whole: MeshArgument,
+    mesh: ShapeArgument,
+    whole: ShapeArgument,
     *,
     scale: Annotated[
         str,
         typer.Option(
             help=(
                 "known if both files have one unit of length, unknown to search for the size of "
-                "the part, or a number by which its lengths are multiplied."
+                "the part, or a number by which its lengths are multiplied. By default the root of "
+                "the ratio of areas if both shapes are complete and differ in size, known if not, "
+                "and unknown if the part is too large or too small for that."
             )
         ),
-    ] = "known",
-    repair: RepairOption = "",
+    ] = "auto",
+    repair: AutoRepairOption = "auto",
     output: Annotated[
         Path | None,
         typer.Option(
@@ -47,13 +49,16 @@ def match(
 ) -> None:
     """Find where each point of a part, a scan or a pose lies on a whole shape.
 
+    Both meshes are repaired first where they need it, and loose pieces are left out; what was done is
+    printed.
+
     For instance: eigenshape match scan.ply cat.ply --picture map.png -o map.csv
     """
     steps.require_picture(picture)
     side = steps.parse_side(view, up)
     steps.require_output(output, steps.MAP_FILES, "A map")
     size = steps.parse_scale(scale)
-    ours, theirs = (steps.load_mesh(path, repair) for path in (mesh, whole))
+    ours, theirs = (steps.load_surface(path, repair) for path in (mesh, whole))
     with progress_bar("match") as progress:
         found = es.match_shapes(ours, theirs, scale=size, progress=progress)
     facts = steps.match_facts(found)

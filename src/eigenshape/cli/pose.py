@@ -9,7 +9,7 @@ import typer
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import out, print_json, progress_bar
-from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption, UpOption, ViewOption
+from eigenshape.cli.inputs import AutoRepairOption, JsonOption, MeshArgument, UpOption, ViewOption
 
 
 def pose(
@@ -26,7 +26,7 @@ def pose(
             ),
         ),
     ] = None,
-    repair: RepairOption = "",
+    repair: AutoRepairOption = "auto",
     output: Annotated[
         Path | None,
         typer.Option(
@@ -42,14 +42,16 @@ def pose(
 ) -> None:
     """Bend a mesh into the pose of another one; what corresponds is found by itself.
 
-    Repairs are applied to the mesh that is bent.
+    Repairs are applied to both meshes; with --rest, to the mesh that is bent alone.
 
     For instance: eigenshape pose cat.ply --like lion.ply -o bent.ply --picture bent.png
     """
     steps.require_picture(picture)
     side = steps.parse_side(view, up)
     steps.require_mesh_path(output)
-    target, posed = steps.load_mesh(mesh, repair), steps.load_mesh(like, "")
+    # A repair may change the faces, which --rest and --like must share.
+    other = "" if rest else repair
+    target, posed = steps.load_mesh(mesh, repair), steps.load_mesh(like, other)
     source = steps.load_mesh(rest, "") if rest else posed
     factor = sqrt(es.geometry.surface_area(source) / es.geometry.surface_area(target))
     with progress_bar("match") as progress:

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._threads import map_in_threads
-from eigenshape.matching.assignment import assign_far_points
+from eigenshape.matching.assignment import N_FAR, assign_far_points
 from eigenshape.matching.evidence import FittedMap
 from eigenshape.matching.fitting import (
     FARTHEST,
@@ -84,8 +84,11 @@ def _best_first(maps: list[FittedMap]) -> list[FittedMap]:
 def find_maps(
     plan: FitPlan, differences: Float[np.ndarray, "m k"], ours: Modes, theirs: Modes
 ) -> list[FittedMap]:
-    """Return maps of a part, the best fit first, which low modes made smooth and which slid."""
-    maps = grow_maps(plan, differences)
+    """Return maps of a part, the best fit first, which low modes made smooth and which slid.
+
+    A part with so few points that it bends to any map has none.
+    """
+    maps = grow_maps(plan, differences) if len(plan.part.points) >= N_FAR else []
     if not maps:
         return []
     first, *others = _smooth_best(plan, maps, ours, theirs)

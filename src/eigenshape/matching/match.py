@@ -1,5 +1,6 @@
 """Dense correspondences of a part or a whole with a whole, without training."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +12,10 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import face_areas, surface_area
+from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import outward_vote
-from eigenshape.geometry.topology import submesh, vertex_components
+from eigenshape.geometry.topology import vertex_components
 from eigenshape.matching.evidence import (
     N_COLUMNS,
     Quality,
@@ -23,31 +24,31 @@ from eigenshape.matching.evidence import (
     vertex_evidence,
 )
 from eigenshape.matching.fitting import plan_fit
-from eigenshape.matching.growth import find_maps, first_support, fitted_maps
+from eigenshape.matching.growth import find_maps, first_support
 from eigenshape.matching.pairs import Pairs, patch_differences
+from eigenshape.matching.pieces import Piece, report_left_out, split_pieces
+from eigenshape.matching.rivals import count_places, equally_good_maps
+from eigenshape.matching.scale import MOST_AREA, N_PART, choose_factor, require_scale
 from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.matching.spectral_refinement import modes_of_part, refine_places
-from eigenshape.matching.surface import Surface, describe_surface, turn_over
-from eigenshape.matching.target import MatchTarget, as_target, require_matchable
-from eigenshape.operators.smoothing import denoise
+from eigenshape.matching.surface import describe_surface, turn_over
+from eigenshape.matching.target import (
+    LEAST_AREA,
+    MatchTarget,
+    TargetPiece,
+    as_target,
+    require_matchable,
+)
+from eigenshape.matching.working_copy import WorkingCopy, carry_map
 
-N_PART = 300  # points of the part
-# A part with this many times the area of the whole is not a part of it in the same unit.
-MOST_AREA = 1.5
-# Pieces with less of the area of the whole are not matched: they have too few patches.
-LEAST_AREA = 0.01
 # Support of the part turned inside out, as a share of that of the part, from which nothing tells
 # the outside from the inside, and so left from right.
 AS_HANDED = 0.9
 # Mean agreement of normals with those of the convex hull (`outward_vote`) from which the outside is
 # known. All of 46 parts of the tuning half have at least 0.49, and patches were wrong on four.
 CLEAR_VOTE = 0.3
-# Sizes of the part that are tried, as shares of the longest side of the whole's box
-SIZES = 1.25 ** np.arange(1, -6, -1.0)
-# Quantile of the ratios of distances on the whole to those on the part that stands for its size.
-# Ways around what was cut off are longer on the part, so that the median is 4 to 15 % too small; on
-# eight cuts and scans of the tuning half this quantile was 10 % too small to 6 % too large.
-UNCUT = 0.7
+# A piece of the whole with less free area than this share of a piece of the part is taken.
+FREE = 0.5
 
 
 @one_blas_thread()
@@ -55,7 +56,7 @@ def match_shapes(
     part: MeshLike,
     whole: MeshLike | MatchTarget,
     *,
-    scale: str | float = "known",
+    scale: str | float = "auto",
     progress: Progress | None = None,
 ) -> ShapeMatch:
     """Find the point of a whole shape that corresponds to each vertex of a part of it.
@@ -88,10 +89,13 @@ def match_shapes(
     part : MeshLike
         A part of the whole, or a whole shape. Each piece that is not tiny is matched by itself.
     whole : MeshLike or MatchTarget
-        A connected surface; prepare it once with `prepare_target` to match many parts.
-    scale : "known", "unknown" or float
+        Prepare it once with `prepare_target` to match many parts. Each piece of the part is placed on
+        the piece of the whole where its map has the highest score.
+    scale : "auto", "known", "unknown" or float
         "known": both shapes have one unit of length. A number: lengths of the part are multiplied
-        by it first. "unknown": seven sizes are tried, which takes five times as long.
+        by it first. "unknown": seven sizes are tried, which takes five times as long. "auto": the
+        root of the ratio of areas if both shapes are complete and differ in size by more than
+        10 %; else "known", or "unknown" if the part is too large or too small for that.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -102,10 +106,11 @@ def match_shapes(
     Raises
     ------
     InvalidParameterError
-        If `scale` is none of these, or the part has more than 1.5 times the area of the whole.
+        If `scale` is none of these; or it is "known" or a number, and the part has more than 1.5
+        times the area of the whole, or several pieces and none with 1 % of that area.
     InvalidShapeError
         If a mesh has a face without area or twice, a vertex without face, or neighboring faces that
-        disagree in orientation; or the whole has several components.
+        disagree in orientation.
 
     See Also
     --------
@@ -116,7 +121,9 @@ def match_shapes(
     Notes
     -----
     Nothing is found where part and whole have nothing in common, but a map is returned all the
-    same: look at `confidence`. A part of 5,000 vertices takes about 3 s on one core.
+    same: look at `confidence`. If the shape can be turned into itself, there are several maps:
+    look at `n_equally_good`. A piece of more than 16,000 vertices or with needles is matched by way
+    of a copy with fewer vertices, and the map is carried over. A part of 5,000 vertices takes about 3 s on one core.
 
     Examples
     --------
@@ -132,83 +139,21 @@ def match_shapes(
     >>> image.shape == scan.mesh.vertices.shape
     True
     """
-    report = progress or silent
+    tell = progress or silent
     mesh = as_mesh(part, "part")
     require_matchable(mesh)
-    factor = _require_scale(scale)
-    report(0.0, "prepare the whole")
+    scale = require_scale(scale)
+    tell(0.0, "prepare the whole")
     target = as_target(whole)
+    # Even a part that is as large as it may be has its large pieces among these.
+    pieces = split_pieces(mesh, LEAST_AREA / MOST_AREA)
     if scale == "unknown":
-        report(0.3, "find the scale")
-        factor = _find_scale(mesh, target)
-    _require_smaller(mesh, target, factor)
-    report(0.5, "match")
-    found = _match_pieces(mesh, target, factor)
-    report(1.0, "matched")
+        tell(0.3, "find the scale")
+    factor, report = choose_factor(mesh, pieces, target, scale)
+    tell(0.5, "match")
+    found = _match_pieces(mesh, pieces, target, factor, report)
+    tell(1.0, "matched")
     return found
-
-
-def _require_scale(scale: object) -> float:
-    """Return the factor that a scale stands for, 1 where it is known or has to be found."""
-    if isinstance(scale, str) and scale in ("known", "unknown"):
-        return 1.0
-    numbers = np.asarray(scale)
-    if numbers.dtype.kind not in "iuf" or numbers.shape != () or not 0 < float(numbers) < np.inf:
-        raise InvalidParameterError(
-            f'scale must be "known", "unknown" or a positive number; it is {scale!r}.'
-        )
-    return float(numbers)
-
-
-def _require_smaller(mesh: TriangleMesh, target: MatchTarget, factor: float) -> None:
-    limit = MOST_AREA * surface_area(target.mesh) / factor**2
-    # Noise of a quarter of an edge adds a fifth to the area, which must not refuse a whole.
-    if surface_area(mesh) > limit and surface_area(denoise(mesh)) > limit:
-        share = surface_area(mesh) * MOST_AREA / limit
-        raise InvalidParameterError(
-            f"A part must not have more than {MOST_AREA} times the area of the whole; it has "
-            f'{share:.3g} times. Exchange the two shapes, or pass scale="unknown".'
-        )
-
-
-def _find_scale(mesh: TriangleMesh, target: MatchTarget) -> float:
-    """Return the factor for the part at which its largest piece fits the whole best."""
-    labels, areas = _pieces(mesh)
-    largest, _ = submesh(mesh, labels[mesh.faces[:, 0]] == areas.argmax())
-    ours, theirs = (float(np.ptp(m.vertices, axis=0).max()) for m in (largest, target.mesh))
-    factors = SIZES * theirs / ours
-    share = surface_area(largest) / surface_area(target.mesh)
-    factors = factors[factors**2 * share <= MOST_AREA]
-    best, highest = 1.0, -1.0
-    for factor in factors.tolist():
-        surface = describe_surface(largest, target.unit / factor, N_PART)
-        differences = patch_differences(surface, target.surface)
-        maps = fitted_maps(plan_fit(surface, target.surface), differences)
-        score = 0.0
-        if maps:
-            one = maps[0]
-            quality = rate_map(surface, target.surface, differences, one.pairs, one.fit.places)
-            score = quality.score * np.sqrt(surface.area)
-        if score > highest:
-            # Between the sizes that are tried, distances between pairs say how large the part is.
-            stretch = _stretch(surface, target.surface, maps[0].pairs) if maps else 1.0
-            best, highest = factor * stretch, score
-    return best
-
-
-def _stretch(part: Surface, whole: Surface, pairs: Pairs) -> float:
-    """Return how much larger than the part it is on the whole, from distances between pairs."""
-    ours = part.between[np.ix_(pairs.points, pairs.points)].astype(np.float64)
-    theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
-    known = (ours > 0) & (theirs > 0)
-    return float(np.quantile(theirs[known] / ours[known], UNCUT)) if known.any() else 1.0
-
-
-def _pieces(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " k"]]:
-    """Return the component of each vertex, and the area of each component."""
-    count, labels = vertex_components(mesh)
-    owners = labels[mesh.faces[:, 0]]
-    return labels, np.bincount(owners, weights=face_areas(mesh), minlength=count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,37 +166,54 @@ class _Piece:
     evidence: Float[np.ndarray, "n c"]
     quality: Quality
     handed: bool
+    n_equally_good: int
 
 
-def _match_pieces(mesh: TriangleMesh, target: MatchTarget, factor: float) -> ShapeMatch:
+def _match_pieces(
+    mesh: TriangleMesh,
+    pieces: Sequence[Piece],
+    target: MatchTarget,
+    factor: float,
+    report: tuple[str, ...],
+) -> ShapeMatch:
     """Match each piece by itself; tiny ones go where their nearest neighbors in space go."""
     n = mesh.n_vertices
     faces, weights = np.zeros(n, dtype=np.int64), np.full((n, 3), 1 / 3)
     sure, evidence, done = np.zeros(n), np.zeros((n, N_COLUMNS)), np.zeros(n, dtype=bool)
     least = LEAST_AREA * surface_area(target.mesh) / factor**2
-    labels, areas = _pieces(mesh)
-    matched = np.flatnonzero(areas >= least) if len(areas) > 1 else np.array([0])
-    found: list[_Piece] = []
-    for number in matched.tolist():
-        part, vertices = submesh(mesh, labels[mesh.faces[:, 0]] == number)
-        piece = _match_piece(part, target, factor)
-        faces[vertices], weights[vertices] = piece.faces, piece.weights
-        sure[vertices], evidence[vertices], done[vertices] = piece.confidence, piece.evidence, True
-        found.append(piece)
-    if not found:
+    # A connected part is matched, however small it is.
+    is_connected = len(pieces) == 1 and len(pieces[0].vertices) == n
+    matched = [piece for piece in pieces if is_connected or piece.area >= least]
+    if not matched:
         raise InvalidParameterError(
-            f"A part must have a piece with {LEAST_AREA:.0%} of the area of the whole; "
-            f'none of its {len(areas)} pieces has. Pass scale="unknown" if units may differ.'
+            f"A part must have a piece with {LEAST_AREA:.0%} of the area of the whole; none of its "
+            f'{vertex_components(mesh)[0]} pieces has. Pass scale="unknown" if units may differ.'
         )
+    report += report_left_out(mesh, matched, "part") + target.report
+    found: list[_Piece] = []
+    free = [each.piece.area / factor**2 for each in target.pieces]
+    for number, piece in enumerate(matched):
+        # A piece of the whole that other pieces cover is only taken if there is no other.
+        roomy = [k for k, area in enumerate(free) if area >= FREE * piece.area] or [0]
+        maps = {k: _match_piece(piece.copy, target.pieces[k], factor) for k in roomy}
+        best = max(maps, key=lambda k: maps[k].quality.score)
+        one = maps[best]
+        free[best] -= piece.area
+        faces[piece.vertices] = target.pieces[best].piece.faces[one.faces]
+        weights[piece.vertices] = one.weights
+        sure[piece.vertices], evidence[piece.vertices] = one.confidence, one.evidence
+        done[piece.vertices] = True
+        found.append(one)
+        if len(target.pieces) > 1:
+            report += (f"piece {number} of the part was placed on piece {best} of the whole",)
     if not done.all():
         nearest = np.flatnonzero(done)[cKDTree(mesh.vertices[done]).query(mesh.vertices[~done])[1]]
         faces[~done], weights[~done] = faces[nearest], weights[nearest]
     corners = target.mesh.faces[faces]
+    areas = [piece.area for piece in matched]
 
     def mean(what: str) -> float:
-        return float(
-            np.average([getattr(piece.quality, what) for piece in found], weights=areas[matched])
-        )
+        return float(np.average([getattr(one.quality, what) for one in found], weights=areas))
 
     return ShapeMatch(
         vertices=freeze(corners[np.arange(n), weights.argmax(axis=1)]),
@@ -263,36 +225,46 @@ def _match_pieces(mesh: TriangleMesh, target: MatchTarget, factor: float) -> Sha
         score=mean("score"),
         orientation=mean("orientation"),
         coverage=mean("coverage"),
-        handed=all(piece.handed for piece in found),
+        handed=all(one.handed for one in found),
+        n_equally_good=max(one.n_equally_good for one in found),
         scale=factor,
+        report=report,
     )
 
 
-def _match_piece(mesh: TriangleMesh, target: MatchTarget, factor: float) -> _Piece:
-    """Match a connected part."""
+def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piece:
+    """Match a connected part to a connected whole."""
     whole = target.surface
-    part = describe_surface(mesh, target.unit / factor, N_PART)
+    part = describe_surface(copy.mesh, target.unit / factor, N_PART)
     upright, turned = (first_support(part, whole, turned=side) for side in (False, True))
     handed = min(upright, turned) < AS_HANDED * max(upright, turned)
     if handed and turned > upright and outward_vote(part.mesh) < CLEAR_VOTE:
         part = turn_over(part)
     differences = patch_differences(part, whole)
     modes = modes_of_part(part.mesh, target.modes)
-    maps = find_maps(plan_fit(part, whole), differences, modes, target.modes)
+    plan = plan_fit(part, whole)
+    maps = find_maps(plan, differences, modes, target.modes)
     if maps:
         best = maps[0]
         quality = rate_map(part, whole, differences, best.pairs, best.fit.places)
         evidence = vertex_evidence(part, whole, differences, maps, quality)
         faces, weights = refine_places(modes, target.modes, whole.mesh, best.fit.places)
-        return _Piece(faces, weights, confidence(evidence), evidence, quality, handed)
-    # Too few points agree for a map: take the most similar patch of each, and trust none.
-    partners = differences.argmin(axis=1)
-    places = whole.points[partners][part.nearest]
-    pairs = Pairs(np.arange(len(partners)), partners, np.ones(len(partners)))
-    quality = rate_map(part, whole, differences, pairs, places)
-    faces, weights = _at_vertices(target.mesh, places)
-    n = len(places)
-    return _Piece(faces, weights, np.zeros(n), np.zeros((n, N_COLUMNS)), quality, handed)
+        rivals = equally_good_maps(plan, differences, maps)
+        # Each of several equally good places is as likely as the others.
+        sure = confidence(evidence) / count_places(plan, best, rivals)
+        n_equally_good = 1 + len(rivals)
+    else:
+        # Too few points agree for a map: take the most similar patch of each, and trust none.
+        partners = differences.argmin(axis=1)
+        places = whole.points[partners][part.nearest]
+        pairs = Pairs(np.arange(len(partners)), partners, np.ones(len(partners)))
+        quality = rate_map(part, whole, differences, pairs, places)
+        faces, weights = _at_vertices(whole.mesh, places)
+        sure, evidence = np.zeros(len(places)), np.zeros((len(places), N_COLUMNS))
+        n_equally_good = 1
+    values = np.column_stack([sure, evidence])
+    faces, weights, values = carry_map(copy, target.piece.copy, faces, weights, values)
+    return _Piece(faces, weights, values[:, 0], values[:, 1:], quality, handed, n_equally_good)
 
 
 def _at_vertices(

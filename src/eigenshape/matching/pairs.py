@@ -91,7 +91,8 @@ def _differences(part: Surface, other: Surface | View, power: float) -> Float[np
 def descriptor_costs(differences: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "m k"]:
     """Return differences of patches in units of the median difference to the most similar one."""
     costs = differences
-    return costs / max(float(np.median(costs.min(axis=1))), np.finfo(float).tiny)
+    # Differences of single precision below this are rounding.
+    return costs / max(float(np.median(costs.min(axis=1))), float(np.finfo(np.float32).eps))
 
 
 def first_candidates(costs: Float[np.ndarray, "m k"]) -> tuple[np.ndarray, np.ndarray]:

@@ -16,20 +16,20 @@ COLUMNS = "vertex,whole_vertex,face,weight_1,weight_2,weight_3,confidence"
 
 
 def parse_scale(text: str) -> Any:
-    """Return "known" and "unknown" as they are, and a number as a number.
+    """Return "auto", "known" and "unknown" as they are, and a number as a number.
 
     Raises
     ------
     InvalidParameterError
         If it is neither.
     """
-    if text in ("known", "unknown"):
+    if text in ("auto", "known", "unknown"):
         return text
     try:
         return float(text)
     except ValueError as err:
         raise InvalidParameterError(
-            f"--scale takes known, unknown or a number; it is {text!r}."
+            f"--scale takes auto, known, unknown or a number; it is {text!r}."
         ) from err
 
 
@@ -41,7 +41,9 @@ def match_facts(match: ShapeMatch) -> dict[str, Any]:
         "orientation": match.orientation,
         "coverage": match.coverage,
         "handed": match.handed,
+        "n_equally_good": match.n_equally_good,
         "scale": match.scale,
+        "report": match.report,
         "mean_confidence": float(match.confidence.mean()),
         "share_sure": float(match.sure().mean()),
     }
@@ -55,7 +57,12 @@ def match_sentence(facts: dict[str, Any]) -> str:
     )
     if not facts["handed"]:
         text += " Nothing tells outside from inside: left and right may be exchanged."
-    return text
+    if facts["n_equally_good"] > 1:
+        text += (
+            f" At least {facts['n_equally_good']} maps that differ fit equally well, since the shape "
+            "can be turned into itself; this is one of them."
+        )
+    return "\n".join([text, *(f"{sentence}." for sentence in facts["report"])])
 
 
 def save_match(match: ShapeMatch, path: Path) -> None:

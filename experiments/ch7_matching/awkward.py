@@ -1,0 +1,176 @@
+"""Raw files to dense correspondences: skulls as they were published, and small awkward files."""
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from itertools import combinations, pairwise
+from pathlib import Path
+
+import numpy as np
+from pairs import TUNING
+from rich.progress import track
+
+import eigenshape as es
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from frame import rounded
+from outputs import give_out, output_file, save_figures
+from real_shapes import DATA, require_data
+
+# A turn, so that awkward files are not matched to themselves in place
+TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+N_HOLES, HOLE = 5, 0.05  # holes of a part, and their radius in roots of the area
+LEFT_OUT = 0.2  # share of the vertices of a part that a plane removes
+GAP = 0.55, 0.58  # the share of the vertices below the two planes between which a part is torn
+
+
+def prepare(path: Path) -> es.TriangleMesh:
+    """Read a file as `eigenshape match` does."""
+    return es.repair(es.io.read_surface(path).mesh, ["auto"]).mesh
+
+
+def landmarks(path: Path) -> dict[str, list[float]]:
+    """Return the places of the landmarks of a skull by name."""
+    points = json.loads(path.read_text())["markups"][0]["controlPoints"]
+    return {point["label"]: point["position"] for point in points}
+
+
+def skulls(names: list[str]) -> dict[str, dict[str, object]]:
+    """Match each two skulls, and measure the error at landmarks in mm."""
+    folder = DATA / "mice"
+    meshes = {name: prepare(folder / "full" / f"{name}.ply") for name in names}
+    marks = {name: landmarks(folder / f"{name}.mrk.json") for name in names}
+    rows: dict[str, dict[str, object]] = {}
+    for one, two in track(list(combinations(names, 2)), "skulls"):
+        start = time.process_time()
+        match = es.match_shapes(meshes[one], meshes[two])
+        seconds = time.process_time() - start
+        both = [name for name in marks[one] if name in marks[two]]
+        starts, ends = (np.array([marks[name][key] for key in both]) for name in (one, two))
+        on_part = es.geometry.closest_points(meshes[one], starts)
+        images = match.pull(meshes[two].vertices)[meshes[one].faces[on_part.simplices]]
+        gaps = np.linalg.norm(np.einsum("pc,pcd->pd", on_part.weights, images) - ends, axis=1)
+        rows[f"{one} on {two}"] = {
+            "vertices": [meshes[one].n_vertices, meshes[two].n_vertices],
+            "landmarks": len(both),
+            "mean": float(gaps.mean()),
+            "median": float(np.median(gaps)),
+            "worst": float(gaps.max()),
+            "confidence": float(match.confidence.mean()),
+            "seconds": seconds,
+            "report": list(match.report),
+        }
+    return rows
+
+
+def awkward(paths: list[Path]) -> list[dict[str, object]]:
+    """Match each file to itself, turned: the error in hundredths of √area, or why it is refused."""
+    rows: list[dict[str, object]] = []
+    for path in track(paths, "awkward files"):
+        row: dict[str, object] = {"file": str(path.relative_to(DATA / "nasty"))}
+        try:
+            mesh = prepare(path)
+            match = es.match_shapes(es.TriangleMesh(mesh.vertices @ TURN.T, mesh.faces), mesh)
+        except es.EigenshapeError as err:
+            rows.append(row | {"refused": str(err).replace(str(path), path.name)})
+            continue
+        gaps = np.linalg.norm(match.pull(mesh.vertices) - mesh.vertices, axis=1)
+        unit = np.sqrt(es.geometry.surface_area(mesh))
+        row |= {"mean error": float(100 * gaps.mean() / unit)}
+        row |= {"mean confidence": float(match.confidence.mean())}
+        rows.append(row | {"equally good": match.n_equally_good, "report": list(match.report)})
+    return rows
+
+
+def torn_part(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMesh:
+    """Return what planes and holes leave, torn into pieces, with all that a raw file may have.
+
+    Faces are removed without a look at what is left, so that there are vertices with two fans and
+    loose pieces, vertices without a face, and one face that stands twice.
+    """
+    direction = rng.normal(size=3)
+    heights = mesh.vertices @ direction
+    cut, low, high = np.quantile(heights, (LEFT_OUT, *GAP))
+    unit = np.sqrt(es.geometry.surface_area(mesh))
+    centers = mesh.vertices[mesh.faces].mean(axis=1)
+    keep = centers @ direction > cut
+    keep &= (centers @ direction < low) | (centers @ direction > high)
+    for center in centers[rng.integers(len(centers), size=N_HOLES)]:
+        keep &= np.linalg.norm(centers - center, axis=1) > HOLE * unit
+    faces = mesh.faces[keep]
+    return es.TriangleMesh(mesh.vertices @ TURN.T, np.vstack([faces, faces[:1]]))
+
+
+def torn(names: list[str], folder: Path) -> list[dict[str, object]]:
+    """Match torn parts of animals, read from files, to the next pose with the same vertices."""
+    rows: list[dict[str, object]] = []
+    for number, (one, two) in enumerate(pairwise(names)):
+        if one.split("-")[0] != two.split("-")[0]:
+            continue
+        kind = one.split("-")[0].removeprefix("sumner_")
+        folder_of_kind = DATA / "retrieval" / kind
+        source, whole = (es.read_mesh(folder_of_kind / f"{name}.ply") for name in (one, two))
+        raw = torn_part(source, np.random.default_rng(number))
+        path = folder / f"{one}.ply"
+        es.write_mesh(raw, path)
+        done = es.repair(es.io.read_surface(path).mesh, ["auto"])
+        match = es.match_shapes(done.mesh, whole)
+        truth = whole.vertices[done.source_vertices]
+        gaps = np.linalg.norm(match.pull(whole.vertices) - truth, axis=1)
+        errors = 100 * gaps / np.sqrt(es.geometry.surface_area(whole))
+        n_pieces, piece = es.geometry.vertex_components(done.mesh)
+        areas = np.bincount(piece, weights=es.geometry.dual_volumes(done.mesh))
+        large = piece == areas.argmax()
+        rows.append(
+            {
+                "part": one,
+                "whole": two,
+                "pieces": n_pieces,
+                "error of the largest piece": float(errors[large].mean()),
+                "confidence of the largest piece": float(match.confidence[large].mean()),
+                "error of the others": float(errors[~large].mean()) if n_pieces > 1 else None,
+                "confidence of the others": float(match.confidence[~large].mean())
+                if n_pieces > 1
+                else None,
+                "repairs": list(done.report),
+                "report": list(match.report),
+            }
+        )
+    return rows
+
+
+def main() -> None:
+    """Match all, print and save the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--quick", action="store_true", help="three awkward files and one torn part"
+    )
+    parser.add_argument("--out", type=output_file, default="ch7-awkward.json")
+    arguments = parser.parse_args()
+    require_data()
+    files = sorted(path for path in (DATA / "nasty").glob("*/*") if path.is_file())
+    names = [*TUNING["cat"][:5], *TUNING["horse"][:5]]
+    with tempfile.TemporaryDirectory() as folder:
+        if arguments.quick:
+            few = [path for path in files if path.stem in ("fox", "moebius", "cylinder")]
+            give_out(
+                {"awkward": awkward(few), "torn": torn(names[:2], Path(folder))}, arguments.out
+            )
+            return
+        results: dict[str, object] = {}
+        for what, measure in {
+            "skulls": lambda: skulls(
+                sorted(p.stem for p in (DATA / "mice" / "full").glob("*.ply"))
+            ),
+            "torn": lambda: torn(names, Path(folder)),
+            "awkward": lambda: awkward(files),
+        }.items():
+            results[what] = measure()
+            save_figures(rounded(results), arguments.out)
+    give_out(rounded(results), arguments.out)
+
+
+if __name__ == "__main__":
+    main()
