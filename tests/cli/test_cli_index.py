@@ -212,6 +212,12 @@ def test_a_folder_and_a_shape_of_the_index_are_queries_too(meshes, index, tmp_pa
     assert (shown.count("Most similar shapes"), shown.count("score: ")) == (4, 1)
     alike = run_json("query", index, "fish/a", "-n", 1)["matches"]
     assert [match["name"] for match in alike] == ["fish/b"]
+    classes = run_json("query", index, "fish/a", "-n", 1, "--classify")["classes"]
+    assert next(iter(classes)) == "fish"
+    assert (
+        f"class: fish {100 * classes['fish']:.0f} %"
+        in run("query", index, "fish/a", "--classify").stdout
+    )
     assert "nobody is none of them" in run("query", index, "nobody", code=1).stderr
     only = run_json("query", index, "fish/a", "--filter", "label=bird")["matches"]
     assert {match["label"] for match in only} == {"bird"}

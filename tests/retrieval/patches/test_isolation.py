@@ -6,7 +6,7 @@ from search_cases import RECIPE, mixtures
 
 import eigenshape as es
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
-from eigenshape.retrieval.patches.distance import patch_distances, view_distances
+from eigenshape.retrieval.patches.distance import patch_distances
 from eigenshape.retrieval.patches.isolation import (
     N_NEAREST,
     USUAL_ISOLATION,

@@ -35,7 +35,9 @@ def test_an_empty_answer_has_nothing_alike():
 def test_classes_share_one_with_those_that_were_not_found():
     even = class_chances([EVEN_SCORE], ["cat"])
     assert even == {"cat": 0.5}
-    several = class_chances([0.3, 0.35, 0.35, 0.4, 0.4, 0.1], ["dog", "cat", "cat", None, "ox", "fish"])
+    several = class_chances(
+        [0.3, 0.35, 0.35, 0.4, 0.4, 0.1], ["dog", "cat", "cat", None, "ox", "fish"]
+    )
     assert list(several) == ["dog", "cat", "ox"]  # the sixth match does not count
     assert 0.98 < sum(several.values()) < 1
     twice = class_chances([0.3, 0.3], ["dog", "dog"])["dog"]
@@ -48,5 +50,7 @@ def test_classes_are_not_known_for_heat():
     index = es.ShapeIndex.create(None)
     heat = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
     index.add_descriptors("fish", [heat], label="fish")
-    with pytest.raises(es.InvalidParameterError, match="known for patches; 'fish' was found by heat"):
+    with pytest.raises(
+        es.InvalidParameterError, match="known for patches; 'fish' was found by heat"
+    ):
         index.query(heat).classify()
