@@ -202,7 +202,8 @@ class Matches(Sequence[Match]):
             if match.chance is None:
                 raise InvalidParameterError(
                     f"Probabilities of classes are known for patches; {match.name!r} was found by "
-                    "heat. Ask with a descriptor by a PatchRecipe (--method patches)."
+                    "heat. Ask by a PatchRecipe (--method patches), by which the index must describe "
+                    "its shapes."
                 )
         scores = [match.score for match in self.found]
         return class_chances(scores, [match.label for match in self.found])
