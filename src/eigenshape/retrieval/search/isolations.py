@@ -14,7 +14,7 @@ from eigenshape.retrieval.patches.isolation import N_REFERENCES, measure_isolati
 from eigenshape.retrieval.patches.packing import unpack_codes
 from eigenshape.retrieval.search.coarse import Rows
 
-FEWEST_TO_KEEP = 100  # shapes of an index that has such a file; fewer are measured in 20 ms
+FEWEST_TO_KEEP = 100  # shapes of an index that has such a file; fewer are measured in 10 ms
 
 
 def stored_isolations(
