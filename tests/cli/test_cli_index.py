@@ -233,6 +233,19 @@ def test_files_that_are_gone_are_pruned_when_asked(meshes, index, tmp_path):
     assert run_json("index", "stats", index)["shapes"] == 3
 
 
+def test_the_class_is_printed_with_its_probability(index, tmp_path):
+    folder = tmp_path / "patches"
+    shelf = ShapeIndex.create(folder)
+    for kind in ("fish", "bird"):
+        shelf.add(kind, make_creature(kind, n_vertices=500), label=kind, n_views=0)
+    found = run_json("query", folder, "fish", "-n", 1, "--classify")
+    assert list(found["classes"]) == ["bird"]
+    share = f"{100 * found['classes']['bird']:.0f} %"
+    assert f"class: bird {share}" in run("query", folder, "fish", "--classify").stdout
+    refused = run("query", index, "fish/a", "--classify", code=1).stderr
+    assert "Probabilities of classes are known for patches" in refused
+
+
 def test_a_folder_and_a_shape_of_the_index_are_queries_too(meshes, index, tmp_path):
     table = tmp_path / "matches.csv"
     answers = run_json("query", index, meshes, "-n", 2, "-o", table)

@@ -13,6 +13,7 @@ FIGURES["docs_errors/run.py"] = "docs_errors/expected.json"
 FIGURES["ch3_poses/figure_3_4.py"] = "ch3_poses/expected_figure_3_4.json"
 FIGURES["ch5_retrieval/robustness.py"] = "ch5_retrieval/expected_robustness.json"
 FIGURES["ch5_retrieval/frames.py"] = "ch5_retrieval/expected_frames.json"
+FIGURES["ch5_retrieval/answers.py"] = "ch5_retrieval/expected_answers.json"
 
 MADE_UP = (  # what needs no real shapes
     "ch1_compression/run.py",
@@ -41,6 +42,7 @@ ONE_MORE = {
     + 0.1,  # per cent, of sixty feature points; rounded to a tenth
     "ch5_retrieval/run.py": 100 / 6 + 0.1,  # per cent, of six queries
     "ch5_retrieval/robustness.py": 100 / 4 + 0.1,  # per cent, of four queries
+    "ch5_retrieval/answers.py": 0.01,  # a probability
 }
 
 

@@ -42,6 +42,7 @@ from eigenshape.cli.inputs import (
 # The types of the library are not named here, so that `--help` loads nothing heavy.
 AnyRecipe = Any
 Descriptor = Any
+N_VOTES = 5  # matches whose labels tell the class
 Ask = Callable[..., Any]  # returns the matches of a descriptor
 COLUMNS = (
     "query",
@@ -90,6 +91,14 @@ def query(
             "scan of all finds nearest.",
         ),
     ] = False,
+    classify: Annotated[
+        bool,
+        typer.Option(
+            "--classify",
+            help="Print the probability of each class, by the labels of the first five matches, "
+            "which are shown in any case.",
+        ),
+    ] = False,
     method: StoredMethodOption = None,
     repair: IndexRepairOption = "auto",
     picture: Annotated[
@@ -126,6 +135,8 @@ def query(
     side = steps.parse_side(view, up)
     repairs, filters = repair_names(repair), steps.parse_filters(where)
     drawn = picture is not None or explain is not None
+    if classify:
+        n_matches = max(n_matches, N_VOTES)
     shelf = es.ShapeIndex.open(index)
     recipe = steps.query_recipe(shelf, method)
     # Unlike the methods of Path, these say no to a text that cannot be a path, too.
@@ -152,10 +163,10 @@ def query(
         err.print(f"[yellow]not searched for:[/] {escape_text(name)}: {escape_text(reason)}")
     _write(answers, output)
     if as_json:
-        facts = [_facts(answer) for answer in answers]
+        facts = [_facts(answer, classify=classify) for answer in answers]
         print_json(facts if is_folder else facts[0])
     else:
-        _print(answers)
+        _print(answers, classify=classify)
     if drawn:
         _draw(answers[0], index, repairs, side, picture, explain)
     if failed:
@@ -238,12 +249,16 @@ def _write(answers: Sequence[_Answer], output: Path | None) -> None:
     print_written(output)
 
 
-def _print(answers: Sequence[_Answer]) -> None:
+def _print(answers: Sequence[_Answer], *, classify: bool) -> None:
     for answer in answers:
         title = "Most similar shapes"
         print_matches(answer.matches, title if len(answers) == 1 else f"{title}: {answer.title}")
         if answer.matches.nothing_alike:
             out.print("nothing alike here: unrelated shapes would score as well")
+        if classify:
+            classes = answer.matches.classify()
+            shares = [f"{escape_text(name)} {100 * share:.0f} %" for name, share in classes.items()]
+            out.print(f"class: {', '.join(shares) or 'unknown, since no match has a label'}")
     explain_scores([match for answer in answers for match in answer.matches])
     describe = sum(answer.seconds["describe"] for answer in answers)
     found = 1000 * sum(answer.seconds["query"] for answer in answers)
@@ -282,13 +297,15 @@ def _draw(
         steps.save_picture(figure, explain)
 
 
-def _facts(answer: _Answer) -> dict[str, Any]:
+def _facts(answer: _Answer, *, classify: bool) -> dict[str, Any]:
+    classes = {"classes": answer.matches.classify()} if classify else {}
     return {
         "scan": answer.title,
         "seconds": answer.seconds,
         "method": answer.matches.method,
         "compared": answer.matches.n_compared,
         "nothing_alike": answer.matches.nothing_alike,
+        **classes,
         "matches": [_match_facts(answer.descriptor, match) for match in answer.matches],
     }
 

@@ -17,9 +17,9 @@ from eigenshape.retrieval.heat.features import N_VIEWS, describe_views, find_hea
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.heat.score import match_features, matching_scores
 from eigenshape.retrieval.patches.codebook import read_codebook, write_codebook
-from eigenshape.retrieval.patches.cohort import normalized_distances
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe, patch_descriptor
 from eigenshape.retrieval.patches.distance import packed_distances
+from eigenshape.retrieval.patches.isolation import scale_distances
 from eigenshape.retrieval.patches.matching import match_patches
 from eigenshape.retrieval.patches.packing import (
     pack_codes,
@@ -82,10 +82,6 @@ class Kind(ABC, Generic[R, D]):
     @abstractmethod
     def as_stored(self, descriptor: D) -> D:
         """Return a descriptor whose numbers are rounded as those of an index are."""
-
-    def isolation(self, descriptor: D) -> float:
-        """Return how much farther a shape is from others than usual, to be stored with its rows."""
-        return 0.0
 
     @abstractmethod
     def scores(
@@ -215,16 +211,13 @@ class _PatchKind(Kind[PatchRecipe, PatchDescriptor]):
     def as_stored(self, descriptor: PatchDescriptor) -> PatchDescriptor:
         return descriptor  # whose numbers were rounded when it was made
 
-    def isolation(self, descriptor: PatchDescriptor) -> float:
-        return descriptor.isolation
-
     def scores(
         self,
         query: PatchDescriptor,
         rows: Sequence[np.ndarray],
         isolations: Float[np.ndarray, " k"],
     ) -> Float[np.ndarray, " k"]:
-        return normalized_distances(query.codes, packed_distances(query.codes, rows), isolations)
+        return scale_distances(query.codes, packed_distances(query.codes, rows), isolations)
 
     def verify(
         self,

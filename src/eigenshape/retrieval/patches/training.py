@@ -1,7 +1,6 @@
 """Learn a codebook of patches from shapes without labels."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import scipy.linalg as sl
@@ -15,16 +14,12 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import (
     BASES,
-    CLIP,
     N_AXES,
     N_ENTRIES,
     PatchCodebook,
-    encode_patches,
     log_joint,
-    round_codes,
     standardize,
 )
-from eigenshape.retrieval.patches.cohort import FEWEST_MEMBERS
 from eigenshape.retrieval.patches.patches import Patches
 
 LEAST_SPREAD = 0.1  # standard deviation by which a number is divided at least, against noise
@@ -33,9 +28,6 @@ LEAST_VARIANCE = 1e-3  # of an entry; whitened numbers have variance 1
 LEAST_COUNT = 1e-9  # patches, added to the count of each entry so that none is divided by 0
 ROUNDS = 60  # of expectation and maximization at most
 CONVERGED = 1e-5  # gain of the mean log-likelihood below which the fit ends
-# Members of a cohort at most; each takes 6 KB of the codebook's file. 48 members found no more on
-# the tuning half of experiments/ch5_retrieval.
-N_MEMBERS = 24
 
 
 def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook:
@@ -43,8 +35,7 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
 
     At each base radius the numbers are scaled to unit variance, turned to their 20 principal axes
     and whitened. A mixture of 32 Gaussians with diagonal covariance is then fitted by expectation
-    and maximization. Codes of up to 24 of the closed shapes are kept, as the cohort by which
-    distances are normalized.
+    and maximization.
 
     Parameters
     ----------
@@ -85,21 +76,9 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
             _train_at_radius(np.concatenate([shape.numbers[:, base] for shape in shapes]), seed)
             for base in BASES
         ]
-        codebook = PatchCodebook(
-            *(freeze(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True))
-        )
-        return _with_cohort(codebook, shapes)
-
-
-def _with_cohort(codebook: PatchCodebook, shapes: Sequence[Patches]) -> PatchCodebook:
-    """Return a codebook with a cohort, spread evenly over the closed shapes in their order."""
-    # Only near a boundary does the weight of a disc depend on its radius.
-    closed = [shape for shape in shapes if (shape.weights == shape.weights[:, :1]).all()]
-    if len(closed) < FEWEST_MEMBERS:
-        return codebook
-    places = np.linspace(0, len(closed) - 1, min(N_MEMBERS, len(closed))).astype(np.int64)
-    codes = [encode_patches(closed[place], codebook) for place in places.tolist()]
-    return replace(codebook, cohort=freeze(round_codes(np.stack(codes), CLIP)))
+    return PatchCodebook(
+        *(freeze(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True))
+    )
 
 
 def _train_at_radius(rows: Float32[np.ndarray, "p c"], seed: int) -> tuple[np.ndarray, ...]:

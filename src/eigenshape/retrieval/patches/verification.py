@@ -1,16 +1,18 @@
 """Score a query by patches: compare codes with all shapes, then verify the nearest by matching."""
 
 from collections.abc import Callable, Sequence
+from zlib import crc32
 
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._threads import one_blas_thread
-from eigenshape.retrieval.patches.cohort import normalized_distances
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.patches.distance import patch_distances, view_distances
+from eigenshape.retrieval.patches.isolation import measure_isolations, scale_distances
 from eigenshape.retrieval.patches.matching import patch_agreement
+from eigenshape.retrieval.patches.packing import pack_codes
 
 N_VERIFIED = 30  # nearest shapes whose points are matched; the time of a query grows with it
 # How much agreement counts: the score is e^(-8 agreement) times the distance of codes. Unrelated
@@ -40,7 +42,7 @@ def verified_scores(
     other : callable
         Return the descriptor of a shape by its number below k; called for the nearest only.
     distances : (k,) float
-        Of `normalized_distances`.
+        Of `scale_distances`.
     n_verified : int
         Nearest shapes to verify; the agreement of the others counts as 0.
 
@@ -95,12 +97,23 @@ def patch_scores(
     require_type(query, PatchDescriptor, "query")
     require_each(others, PatchDescriptor, "others")
     with one_blas_thread():
-        distances = normalized_distances(
+        distances = scale_distances(
             query.codes,
             view_distances(query.codes, [other.codes for other in others]),
-            np.array([other.isolation for other in others]),
+            _isolations(others),
         )
         return verified_scores(query, others.__getitem__, distances) if verify else distances
+
+
+def _isolations(others: Sequence[PatchDescriptor]) -> Float[np.ndarray, " k"]:
+    """Return the isolation of each shape among the others, as an index of them would."""
+    packed = [pack_codes(other.codes.reshape(-1, other.codes.shape[-1])) for other in others]
+    checksums = np.array([crc32(rows.tobytes()) for rows in packed], dtype=np.int64)
+    distinct, firsts, inverse = np.unique(checksums, return_index=True, return_inverse=True)
+    found = measure_isolations(
+        lambda number: others[firsts[number]].codes[0], len(distinct), np.arange(len(distinct))
+    )
+    return found[inverse]
 
 
 def shape_agreement(query: PatchDescriptor, other: PatchDescriptor) -> float:

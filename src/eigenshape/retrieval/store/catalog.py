@@ -20,7 +20,7 @@ from eigenshape.retrieval.store.damage import Damage
 
 DATABASE = "index.sqlite"
 APPLICATION = 0x65696773  # "eigs", by which SQLite files tell whose they are
-FORMAT = 7  # of the tables and of the files beside the database; raised by every change
+FORMAT = 8  # of the tables and of the files beside the database; raised by every change
 MODULUS = 2**63  # of sums of checksums, so that SQLite stores them as integers
 ROWS_AT_ONCE = 20_000  # rows of a table in memory at a time: 10 MB
 # Errors that a damaged file causes: SQLite quotes bytes of it in messages, which may be no text.
@@ -47,7 +47,7 @@ CREATE TABLE shape (
 );
 CREATE TABLE descriptor (
     id INTEGER PRIMARY KEY, shape INTEGER NOT NULL, recipe INTEGER NOT NULL, view INTEGER NOT NULL,
-    isolation INTEGER NOT NULL, rows_file INTEGER NOT NULL, rows_offset INTEGER NOT NULL,
+    rows_file INTEGER NOT NULL, rows_offset INTEGER NOT NULL,
     n_rows INTEGER NOT NULL, n_columns INTEGER NOT NULL, rows_checksum INTEGER NOT NULL,
     details_file INTEGER NOT NULL, details_offset INTEGER NOT NULL,
     details_size INTEGER NOT NULL, details_checksum INTEGER NOT NULL,
@@ -62,7 +62,7 @@ CREATE TABLE seal (
 """
 # The default is for a value whose type was damaged. Rows are flat: none is inside itself.
 ENCODER = json.JSONEncoder(default=repr, check_circular=False)
-DESCRIPTOR = struct.Struct("<14q")  # the numbers of a row of that table, for its checksum
+DESCRIPTOR = struct.Struct("<13q")  # the numbers of a row of that table, for its checksum
 Piece = tuple[int, int, int, int]  # file, offset, size and checksum of some bytes
 # The row of `seal` that counts committed changes; its last number is that of the table `touched`.
 CHANGES = "changes"
@@ -112,16 +112,12 @@ class ShapeRow(NamedTuple):
 
 
 class DescriptorRow(NamedTuple):
-    """Where the numbers of a descriptor are, and their checksums.
-
-    `isolation` is that of `Kind`, in millionths.
-    """
+    """Where the numbers of a descriptor are, and their checksums."""
 
     id: int
     shape: int
     recipe: int
     view: int
-    isolation: int
     rows_file: int
     rows_offset: int
     n_rows: int

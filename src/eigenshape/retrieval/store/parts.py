@@ -16,7 +16,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import Descriptor, kind_of
 from eigenshape.retrieval.patches.verification import N_VERIFIED
-from eigenshape.retrieval.search.chances import chances, nothing_alike
+from eigenshape.retrieval.search.chances import chances
 from eigenshape.retrieval.store.catalog import DATABASE
 from eigenshape.retrieval.store.reader import IndexReader, choose_recipe
 from eigenshape.retrieval.store.records import Match, Matches
@@ -33,7 +33,10 @@ def query_indexes(
     exact: bool = False,
     executor: Executor | None = None,
 ) -> Matches:
-    """Ask several indexes, and return what one index of all their shapes would have answered.
+    """Ask several indexes, and return nearly what one index of all their shapes would have answered.
+
+    Each index scales scores by how isolated its shapes are among its own (`Match.distance`), which
+    one index of them all would do among all.
 
     The workers of an executor each ask some of the indexes: processes of this machine, or a
     cluster's, where every worker sees the same folders. Indexes stay open in a process from one
@@ -121,9 +124,7 @@ def merge_matches(answers: Sequence[Matches], *, n_matches: SupportsIndex = 5) -
     Returns
     -------
     Matches
-        Best first. With ``exact=True`` they are bit for bit those of one index, if no two shapes
-        are at the same distance; otherwise each index has chosen its own candidates, which are
-        more.
+        Best first. `nothing_alike` if it is true of each answer.
 
     Raises
     ------
@@ -163,13 +164,12 @@ def merge_matches(answers: Sequence[Matches], *, n_matches: SupportsIndex = 5) -
     found = [*found[:N_VERIFIED], *map(_not_verified, found[N_VERIFIED:])]
     found.sort(key=lambda match: (match.score, match.name))
     n_shapes = sum(answer.n_shapes for answer in answers)
-    scores = np.array([match.score for match in found])
     return Matches(
         tuple(found[:wanted]),
         next((each.method for each in answers if each.method != "exact"), "exact"),
         sum(answer.n_compared for answer in answers),
         n_shapes,
-        any(map(_by_patches, answers)) and nothing_alike(scores, n_shapes),
+        all(answer.nothing_alike for answer in answers),
     )
 
 

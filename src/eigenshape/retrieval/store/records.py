@@ -9,10 +9,12 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 from eigenshape.retrieval.search.candidates import Method
+from eigenshape.retrieval.search.chances import class_chances
 
 
 @dataclass(frozen=True)
@@ -82,8 +84,9 @@ class Match(ReadOnly):
         Share of unrelated shapes that would score as well or better: below 0.001 the match is
         hardly a coincidence. Measured for patches; None for heat.
     distance : float or None
-        Of codes of patches, normalized by isolation, before points were matched: the score if
-        none agree. None for heat.
+        Of codes of patches, before points were matched: the score if none agree. It is scaled by
+        how isolated the shape is, the mean distance to its five nearest in the index: a shape that
+        is near to many others is near to any query. None for heat.
 
     See Also
     --------
@@ -147,8 +150,8 @@ class Matches(Sequence[Match]):
     n_compared, n_shapes : int
         Shapes that were compared exactly, and shapes among which they were found.
     nothing_alike : bool
-        Whether unrelated shapes alone would explain the scores, so that probably no shape of the
-        index is like the query. Always False for heat, for which it was not measured.
+        Whether the best score is no better than those of unrelated shapes, so that the index
+        probably holds nothing like the query. Always False for heat, for which it was not measured.
 
     See Also
     --------
@@ -183,3 +186,39 @@ class Matches(Sequence[Match]):
     def __getitem__(self, number: slice) -> tuple[Match, ...]: ...
     def __getitem__(self, number: int | slice) -> Match | tuple[Match, ...]:
         return self.found[number]
+
+    def classify(self) -> dict[str, float]:
+        """Return the probability of each class, by the labels of the first five matches.
+
+        Ask for at least five. The probabilities hold if the class of the query is in the index,
+        which `nothing_alike` doubts; what they lack to 1 is that of classes that were not found.
+
+        Returns
+        -------
+        dict
+            From label to probability, most probable first; empty if no match has a label.
+
+        Raises
+        ------
+        InvalidParameterError
+            If the matches are by heat, for which probabilities were not measured.
+
+        Examples
+        --------
+        >>> import eigenshape as es
+        >>> index = es.ShapeIndex.create(None)
+        >>> for kind in ("fish", "bird"):
+        ...     index.add(kind, es.make_creature(kind, n_vertices=500), label=kind, n_views=0)
+        >>> classes = index.query(es.make_creature("fish", 1, n_vertices=500)).classify()
+        >>> next(iter(classes)), classes["fish"] > 0.9
+        ('fish', True)
+        """
+        for match in self.found:
+            if match.chance is None:
+                raise InvalidParameterError(
+                    f"Probabilities of classes are known for patches; {match.name!r} was found by "
+                    "heat. Ask by a PatchRecipe (--method patches), by which the index must describe "
+                    "its shapes."
+                )
+        scores = [match.score for match in self.found]
+        return class_chances(scores, [match.label for match in self.found])

@@ -7,7 +7,6 @@ from jaxtyping import Float
 
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.kinds import Descriptor, kind_of
-from eigenshape.retrieval.patches.cohort import ISOLATION_STEP
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search.candidates import Candidates
 from eigenshape.retrieval.search.chances import chances, nothing_alike
@@ -42,8 +41,7 @@ def search_candidates(
     while len(places):
         # An exact search reads all shapes one after the other in any case.
         stored = snapshot.rows_of(places, read_ahead=candidates.method != "exact")
-        isolations = ISOLATION_STEP * snapshot.columns["isolation"][places]
-        distances = kind.scores(query, stored, isolations)
+        distances = kind.scores(query, stored, snapshot.isolations[places])
         try:
             for bad in places[~np.isfinite(distances)].tolist():
                 snapshot.verify(bad)
@@ -54,7 +52,8 @@ def search_candidates(
             places = places[places != err.place]
         else:
             if isinstance(descriptor, PatchDescriptor):
-                nothing = nothing_alike(scores, candidates.n_shapes)
+                is_closed = len(descriptor.codes) > 1
+                nothing = nothing_alike(scores, candidates.n_shapes, is_closed=is_closed)
             break
     n_shapes = candidates.n_shapes - len(damages)
     return Matches(found, candidates.method, len(places), n_shapes, nothing), damages

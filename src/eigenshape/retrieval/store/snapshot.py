@@ -11,10 +11,12 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import StoreError
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.search.isolations import stored_isolations
 from eigenshape.retrieval.store.catalog import (
     CHANGES,
     DAMAGE,
@@ -287,7 +289,7 @@ class Snapshot:
     def __post_init__(self) -> None:
         object.__setattr__(self, "row_type", kind_of(self.recipe).row_type)
         columns = self.state.descriptors
-        if len(self.entries) < len(columns):  # else no copy of 112 bytes a shape
+        if len(self.entries) < len(columns):  # else no copy of 104 bytes a shape
             columns = columns[self.entries]
         object.__setattr__(self, "columns", columns)
 
@@ -312,6 +314,13 @@ class Snapshot:
         # With that of the details: of a million checksums of rows, a hundred pairs would be equal.
         rows = self.columns["rows_checksum"].astype(np.int64)
         return (rows << 31) ^ self.columns["details_checksum"].astype(np.int64)
+
+    @cached_property
+    def isolations(self) -> Float[np.ndarray, " k"]:
+        """Return how isolated the shape of each place is; 0 for heat, whose scores are not scaled."""
+        if not isinstance(self.recipe, PatchRecipe):
+            return np.zeros(len(self.entries))
+        return stored_isolations(self, self.recipe, self.columns["rows_checksum"])
 
     def rows(self, place: int) -> np.ndarray:
         """Return the (m, q) rows of a place, mapped into memory and not checked."""

@@ -255,7 +255,7 @@ class _Merging:
             at, offset, _, checksum = self._carry(found["rows"], f"rows-{recipe}", rows_data)
             where = self._carry(found["details"], f"details-{recipe}", details_data)
             size = (row.n_rows, row.n_columns)
-            fields = (number, recipe, row.view, row.isolation)
+            fields = (number, recipe, row.view)
             change.insert("descriptor", *fields, at, offset, *size, checksum, *where)
         return int(not same)
 

@@ -12,7 +12,6 @@ from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
-from eigenshape.retrieval.patches.cohort import ISOLATION_STEP
 from eigenshape.retrieval.store.change import Change
 from eigenshape.retrieval.store.filters import RESERVED
 from eigenshape.retrieval.store.records import Record
@@ -179,8 +178,7 @@ def write_shape(change: Change, shape: DescribedShape, *, replace: bool) -> None
             details = kind_of(recipe).details(descriptor)
             at, offset, _, checksum = change.append(f"rows-{recipe_number}", each.tobytes())
             where = change.append(f"details-{recipe_number}", details)
-            isolation = round(kind_of(recipe).isolation(descriptor) / ISOLATION_STEP)
-            fields = (number, recipe_number, view, isolation)
+            fields = (number, recipe_number, view)
             change.insert("descriptor", *fields, at, offset, *each.shape, checksum, *where)
 
 

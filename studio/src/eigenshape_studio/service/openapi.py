@@ -116,7 +116,7 @@ SCHEMAS = {
         n_compared=WHOLE | {"description": "Shapes that were compared exactly."},
         nothing_alike={
             "type": "boolean",
-            "description": "Whether unrelated shapes alone would explain the scores.",
+            "description": "Whether the best score is no better than those of unrelated shapes.",
         },
         seconds=_object(describe=NUMBER, search=NUMBER),
         matches=_list({"$ref": "#/components/schemas/Match"}),

@@ -72,7 +72,7 @@ class Answer:
     n_compared : int
         Shapes that were compared exactly.
     nothing_alike : bool
-        Whether unrelated shapes alone would explain the scores.
+        Whether the best score is no better than those of unrelated shapes.
     """
 
     found: tuple[Found, ...] = ()
