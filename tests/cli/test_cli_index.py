@@ -242,7 +242,7 @@ def test_the_class_is_printed_with_its_probability(index, tmp_path):
     assert list(found["classes"]) == ["bird"]
     share = f"{100 * found['classes']['bird']:.0f} %"
     assert f"class: bird {share}" in run("query", folder, "fish", "--classify").stdout
-    refused = run("query", index, "fish/a", "--classify", code=1).stderr
+    refused = run("query", index, "fish/a", "--classify", code=2).stderr
     assert "Probabilities of classes are known for patches" in refused
 
 
