@@ -43,7 +43,7 @@ def test_the_report_is_json_too(ball, tmp_path):
 
 def test_what_is_asked_must_be_one_number(ball, tmp_path):
     for options in ((), ("--faces", 9, "--ratio", 0.5)):
-        done = run("decimate", ball, *options, "-o", tmp_path / "small.ply", code=1)
+        done = run("decimate", ball, *options, "-o", tmp_path / "small.ply", code=2)
         assert "must be given by one of --faces and --ratio" in done.stderr
-    done = run("decimate", ball, "--faces", 5000, "-o", tmp_path / "small.ply", code=1)
+    done = run("decimate", ball, "--faces", 5000, "-o", tmp_path / "small.ply", code=2)
     assert "n_faces must lie in 4..1279; it is 5000" in done.stderr

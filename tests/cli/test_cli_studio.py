@@ -68,6 +68,7 @@ def test_serve_passes_its_options_on_and_prints_the_address(monkeypatch):
         "allow_remote": False,
         "allow_hosts": (),
         "token": "a-token-of-the-environment",
+        "write_token": None,
         "workers": es.retrieval.Workers(3, 7.0, 1.5e9),
         "show_sources": False,
         "browse": False,

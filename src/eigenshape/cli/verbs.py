@@ -18,8 +18,8 @@ from eigenshape.cli.interrupt import interruptible
 # verbs without importing their modules, which takes more than a second. A test compares the two.
 VERBS = {
     "info": "Show the size, topology and faults of a shape, and which repairs would help.",
-    "repair": "Repair a mesh and write it, and report what was done. From OBJ to OBJ, polygons, "
-    "textures and groups stay.",
+    "repair": "Repair a mesh and write it, and report what was done. All else that the file holds "
+    "stays, or is named.",
     "decimate": "Write a mesh with fewer faces and the same topology, by collapsing edges.",
     "spectrum": "Compute the lowest eigenvalues of a shape and prove that none is missing.",
     "operators": "List the operators that `spectrum --operator` takes, with the shapes and options "
