@@ -247,7 +247,6 @@ def test_errors_are_one_line_and_exit_code_1(sphere, arguments, message):
     ("arguments", "message"),
     [
         (("spectrum", "{sphere}", "-k", "0"), "k must lie in 1..162; it is 0"),
-        (("spectrum", "{sphere}", "-k", "0"), "k must lie in 1..162; it is 0"),
         (("spectrum", "{sphere}", "--picture", "plot.bmp"), "A picture must end in"),
         (
             ("features", "{sphere}", "--method", "best"),

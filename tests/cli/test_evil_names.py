@@ -213,7 +213,7 @@ def test_warnings(zoo, monkeypatch):
         return es.icosphere(0)
 
     monkeypatch.setattr("eigenshape.cli.steps.reading.read_mesh", warn)
-    assert f"{SPELLED}0.ply is odd" in run("features", zoo / f"{EVIL}0.ply", "-n", 2).stderr
+    assert f"{SPELLED}0.ply is odd" in run("segment", zoo / f"{EVIL}0.ply").stderr
 
 
 def test_the_alphabet_of_a_name_stays():
