@@ -57,11 +57,11 @@ class ReadOnly:
 
 
 def _arrays_of(entry: Any) -> Iterator[NDArray[Any]]:
-    """Yield the arrays of an entry of a value: of an array, a sparse matrix, or a tuple of them."""
+    """Yield the arrays of an entry of a value: an array, a sparse matrix, or a tuple or dict of them."""
     if isinstance(entry, np.ndarray):
         yield entry
-    elif isinstance(entry, tuple):
-        for each in entry:
+    elif isinstance(entry, tuple | dict):
+        for each in entry.values() if isinstance(entry, dict) else entry:
             yield from _arrays_of(each)
     elif hasattr(entry, "indptr"):
         yield from (entry.data, entry.indices, entry.indptr)

@@ -6,7 +6,6 @@ from test_cli import run, run_json
 
 from eigenshape.io.labels import read_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
-from eigenshape.io.ply import parse_colors
 from eigenshape.shapes.surfaces import icosphere
 
 BALL = icosphere(3)
@@ -25,8 +24,9 @@ def test_colors_and_labels_go_along(ball, tmp_path):
     output = tmp_path / "small.ply"
     done = run("decimate", ball, "--faces", 200, "-o", output)
     assert "decimate kept 200 of 1,280 faces and 102 of 642 vertices" in done.stdout
-    small = read_mesh(output)
-    red = parse_colors(output.read_bytes())[:, 0]
+    small, attributes = read_mesh(output, attributes=True)
+    red = np.zeros(small.n_vertices, dtype=np.uint8)
+    red[small.faces] = attributes.colors[..., 0]
     height = small.vertices[:, 2]
     assert (red[height > 0.2] == 240).all()
     assert (red[height < -0.2] == 40).all()

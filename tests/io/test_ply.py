@@ -226,7 +226,7 @@ def test_wrong_values_are_refused():
 @pytest.mark.parametrize("write", [format_text, format_binary])
 def test_colors_stand_with_the_vertices(write):
     colors = np.arange(12, dtype=np.uint8).reshape(4, 3)
-    data = write(TETRAHEDRON, colors=colors)
+    data = write(TETRAHEDRON, dict(zip(("red", "green", "blue"), colors.T, strict=True)))
     assert b"property uchar red\nproperty uchar green\nproperty uchar blue\nelement face" in data
     assert (b"0.0 0.0 1.0 9 10 11\n" in data) or (
         struct.pack("<dddBBB", 0, 0, 1, 9, 10, 11) in data

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import escape_text, out, print_json
@@ -15,7 +16,7 @@ def decimate(
     mesh: MeshArgument,
     *,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL or GLB.")
+        Path, typer.Option("-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ.")
     ],
     faces: Annotated[int | None, typer.Option(help="Number of faces to keep.")] = None,
     ratio: Annotated[
@@ -27,6 +28,9 @@ def decimate(
 ) -> None:
     """Write a mesh with fewer faces and the same topology, by collapsing edges.
 
+    All else that the file holds stays, or is named: textures, materials, colors, groups, fields.
+    Vertices that are double along seams are joined first.
+
     For instance: eigenshape decimate scan.ply --ratio 0.1 -o small.ply
     """
     steps.require_mesh_path(output)
@@ -34,8 +38,10 @@ def decimate(
         raise InvalidParameterError(
             "The number of faces must be given by one of --faces and --ratio."
         )
-    done = steps.decimate_file(mesh, repair, faces, ratio)
-    steps.save_decimated(mesh, done, output)
+    # Vertices are double along seams of textures, where the surface would come apart.
+    names = ",".join(["weld_seams", *([repair] if repair else [])])
+    done = es.geometry.decimate(steps.load_surface(mesh, names), faces, ratio=ratio)
+    steps.save_like(mesh, done.mesh, output)
     if as_json:
         facts = {"n_vertices": done.mesh.n_vertices, "n_faces": done.mesh.n_faces}
         print_json({"path": str(mesh), "output": str(output), "report": done.report, **facts})

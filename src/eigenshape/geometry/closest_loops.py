@@ -1,4 +1,4 @@
-"""Compiled loops of `closest`: the nearest face of a point, and how faces wind around it.
+"""Compiled loops of `closest` and of `carrying`: nearest faces of points, and how faces wind around them.
 
 The corners of face i are `corners[i]`. Faces are in the order of the leaves of a `box_tree`.
 """
@@ -46,12 +46,48 @@ def nearest_faces(points, corners, levels, nodes):
                 continue
             leaf = node - leaves + 1
             for face in range(leaf * n // leaves, (leaf + 1) * n // leaves):
-                found, b, c = _to_face(corners, face, x, y, z)
+                found, b, c = to_face(corners, face, x, y, z)
                 if found < least:
                     least, faces[p] = found, face
                     weights[p, 0], weights[p, 1], weights[p, 2] = max(1.0 - b - c, 0.0), b, c
         squares[p] = least
     return faces, weights, squares
+
+
+@njit
+@no_type_check
+def nearest_around(points, middles, starts, reach, corners, neighbors):
+    """Return, for three points each, the nearest of the faces around a start, and weights there.
+
+    Faces are visited from neighbor to neighbor, as long as their squared distance to the middle
+    is at most the reach.
+    """
+    faces = np.zeros((len(points), 3), dtype=np.int64)
+    weights = np.zeros((len(points), 3, 3))
+    visits, waiting = np.full(len(corners), -1), np.empty(len(corners), dtype=np.int64)
+    least = np.empty(3)
+    for p in range(len(points)):
+        least[:] = np.inf
+        waiting[0], visits[starts[p]] = starts[p], p
+        first, last = 0, 1
+        while first < last and least.max() > 0.0:
+            face = waiting[first]
+            first += 1
+            for k in range(3):
+                x, y, z = points[p, k]
+                found, b, c = to_face(corners, face, x, y, z)
+                if found < least[k]:
+                    least[k], faces[p, k] = found, face
+                    weights[p, k, 0], weights[p, k, 1] = max(1.0 - b - c, 0.0), b
+                    weights[p, k, 2] = c
+            for k in range(3):
+                other = neighbors[face, k]
+                x, y, z = middles[p]
+                if visits[other] != p and to_face(corners, other, x, y, z)[0] <= reach[p]:
+                    visits[other] = p
+                    waiting[last] = other
+                    last += 1
+    return faces, weights
 
 
 @njit
@@ -66,7 +102,7 @@ def _to_box(boxes, i, x, y, z):
 
 @njit
 @no_type_check
-def _to_face(corners, face, x, y, z):
+def to_face(corners, face, x, y, z):
     """Return the squared distance to a face, and the weights of corners 1 and 2 there.
 
     The nearest point is the foot of the perpendicular if that lies inside, else on a side. This

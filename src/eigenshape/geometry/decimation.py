@@ -192,15 +192,13 @@ def decimate(
     )
     if thinned.n_faces > wanted:
         report.append(f"fewer faces, such as {wanted:,}, would change the topology")
-    return place_on(mesh, thinned, tuple(report))
-
-
-def place_on(original: TriangleMesh, mesh: TriangleMesh, report: tuple[str, ...]) -> DecimatedMesh:
-    """Find the nearest points and faces of the original for a mesh with fewer faces."""
-    middles = mesh.vertices[mesh.faces].mean(axis=1)
-    places = closest_points(original, mesh.vertices)
+    middles = thinned.vertices[thinned.faces].mean(axis=1)
     return DecimatedMesh(
-        mesh, report, places, closest_points(original, middles).simplices, original
+        mesh=thinned,
+        report=tuple(report),
+        places=closest_points(mesh, thinned.vertices),
+        source_faces=closest_points(mesh, middles).simplices,
+        original=mesh,
     )
 
 

@@ -1,6 +1,6 @@
 from .attributes import Material as Material
 from .attributes import MeshAttributes as MeshAttributes
-from .attributes import carry_attributes as carry_attributes
+from .carrying import carry_attributes as carry_attributes
 from .bridges import from_pyvista as from_pyvista
 from .bridges import from_trimesh as from_trimesh
 from .bridges import to_arrays as to_arrays

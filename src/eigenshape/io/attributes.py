@@ -1,22 +1,18 @@
 """What a mesh file holds besides positions and faces: texture coordinates, materials, colors, groups."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
-from scipy.spatial import cKDTree
+from jaxtyping import Bool, Float, Int, UInt8
+from scipy.sparse import csr_array, eye_array
 
-from eigenshape._arrays import freeze
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
-from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 
-# Weight of the directions of faces beside their places, in units of the size of the mesh: it only
-# tells the two sides of a sheet apart.
-DIRECTION = 1e-3
 SAME_NORMAL = 1000  # steps from 0 to 1; normals that agree to a step are one
 
 
@@ -53,7 +49,7 @@ class SourceFile:
 
 
 @dataclass(frozen=True, eq=False)
-class MeshAttributes:
+class MeshAttributes(ReadOnly):
     r"""What a mesh file holds besides positions and faces.
 
     `read_mesh(path, attributes=True)` returns it, `carry_attributes` carries it to a repaired mesh,
@@ -63,15 +59,19 @@ class MeshAttributes:
     ----------
     mesh : TriangleMesh
         The mesh that the attributes belong to.
-    corners : (f, 3) int
-        For each corner of a face, the corner of the file that it comes from: 3 times its face, plus
-        0, 1 or 2.
+    corners : (3 f, 3 F) sparse matrix
+        What the corners of the F faces of the file give to each corner, face by face: its values are
+        the product of this matrix and those of the file. Rows have the sum 1.
+    face_parts : (f,) int
+        Number of the part of the file, such as a primitive of glTF, that each face comes from.
     texture_coordinates : (f, 3, 2) float, optional
         At each corner of a face; v goes up, as in OBJ.
     normals : (f, 3, 3) float, optional
         At each corner, as in the file.
     colors : (f, 3, 4) uint8, optional
         Red, green, blue (sRGB) and opacity at each corner.
+    fields : dict of str to array
+        Functions with a row for each vertex or for each face, as in `read_fields`.
     face_materials, face_groups : (f,) int
         Number of the material and the group of each face; -1 for none.
     materials : tuple of Material
@@ -94,12 +94,14 @@ class MeshAttributes:
     """
 
     mesh: TriangleMesh
-    corners: Int[np.ndarray, "f 3"]
+    corners: csr_array
+    face_parts: Int[np.ndarray, " f"]
     face_materials: Int[np.ndarray, " f"]
     face_groups: Int[np.ndarray, " f"]
     texture_coordinates: Float[np.ndarray, "f 3 2"] | None = None
     normals: Float[np.ndarray, "f 3 3"] | None = None
     colors: UInt8[np.ndarray, "f 3 4"] | None = None
+    fields: Mapping[str, np.ndarray] = field(default_factory=dict)
     materials: tuple[Material, ...] = ()
     groups: tuple[str, ...] = ()
     others: tuple[str, ...] = ()
@@ -108,11 +110,12 @@ class MeshAttributes:
     __repr__ = short_repr
     _repr_html_ = html_repr
 
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for name, value in [*vars(self).items()]:
-            if isinstance(value, np.ndarray):
-                object.__setattr__(self, name, freeze(value))
+    @property
+    def from_file(self) -> Bool[np.ndarray, " f"]:
+        """Whether each face is one of the file: each of its corners is one of the same face."""
+        are_single = np.diff(self.corners.indptr).reshape(-1, 3) == 1
+        owners = self.corners.indices[self.corners.indptr[:-1]].reshape(-1, 3) // 3
+        return (are_single & (owners == owners[:, :1])).all(axis=1)
 
     @property
     def contents(self) -> dict[str, bool]:
@@ -125,74 +128,15 @@ class MeshAttributes:
             "materials": bool(used),
             "images": any(material.image for material in used),
             "names of groups": any(self.groups),
+            "fields": bool(self.fields),
         }
 
 
 def plain_attributes(mesh: TriangleMesh) -> MeshAttributes:
     """Return the attributes of a mesh of which nothing but positions and faces is known."""
     none = np.full(mesh.n_faces, -1)
-    corners = np.arange(3 * mesh.n_faces).reshape(-1, 3)
-    return MeshAttributes(mesh, corners, none, none.copy())
-
-
-def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttributes:
-    """Carry the attributes of a mesh to a repaired one, from face to face.
-
-    Each face takes the attributes of the old face that lies nearest to it, and each corner those of
-    the nearest corner of that face. So faces and vertices may have been dropped, welded, reordered
-    or turned over, and new faces, such as those of a filled hole, look as what is beside them.
-
-    Parameters
-    ----------
-    attributes : MeshAttributes
-        Of the mesh before the repair.
-    mesh : MeshLike
-        The mesh after the repair, and before it is bent.
-
-    Returns
-    -------
-    MeshAttributes
-        Of `mesh`.
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import eigenshape as es
-    >>> path = pathlib.Path(tempfile.mkdtemp(), "a.ply")
-    >>> es.write_mesh(es.icosphere(1), path)
-    >>> mesh, attributes = es.read_mesh(path, attributes=True)
-    >>> done = es.repair(es.TriangleMesh(mesh.vertices, mesh.faces[5:]), ["fill_holes"])
-    >>> es.io.carry_attributes(attributes, done.mesh).mesh.n_faces == done.mesh.n_faces
-    True
-    """
-    mesh = as_mesh(mesh)
-    old = attributes.mesh
-    if np.array_equal(old.faces, mesh.faces) and np.array_equal(old.vertices, mesh.vertices):
-        return attributes
-    size = float(np.abs(old.vertices).max()) or 1.0
-    places = old.vertices[old.faces] / size
-    wanted = mesh.vertices[mesh.faces] / size
-    faces = cKDTree(_face_keys(places)).query(_face_keys(wanted))[1]
-    gaps = np.linalg.norm(wanted[:, :, None] - places[faces][:, None], axis=3)  # (f, 3, 3)
-    corners = (3 * faces[:, None] + gaps.argmin(axis=2)).ravel()
-    taken = {
-        name: values.reshape(-1, *values.shape[2:])[corners].reshape(-1, 3, *values.shape[2:])
-        for name in ("corners", "texture_coordinates", "normals", "colors")
-        if (values := getattr(attributes, name)) is not None
-    }
-    return replace(
-        attributes,
-        mesh=mesh,
-        face_materials=attributes.face_materials[faces],
-        face_groups=attributes.face_groups[faces],
-        **taken,
-    )
-
-
-def _face_keys(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 6"]:
-    """Return the middle and the direction of each face, of which the direction weighs little."""
-    vectors = area_vectors(corners)
-    return np.column_stack([corners.mean(axis=1), DIRECTION * unit_rows(vectors)])
+    corners = eye_array(3 * mesh.n_faces, format="csr")
+    return MeshAttributes(mesh, corners, none + 1, none, none)
 
 
 def label_attributes(

@@ -4,6 +4,7 @@ import base64
 import re
 import struct
 from collections.abc import Mapping
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -17,6 +18,7 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io import npz, vtk_legacy, vtu
+from eigenshape.io.attributes import MeshAttributes, plain_attributes
 from eigenshape.io.parsing import naming, suffix_of
 
 FIELD_FORMATS = (".vtu", ".vtk", ".npz")
@@ -197,22 +199,37 @@ def read_fields(path: str | Path) -> Fields:
     suffix = suffix_of(path, None, FIELD_FORMATS)
     data = read_regular(path)
     with naming(path):
-        if suffix == ".npz":
-            arrays = npz.read_arrays(data)
-            tables = [
-                {
-                    name.removeprefix(begin): array
-                    for name, array in arrays.items()
-                    if name.startswith(begin)
-                }
-                for begin in (VERTEX_FIELD, FACE_FIELD)
-            ]
-        else:
-            tables = list(
-                vtu.parse_fields(data) if suffix == ".vtu" else vtk_legacy.parse_fields(data)
-            )
+        return _parse_fields(data, suffix)
+
+
+def _parse_fields(data: bytes, suffix: str) -> Fields:
+    if suffix == ".npz":
+        arrays = npz.read_arrays(data)
+        tables = [
+            {
+                name.removeprefix(begin): array
+                for name, array in arrays.items()
+                if name.startswith(begin)
+            }
+            for begin in (VERTEX_FIELD, FACE_FIELD)
+        ]
+    else:
+        parse = vtu.parse_fields if suffix == ".vtu" else vtk_legacy.parse_fields
+        tables = [*parse(data)]
     of_vertices, of_faces = tables
     found = dict(of_vertices)
     for name, values in of_faces.items():
         found[FACE_FIELD + name if name in found else name] = values
     return {name: freeze(values) for name, values in found.items()}
+
+
+def read_field_attributes(data: bytes, suffix: str, mesh: TriangleMesh) -> MeshAttributes:
+    """Return the fields of a file as attributes; those of cells that are no triangles are named."""
+    fields = _parse_fields(data, suffix)
+    fitting = {
+        name: values
+        for name, values in fields.items()
+        if len(values) in (mesh.n_vertices, mesh.n_faces)
+    }
+    others = tuple(f"the field {name!r}" for name in fields if name not in fitting)
+    return replace(plain_attributes(mesh), fields=fitting, others=others)

@@ -4,11 +4,13 @@ import copy
 import json
 import mimetypes
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.sparse import csr_array
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
@@ -19,9 +21,11 @@ from eigenshape.io.attributes import (
     SourceFile,
     corner_normals,
     linear_colors,
+    plain_attributes,
     screen_colors,
     unit_rows,
 )
+from eigenshape.io.carrying import interpolate
 from eigenshape.io.glb import pack, read_gltf, read_scene
 from eigenshape.io.gltf import (
     SURFACES,
@@ -39,6 +43,7 @@ TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 # What a document may hold besides a scene with materials.
 EXTRAS = ("skins", "animations", "cameras", "extensions")
 TANGENTS = "tangents, which viewers compute anew"
+MADE_ANEW = ("POSITION", "NORMAL", "TANGENT")
 DRACO = "KHR_draco_mesh_compression"
 
 
@@ -49,8 +54,9 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     corner_rows = scene.piece.rows[scene.piece.faces]
     found: dict[str, np.ndarray] = {}
     materials = [_material(gltf, source, entry) for entry in gltf.tree.get("materials", [])]
-    face_materials = np.full(n_faces, -1)
-    for _, primitive, chosen in _placed_primitives(gltf, scene):
+    face_materials, face_parts = np.full((2, n_faces), -1)
+    for part, (_, _, primitive, chosen) in enumerate(_placed_primitives(gltf, scene)):
+        face_parts[chosen] = part
         named = primitive["attributes"]
         number = primitive.get("material", -1)
         face_materials[chosen] = number
@@ -79,9 +85,9 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     owners = np.array(list(scene.matrices), dtype=np.int64)
     names = [_node_name(gltf, int(node)) for node in owners]
     groups = np.searchsorted(np.sort(owners), scene.nodes)
-    return MeshAttributes(
-        mesh=mesh,
-        corners=np.arange(3 * n_faces).reshape(-1, 3),
+    return replace(
+        plain_attributes(mesh),
+        face_parts=face_parts,
         face_materials=face_materials,
         face_groups=np.argsort(owners)[groups],
         materials=tuple(materials),
@@ -99,14 +105,14 @@ def _open(source: SourceFile) -> tuple[Gltf, Scene]:
 
 def _placed_primitives(
     gltf: Gltf, scene: Scene
-) -> Iterator[tuple[int, dict[str, Any], Int[np.ndarray, " k"]]]:
-    """Give each primitive of each node, with its faces."""
+) -> Iterator[tuple[int, int, dict[str, Any], Int[np.ndarray, " k"]]]:
+    """Give the node, the number and the faces of each primitive of each node that has faces."""
     for node in scene.matrices:
         primitives = gltf.entry("meshes", gltf.entry("nodes", node)["mesh"])["primitives"]
         for number, primitive in enumerate(primitives):
             chosen = (scene.nodes == node) & (scene.piece.primitives == number)
             if chosen.any():
-                yield node, primitive, np.flatnonzero(chosen)
+                yield node, number, primitive, np.flatnonzero(chosen)
 
 
 def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
@@ -277,9 +283,9 @@ def rewrite(
     gltf, scene = _open(source)
     lost: list[str] = []
     document = _copy_document(gltf, source, lost)
-    old_faces, old_corners = np.divmod(attributes.corners, 3)
-    rows = scene.piece.rows[scene.piece.faces[old_faces, old_corners]]
-    owners = old_faces[:, 0]
+    file_rows = scene.piece.rows[scene.piece.faces.ravel()]
+    parts = [(node, number) for node, number, _, _ in _placed_primitives(gltf, scene)]
+    nodes, primitive_numbers = np.array(parts)[attributes.face_parts].T
     places, normals = (
         single_precision(mesh, "GLB").astype(np.float64),
         corner_normals(attributes, mesh),
@@ -295,37 +301,48 @@ def rewrite(
         for numbers in _sharing(primitives):
             shared = primitives[numbers[0]]
             old_entries += [primitives[number] for number in numbers]
-            in_family = (scene.nodes == node) & np.isin(scene.piece.primitives, numbers)
-            chosen = np.flatnonzero(in_family[owners])
+            chosen = np.flatnonzero((nodes == node) & np.isin(primitive_numbers, numbers))
             if not chosen.size:
                 continue
-            columns = [rows[chosen][:, order].ravel(), mesh.faces[chosen][:, order].ravel()]
+            vertices = mesh.faces[chosen][:, order].ravel()
+            # What the corners of the file give to each corner, without those that give nothing
+            blends = attributes.corners[(3 * chosen[:, None] + order).ravel()]
+            used, columns = np.unique(blends.indices, return_inverse=True)
+            blends = csr_array((blends.data, columns.ravel(), blends.indptr))
+            rows = file_rows[used]
+
+            table: dict[str, Any] = {}
+            targets: list[dict[str, Any]] = [{} for _ in shared.get("targets", [])]
+            columns_of = [(table, shared["attributes"]), *zip(targets, shared.get("targets", []), strict=True)]
+            blended = [
+                (place, name, index, _blend(gltf, index, name, rows, blends))
+                for place, named in columns_of
+                for name, index in named.items()
+                if place is not table or name not in MADE_ANEW
+            ]
+            if blends.nnz == len(vertices):  # corners of the file: values agree as their rows do
+                keys = [vertices, rows[blends.indices]]
+            else:
+                keys = [vertices, *(column for *_, values in blended for column in values.T)]
             normal = None
             if normals is not None and "NORMAL" in shared["attributes"]:
                 normal = normals[chosen][:, order].reshape(-1, 3)
-            first, indices = _split_corners(columns, normal)
-            old_rows, vertices = columns[0][first], columns[1][first]
-            table: dict[str, Any] = {}
-            for name, index in shared["attributes"].items():
-                if name == "POSITION":
-                    local = (places[vertices] - matrix[:3, 3]) @ np.linalg.pinv(matrix[:3, :3]).T
-                    table[name] = document.add_accessor(local.astype("<f4"), name=name)
-                elif name == "NORMAL" and normal is not None:
-                    local = unit_rows(normal[first] @ matrix[:3, :3])
-                    table[name] = document.add_accessor(local.astype("<f4"), name=name)
-                elif name == "TANGENT":
-                    lost.append(TANGENTS)
-                else:
-                    table[name] = _gather(document, gltf, index, old_rows, name)
-            targets = [
-                {
-                    key: _gather(document, gltf, index, old_rows, key)
-                    for key, index in target.items()
-                }
-                for target in shared.get("targets", [])
-            ]
+            first, indices = _split_corners(keys, normal)
+            local = (places[vertices[first]] - matrix[:3, 3]) @ np.linalg.pinv(matrix[:3, :3]).T
+            table["POSITION"] = document.add_accessor(local.astype("<f4"), name="POSITION")
+            if normal is not None:
+                local = unit_rows(normal[first] @ matrix[:3, :3])
+                table["NORMAL"] = document.add_accessor(local.astype("<f4"), name="NORMAL")
+            if "TANGENT" in shared["attributes"]:
+                lost.append(TANGENTS)
+
+            for place, name, index, values in blended:
+                is_normalized = gltf.entry("accessors", index).get("normalized") is True
+                place[name] = document.add_accessor(
+                    values[first], name=name, normalized=is_normalized
+                )
             for number in numbers:
-                of_part = np.repeat(scene.piece.primitives[owners[chosen]] == number, 3)
+                of_part = np.repeat(primitive_numbers[chosen] == number, 3)
                 if not of_part.any():
                     continue
                 entry = copy.deepcopy(primitives[number])
@@ -361,10 +378,14 @@ def _split_corners(
     return first, indices.astype(kind).reshape(-1, 1)
 
 
-def _gather(document: "_Document", gltf: Gltf, index: int, rows: np.ndarray, name: str) -> int:
-    normalized = gltf.entry("accessors", index).get("normalized") is True
-    taken = _take(raw_accessor(gltf, index), rows, name)
-    return document.add_accessor(taken, name=name, normalized=normalized)
+def _blend(
+    gltf: Gltf, index: int, name: str, rows: Int[np.ndarray, " r"], blends: csr_array
+) -> np.ndarray:
+    """Interpolate an attribute; joints, whose weights go along, and numbers of things are only chosen."""
+    values = _take(raw_accessor(gltf, index), rows, name)
+    is_chosen = name.startswith(("JOINTS", "WEIGHTS"))
+    is_chosen |= name.startswith("_") and values.dtype.kind in "iu"
+    return interpolate(blends, values, blend=not is_chosen)
 
 
 def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document:

@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Literal, overload
 
@@ -14,7 +13,7 @@ from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import as_path, read_regular, replace_file
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io import glb_attributes, obj_attributes, off, ply, stl
+from eigenshape.io import glb_attributes, obj_attributes, off, ply, ply_attributes, stl
 from eigenshape.io.attributes import (
     MeshAttributes,
     SourceFile,
@@ -24,7 +23,7 @@ from eigenshape.io.attributes import (
 )
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.cells import require_kind
-from eigenshape.io.fields import FIELD_FORMATS, format_fields
+from eigenshape.io.fields import FIELD_FORMATS, format_fields, read_field_attributes
 from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
 
 TEXT: dict[str, Callable[..., bytes]] = {
@@ -38,7 +37,7 @@ LABELED = (".ply", ".glb", ".obj")  # formats that hold parts
 TEXT_FORMATS = (*TEXT, ".obj")
 BINARY_FORMATS = (*BINARY, ".glb", *FIELD_FORMATS)
 GLTF = (".glb", ".gltf")
-WITH_ATTRIBUTES = (*GLTF, ".obj", ".ply")  # formats that hold more than positions and faces
+WITH_ATTRIBUTES = (*GLTF, ".obj", ".ply", *FIELD_FORMATS)  # formats that hold more than positions and faces
 
 
 @overload
@@ -145,12 +144,11 @@ def _read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         return glb_attributes.read_attributes(source, mesh)
     if source.suffix == ".obj":
         return obj_attributes.read_attributes(source, mesh)
-    plain = plain_attributes(mesh)
     if source.suffix == ".ply":
-        colors, others = ply.read_attributes(source.data, mesh)
-        at_corners = None if colors is None else colors[mesh.faces]
-        return replace(plain, colors=at_corners, others=others)
-    return plain
+        return ply_attributes.read_attributes(source.data, mesh)
+    if source.suffix in FIELD_FORMATS:
+        return read_field_attributes(source.data, source.suffix, mesh)
+    return plain_attributes(mesh)
 
 
 def require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
@@ -309,27 +307,24 @@ def _encode(
         data, more = glb_attributes.rewrite(source, held, mesh)
         lost += more
         return {path: data}
-    if source and suffix == source.suffix == ".obj":
+    if source and suffix == source.suffix == ".obj" and held.from_file.mean() > 0.5:
         files, more = obj_attributes.rewrite(source, held, mesh, path)
         lost += more
         return files
     lost += held.others
+    if suffix in (".obj", ".glb") and held.fields:
+        lost.append("fields")
     if suffix == ".obj":
         return obj_attributes.write_new(held, mesh, path)
     if suffix == ".glb":
         return {path: glb_attributes.write_new(held, mesh)}
-    kept = ("vertex colors",) if suffix == ".ply" else ()
-    lost += [name for name, there in held.contents.items() if there and name not in kept]
-    if suffix in FIELD_FORMATS:
-        return {path: format_fields(mesh, suffix, {})}
-    write = (BINARY if binary else TEXT)[suffix]
+    write = (BINARY if binary else TEXT).get(suffix)
     if suffix == ".ply":
-        tints = None
-        if held.colors is not None:
-            tints = np.full((mesh.n_vertices, 3), 255, np.uint8)
-            tints[mesh.faces.ravel()] = held.colors.reshape(-1, 4)[:, :3]
-        write = partial(write, colors=tints, face_labels=face_labels)
-    return {path: write(mesh)}
+        columns = ply_attributes.columns(held, mesh, face_labels, lost)
+        return {path: write(mesh, *columns)}
+    kept = ("fields",) if suffix in FIELD_FORMATS else ()
+    lost += [name for name, there in held.contents.items() if there and name not in kept]
+    return {path: write(mesh) if write else format_fields(mesh, suffix, held.fields)}
 
 
 def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:

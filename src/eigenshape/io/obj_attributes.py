@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,13 @@ import numpy as np
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.attributes import Material, MeshAttributes, SourceFile, corner_normals
+from eigenshape.io.attributes import (
+    Material,
+    MeshAttributes,
+    SourceFile,
+    corner_normals,
+    plain_attributes,
+)
 from eigenshape.io.obj_sheet import ObjSheet, format_sheet, read_sheet
 from eigenshape.io.text import rows_text
 
@@ -46,10 +53,10 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         others.append("names of objects beside those of groups")
     if _rows(sheet, "s"):
         others.append("smoothing groups")
+    others += sheet.dropped
     has_normals = (normals >= 0).any()
-    return MeshAttributes(
-        mesh=mesh,
-        corners=np.arange(3 * mesh.n_faces).reshape(-1, 3),
+    return replace(
+        plain_attributes(mesh),
         face_materials=np.repeat(face_materials, faces_of),
         face_groups=np.repeat(face_groups, faces_of),
         texture_coordinates=coordinates[textures - 1] if textures.any() else None,
@@ -173,11 +180,11 @@ def rewrite(
 ) -> tuple[Files, list[str]]:
     """Write an OBJ file again with other positions, its materials and images beside it."""
     sheet = read_sheet(source.data)
-    data = format_sheet(sheet, attributes.mesh, mesh.vertices)
+    data = format_sheet(sheet, attributes, mesh.vertices)
     if path.absolute().parent.resolve() == source.path.absolute().parent.resolve():
-        return {path: data}, []
+        return {path: data}, [*sheet.dropped]
     text, missing = _material_files(sheet, source)
-    lost = [
+    lost = [*sheet.dropped] + [
         f"the materials of {name!r}, which is not in the folder of the file" for name in missing
     ]
     if not text:

@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape.geometry.measure import area_vectors
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.attributes import unit_rows
+from eigenshape.io.attributes import MeshAttributes, unit_rows
 from eigenshape.io.obj import corner_index, join_lines
 from eigenshape.io.text import Line, coordinates, fans, rows_text, whole
 
 KEPT = (b"vt", b"o", b"g", b"s", b"usemtl", b"mtllib")
+OTHER_LINES = {"l": "polylines", "p": "points"}
 ORDERS = tuple(permutations(range(3)))
 TURNED = ((0, 2, 1), (1, 0, 2), (2, 1, 0))  # the permutations in ORDERS that reverse a face
 # A vertex, "/7" where it has the texture coordinate 7, and the number of its normal or -1.
@@ -28,7 +28,7 @@ Piece = tuple[Sequence[int], Sequence[Corner], bool]
 class ObjSheet:
     """The content of an OBJ file that a triangle mesh does not store.
 
-    Points, polylines and comments are dropped. Normals are kept to tell where creases are.
+    Comments are dropped. Normals are kept to tell where creases are.
 
     Attributes
     ----------
@@ -41,6 +41,8 @@ class ObjSheet:
         The corners of each face.
     rows : tuple
         Lines to copy, and numbers of polygons, in the order of the file.
+    dropped : tuple of str
+        Kinds of lines that are not kept.
     """
 
     vertices: Float[np.ndarray, "n 3"]
@@ -48,6 +50,7 @@ class ObjSheet:
     normals: tuple[tuple[float, ...], ...]
     polygons: tuple[tuple[Corner, ...], ...]
     rows: tuple[str | int, ...]
+    dropped: tuple[str, ...]
 
 
 def read_sheet(data: bytes) -> ObjSheet:
@@ -63,6 +66,7 @@ def read_sheet(data: bytes) -> ObjSheet:
     polygons: list[tuple[Corner, ...]] = []
     rows: list[str | int] = []
     normals: list[Line] = []
+    dropped: set[str] = set()
     n_textures = 0
     for number, raw in enumerate(join_lines(data.removeprefix(codecs.BOM_UTF8)).splitlines(), 1):
         text = raw.partition(b"#")[0].strip()
@@ -81,6 +85,9 @@ def read_sheet(data: bytes) -> ObjSheet:
         elif keyword in KEPT:
             n_textures += keyword == b"vt"
             rows.append(raw.strip().decode("latin-1"))  # names may contain #
+        elif keyword:
+            kind = keyword.decode("latin-1")[:20]
+            dropped.add(OTHER_LINES.get(kind, f"lines that begin with {kind!r}"))
     return ObjSheet(
         coordinates(positions),
         tuple(tails),
@@ -91,6 +98,7 @@ def read_sheet(data: bytes) -> ObjSheet:
             for polygon in polygons
         ),
         tuple(rows),
+        tuple(sorted(dropped)),
     )
 
 
@@ -108,23 +116,23 @@ def _corner(word: bytes, line: Line, counts: tuple[int, int, int]) -> Corner:
 
 
 def format_sheet(
-    sheet: ObjSheet, mesh: TriangleMesh, moved: Float[np.ndarray, "k 3"] | None = None
+    sheet: ObjSheet, attributes: MeshAttributes, moved: Float[np.ndarray, "k 3"]
 ) -> bytes:
     """Write a repaired or deformed mesh with the remaining polygons, textures and groups.
 
     A polygon is kept if all its triangles still exist. Otherwise its remaining triangles are
-    written. Triangles that the file does not have, such as those of a filled hole, come last and
-    have no texture.
+    written. Triangles that the file does not have, such as those of a filled hole, come last.
 
     Parameters
     ----------
     sheet : ObjSheet
         The content of the file that the mesh was read from.
-    mesh : TriangleMesh
-        The mesh after repairs, which do not move vertices.
-    moved : (k, 3) float, optional
-        Coordinates to write instead of those of the mesh.
+    attributes : MeshAttributes
+        Of the mesh after repairs, which do not move vertices.
+    moved : (k, 3) float
+        Coordinates to write.
     """
+    mesh = attributes.mesh
     places, old_places, new_places = _places(sheet.vertices, mesh.vertices)
     first = np.full(places, -1)
     first[old_places[::-1]] = np.arange(len(old_places))[::-1]
@@ -133,15 +141,26 @@ def format_sheet(
     stayed = old_places[:shared] == new_places[:shared]
     sources[:shared][stayed] = np.arange(shared)[stayed]
     tails = [sheet.tails[source] if source >= 0 else "" for source in sources]
-    vertices = rows_text("v ", mesh.vertices if moved is None else moved)
+    vertices = rows_text("v ", moved)
     lines = [f"{row} {tail}".rstrip() for row, tail in zip(vertices, tails, strict=True)]
 
     triangles, added = _match_triangles(sheet, mesh.faces, old_places, new_places)
     rows: list[str | list[Corner]] = []
     for line in sheet.rows:
         rows += [line] if isinstance(line, str) else _pieces(sheet.polygons[line], triangles[line])
-    rows += [[(vertex, "", -1) for vertex in face] for face in added.tolist()]
-    normals, numbers = _normals(sheet, rows, mesh.vertices if moved is None else moved)
+    n_textures = sum(isinstance(line, str) and line.split(None, 1)[0] == "vt" for line in sheet.rows)
+    for face in added:
+        group, material = attributes.face_groups[face], attributes.face_materials[face]
+        rows += [f"g {_latin(attributes.groups[group])}"] if group >= 0 else []
+        rows += [f"usemtl {_latin(attributes.materials[material].name)}"] if material >= 0 else []
+        textures = [""] * 3
+        if attributes.texture_coordinates is not None:
+            rows += rows_text("vt ", attributes.texture_coordinates[face])
+            textures = [f"/{n_textures + number}" for number in (1, 2, 3)]
+            n_textures += 3
+        corners = zip(mesh.faces[face].tolist(), textures, strict=True)
+        rows.append([(vertex, texture, -1) for vertex, texture in corners])
+    normals, numbers = _normals(sheet, rows, moved)
     lines += rows_text("vn ", normals)
     for row in rows:
         if isinstance(row, str):
@@ -153,6 +172,11 @@ def format_sheet(
             tail = "" if number is None else f"{'' if texture else '/'}/{number + 1}"
             lines[-1] += f" {vertex + 1}{texture}{tail}"
     return ("\n".join(lines) + "\n").encode("latin-1")
+
+
+def _latin(name: str) -> str:
+    """Return a name as its bytes stand in a sheet."""
+    return name.encode().decode("latin-1")
 
 
 def _normals(
@@ -198,12 +222,10 @@ def _match_triangles(
     faces: Int[np.ndarray, "f 3"],
     old_places: Int[np.ndarray, " n"],
     new_places: Int[np.ndarray, " k"],
-) -> tuple[list[Triangles], Int[np.ndarray, "a 3"]]:
-    """Find the face of each triangle of each polygon, by place, and the faces of no polygon."""
-    by_places: defaultdict[tuple[int, ...], deque[list[int]]] = defaultdict(deque)
-    for face, places in zip(
-        faces.tolist(), np.sort(new_places[faces], axis=1).tolist(), strict=True
-    ):
+) -> tuple[list[Triangles], list[int]]:
+    """Find the face of each triangle of each polygon, by place, and the numbers of faces of no polygon."""
+    by_places: defaultdict[tuple[int, ...], deque[int]] = defaultdict(deque)
+    for face, places in enumerate(np.sort(new_places[faces], axis=1).tolist()):
         by_places[tuple(places)].append(face)
     found: list[Triangles] = []
     for polygon in sheet.polygons:
@@ -212,10 +234,10 @@ def _match_triangles(
         for index in range(1, len(corners) - 1):
             wanted = old_places[[corners[0], corners[index], corners[index + 1]]].tolist()
             left = by_places[tuple(sorted(wanted))]
-            triangles.append(_fit_corners(left.popleft(), wanted, new_places) if left else None)
+            corners_of = faces[left.popleft()].tolist() if left else None
+            triangles.append(corners_of and _fit_corners(corners_of, wanted, new_places))
         found.append(triangles)
-    added = [face for left in by_places.values() for face in left]
-    return found, np.array(added, dtype=np.int64).reshape(-1, 3)
+    return found, [face for left in by_places.values() for face in left]
 
 
 def _fit_corners(

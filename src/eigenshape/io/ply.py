@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int, UInt8
+from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
@@ -26,59 +26,37 @@ from eigenshape.io.text import (
 
 AXES = ("x", "y", "z")
 CORNERS = ("vertex_indices", "vertex_index")
-TINTS = ("red", "green", "blue")
+WRITTEN = {"u1": "uchar", "i4": "int", "f8": "double"}  # types of columns that are written
 LABEL = "label"  # the property of faces that holds the number of their part
 Table = dict[str, Any]  # the values of each column, by name
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces; polygons and strips become triangles, the rest is ignored."""
-    tables = _tables(data)
+    tables = read_tables(data)
     vertices = np.column_stack(
         [np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES]
     )
-    polygons, strips = _lists(tables, "face"), _lists(tables, "tristrips")
+    polygons, strips = read_lists(tables, "face"), read_lists(tables, "tristrips")
     triangles = [_triangles(polygons)] if len(polygons) else []
     if len(strips):
         triangles.append(strip_triangles(_pieces(strips)))
     return vertices, np.concatenate(triangles) if triangles else np.empty((0, 3), dtype=np.int64)
 
 
-def _tables(data: bytes) -> dict[str, Table]:
+def read_tables(data: bytes) -> dict[str, Table]:
+    """Read all columns, by table and name; of text those that make no mesh are left as words."""
     header = parse_header(data)
     elements = [element for element in header.elements if element.columns]
     _require_mesh(elements)
     body = data[header.end :]
     if header.order == TEXT:
-        return _text_tables(lines_of(body, first=header.n_lines + 1), elements)
-    return _binary_tables(body, elements, header.order)
+        return _textread_tables(lines_of(body, first=header.n_lines + 1), elements)
+    return _binaryread_tables(body, elements, header.order)
 
 
-def read_attributes(data: bytes, mesh: TriangleMesh) -> tuple[np.ndarray | None, tuple[str, ...]]:
-    """Read colors of vertices, (n, 4) uint8 or None, and name the columns that nothing reads."""
-    elements = {element.name: element for element in parse_header(data).elements}
-    table = _tables(data)["vertex"]
-    known = {*AXES, *CORNERS}
-    colors = None
-    if {*TINTS} <= table.keys():
-        kinds = {column.name: column for column in elements["vertex"].columns}
-        names = [name for name in (*TINTS, "alpha") if name in table]
-        known |= {*names}
-        colors = np.full((mesh.n_vertices, 4), 255, np.uint8)
-        for place, name in enumerate(names):
-            scale = 1 if kinds[name].is_whole else 255
-            values = scale * np.asarray(table[name]).astype(np.float64)
-            colors[:, place] = np.rint(np.nan_to_num(values).clip(0, 255))
-    others = [
-        f"{column.name} of {element.name}"
-        for element in elements.values()
-        for column in element.columns
-        if element.count and column.name not in known
-    ]
-    return colors, tuple(others)
-
-
-def _lists(tables: dict[str, Table], name: str) -> Any:
+def read_lists(tables: dict[str, Table], name: str) -> Any:
+    """Return the lists of corners of faces or strips."""
     table = tables.get(name, {})
     return next((table[column] for column in CORNERS if column in table), ())
 
@@ -124,7 +102,7 @@ def _triangles(polygons: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
     return fans(polygons.astype(np.int64) if isinstance(polygons, np.ndarray) else polygons)
 
 
-def _text_tables(lines: Sequence[Line], elements: Sequence[Element]) -> dict[str, Table]:
+def _textread_tables(lines: Sequence[Line], elements: Sequence[Element]) -> dict[str, Table]:
     declared = sum(element.count for element in elements)
     if declared != len(lines):
         raise FileFormatError(
@@ -200,7 +178,7 @@ def _understood(words: Sequence[bytes], column: Column, row: Line) -> Sequence[A
     return words  # the column is not used
 
 
-def _binary_tables(body: bytes, elements: Sequence[Element], order: str) -> dict[str, Table]:
+def _binaryread_tables(body: bytes, elements: Sequence[Element], order: str) -> dict[str, Table]:
     tables, start = {}, 0
     for element in elements:
         tables[element.name], start = _binary_table(body, element, order, start)
@@ -264,7 +242,7 @@ def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
     FileFormatError
         If faces have no such property, or it is not a whole number.
     """
-    tables = _tables(data)
+    tables = read_tables(data)
     labels = tables.get("face", {}).get(LABEL)
     if labels is None:
         raise FileFormatError(
@@ -276,61 +254,51 @@ def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
         raise FileFormatError(
             f"The property {LABEL} of faces must be a whole number; it is not: {err}."
         ) from err
-    n_triangles = [len(polygon) - 2 for polygon in _lists(tables, "face")]
+    n_triangles = [len(polygon) - 2 for polygon in read_lists(tables, "face")]
     return np.repeat(values, n_triangles)
 
 
-def parse_colors(data: bytes) -> UInt8[np.ndarray, "n 3"] | None:
-    """Read red, green and blue of vertices, or return None if they are not bytes or missing."""
-    table = _tables(data)["vertex"]
-    if not {"red", "green", "blue"} <= table.keys():
-        return None
-    colors = np.column_stack([np.asarray(table[name]) for name in ("red", "green", "blue")])
-    is_byte = np.all((colors >= 0) & (colors <= 255) & (colors == np.round(colors)))
-    return colors.astype(np.uint8) if is_byte else None
-
-
 def format_text(
-    mesh: TriangleMesh,
-    colors: np.ndarray | None = None,
-    face_labels: Int[np.ndarray, " f"] | None = None,
+    mesh: TriangleMesh, of_vertices: Table | None = None, of_faces: Table | None = None
 ) -> bytes:
-    """Write a mesh as text that reads back exactly, with colors of vertices, (n, 3) uint8."""
-    vertices = rows_text("", mesh.vertices)
-    if colors is not None:
-        vertices = [
-            f"{row} {tint}" for row, tint in zip(vertices, rows_text("", colors), strict=True)
+    """Write a mesh, and columns of vertices and faces by name, as text that reads back exactly."""
+    tables = _columns(mesh, of_vertices, of_faces)
+    rows: list[str] = []
+    for columns in tables.values():
+        words = [
+            rows_text(f"{values.shape[1]} ", values) if values.ndim == 2 else map(repr, values.tolist())
+            for values in columns.values()
         ]
-    faces = rows_text("3 ", mesh.faces)
-    if face_labels is not None:
-        faces = [f"{row} {label}" for row, label in zip(faces, face_labels.tolist(), strict=True)]
-    rows = [*vertices, *faces]
-    return _header_text(mesh, "ascii", colors, face_labels) + ("\n".join(rows) + "\n").encode()
+        rows += map(" ".join, zip(*words, strict=True))
+    return _header_text(tables, "ascii") + ("\n".join(rows) + "\n").encode()
 
 
 def format_binary(
-    mesh: TriangleMesh,
-    colors: np.ndarray | None = None,
-    face_labels: Int[np.ndarray, " f"] | None = None,
+    mesh: TriangleMesh, of_vertices: Table | None = None, of_faces: Table | None = None
 ) -> bytes:
-    """Write a mesh in binary that reads back exactly, with colors of vertices, (n, 3) uint8."""
-    vertices = np.zeros(
-        mesh.n_vertices,
-        dtype=[("xyz", "<f8", 3)] + ([("rgb", "u1", 3)] if colors is not None else []),
-    )
-    vertices["xyz"] = mesh.vertices
-    if colors is not None:
-        vertices["rgb"] = colors
-    label = [(LABEL, "<i4")] if face_labels is not None else []
-    faces = np.zeros(mesh.n_faces, dtype=[("n", "u1"), ("corners", "<i4", 3), *label])
-    faces["n"], faces["corners"] = 3, mesh.faces
-    if face_labels is not None:
-        faces[LABEL] = face_labels
-    return (
-        _header_text(mesh, "binary_little_endian", colors, face_labels)
-        + vertices.tobytes()
-        + faces.tobytes()
-    )
+    """Write a mesh, and columns of vertices and faces by name, in binary that reads back exactly."""
+    tables = _columns(mesh, of_vertices, of_faces)
+    data = _header_text(tables, "binary_little_endian")
+    for columns in tables.values():
+        kinds: list[Any] = []
+        for name, values in columns.items():
+            kinds += [(f"length of {name}", "u1")] if values.ndim == 2 else []
+            kinds.append((name, values.dtype.newbyteorder("<"), values.shape[1:]))
+        table = np.zeros(len(next(iter(columns.values()))), dtype=kinds)
+        for name, values in columns.items():
+            table[name] = values
+            if values.ndim == 2:
+                table[f"length of {name}"] = values.shape[1]
+        data += table.tobytes()
+    return data
+
+
+def _columns(
+    mesh: TriangleMesh, of_vertices: Table | None, of_faces: Table | None
+) -> dict[str, Table]:
+    corners = {CORNERS[0]: mesh.faces.astype(np.int32)}
+    places = dict(zip(AXES, mesh.vertices.T, strict=True))
+    return {"vertex": places | (of_vertices or {}), "face": corners | (of_faces or {})}
 
 
 def format_points(points: np.ndarray) -> bytes:
@@ -342,17 +310,11 @@ def format_points(points: np.ndarray) -> bytes:
     return ("\n".join(lines) + "\n").encode() + points.astype("<f8").tobytes()
 
 
-def _header_text(
-    mesh: TriangleMesh,
-    order: str,
-    colors: np.ndarray | None,
-    face_labels: Int[np.ndarray, " f"] | None,
-) -> bytes:
-    tints = [f"property uchar {name}" for name in TINTS if colors is not None]
-    lines = [
-        "ply", f"format {order} 1.0",
-        f"element vertex {mesh.n_vertices}", *(f"property double {axis}" for axis in AXES), *tints,
-        f"element face {mesh.n_faces}", "property list uchar int vertex_indices",
-        *([f"property int {LABEL}"] if face_labels is not None else []), "end_header",
-    ]  # fmt: skip
-    return ("\n".join(lines) + "\n").encode()
+def _header_text(tables: dict[str, Table], order: str) -> bytes:
+    lines = ["ply", f"format {order} 1.0"]
+    for element, columns in tables.items():
+        lines.append(f"element {element} {len(next(iter(columns.values())))}")
+        for name, values in columns.items():
+            kind = WRITTEN[values.dtype.str[1:]]
+            lines.append(f"property {'list uchar ' if values.ndim == 2 else ''}{kind} {name}")
+    return ("\n".join([*lines, "end_header"]) + "\n").encode()

@@ -4,8 +4,6 @@ from .bending import read_edits_for as read_edits_for
 from .comparison import print_stability as print_stability
 from .comparison import scale_shape as scale_shape
 from .comparison import stability_facts as stability_facts
-from .decimation import decimate_file as decimate_file
-from .decimation import save_decimated as save_decimated
 from .facts import mesh_facts as mesh_facts
 from .facts import shape_facts as shape_facts
 from .heat import count_fragments as count_fragments

@@ -1,0 +1,193 @@
+"""Attributes carried from a mesh to a repaired or decimated one."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.sparse import csr_array
+
+from eigenshape.geometry.closest import closest_points
+from eigenshape.geometry.closest_loops import nearest_around
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import size_one
+from eigenshape.io.attributes import MeshAttributes, unit_rows
+
+# Faces are searched this many times as far from the middle of a new face as its corners are.
+REACH = 1.5
+# Values on both sides of an edge differ by more than this where there is a seam. Interpolation
+# rounds coordinates, and colors to whole numbers.
+SEAMS = {"texture_coordinates": 1e-6, "colors": 1}
+
+
+def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttributes:
+    """Carry the attributes of a mesh to a repaired or decimated one.
+
+    Each face takes material and group of the old face that is nearest to its middle. From there the
+    search for the nearest points of its corners spreads over the old faces, but not across seams:
+    edges where texture coordinates or colors jump, or the material or group changes. At the points
+    found, texture coordinates, normals and colors are interpolated. So each face looks into one
+    chart of the texture, and a face of the old mesh gets back the very values that it had.
+
+    Faces and vertices may have been dropped, welded, reordered or turned over, and new faces, such
+    as those of a filled hole, look as what is beside them.
+
+    Parameters
+    ----------
+    attributes : MeshAttributes
+        Of the mesh before.
+    mesh : MeshLike
+        The mesh after the repair, and before it is bent.
+
+    Returns
+    -------
+    MeshAttributes
+        Of `mesh`.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "a.ply")
+    >>> es.write_mesh(es.icosphere(1), path)
+    >>> mesh, attributes = es.read_mesh(path, attributes=True)
+    >>> done = es.repair(es.TriangleMesh(mesh.vertices, mesh.faces[5:]), ["fill_holes"])
+    >>> es.io.carry_attributes(attributes, done.mesh).mesh.n_faces == done.mesh.n_faces
+    True
+    """
+    mesh = as_mesh(mesh)
+    old = attributes.mesh
+    if np.array_equal(old.faces, mesh.faces) and np.array_equal(old.vertices, mesh.vertices):
+        return attributes
+    places = _places(old, mesh)
+    starts = _nearest_faces(old, mesh, places)
+    faces, weights = _corner_places(attributes, mesh, starts, places[: old.n_faces])
+    columns = (3 * faces[:, :, None] + np.arange(3)).ravel()
+    rows = np.repeat(np.arange(3 * mesh.n_faces), 3)
+    shape = (3 * mesh.n_faces, 3 * old.n_faces)
+    matrix = csr_array((weights.ravel(), (rows, columns)), shape=shape)
+    matrix.eliminate_zeros()
+    carried = {
+        name: interpolate(matrix, values.reshape(-1, values.shape[2])).reshape(-1, 3, values.shape[2])
+        for name in ("texture_coordinates", "normals", "colors")
+        if (values := getattr(attributes, name)) is not None
+    }
+    if "normals" in carried and matrix.nnz > len(rows) // 3:
+        carried["normals"] = unit_rows(carried["normals"].reshape(-1, 3)).reshape(-1, 3, 3)
+    fields = {}
+    for name, values in attributes.fields.items():
+        if len(values) != old.n_vertices:
+            fields[name] = values[starts]
+            continue
+        fields[name] = np.zeros((mesh.n_vertices, *values.shape[1:]), values.dtype)
+        at_corners = values[old.faces.ravel()]
+        # A corner that is an old vertex has its value, and all corners of a vertex agree but for rounding.
+        fields[name][mesh.faces.ravel()] = interpolate(
+            matrix, at_corners, blend=values.dtype.kind == "f"
+        )
+    return replace(
+        attributes,
+        mesh=mesh,
+        corners=csr_array(matrix @ attributes.corners),
+        fields=fields,
+        **{
+            name: getattr(attributes, name)[starts]
+            for name in ("face_parts", "face_materials", "face_groups")
+        },
+        **carried,
+    )
+
+
+def interpolate(corners: csr_array, values: np.ndarray, *, blend: bool = True) -> np.ndarray:
+    """Return values at new corners in the type of the old; without blending, those of most weight."""
+    if not blend:
+        ends = corners.indptr[1:]
+        order = np.lexsort([corners.data, np.repeat(np.arange(len(ends)), np.diff(corners.indptr))])
+        return values[corners.indices[order[ends - 1]]]
+    found = corners @ values.astype(np.float64)
+    return (np.rint(found) if values.dtype.kind in "iu" else found).astype(values.dtype)
+
+
+def _places(old: TriangleMesh, new: TriangleMesh) -> Int[np.ndarray, "g 3"]:
+    """Number the places where vertices lie; return those of the old faces, then of the new ones."""
+    # Adding 0.0 makes -0.0 equal to 0.0.
+    points = np.concatenate([old.vertices, new.vertices]) + 0.0
+    numbers = np.unique(points, axis=0, return_inverse=True)[1].ravel()
+    return numbers[np.concatenate([old.faces, new.faces + old.n_vertices])]
+
+
+def _nearest_faces(
+    old: TriangleMesh, new: TriangleMesh, places: Int[np.ndarray, "g 3"]
+) -> Int[np.ndarray, " f"]:
+    """Return the old face at the places of each new one, or the nearest; the right side of a sheet."""
+    n_old = old.n_faces
+    keys = np.unique(np.sort(places, axis=1), axis=0, return_inverse=True)[1].ravel()
+    # Whether a face goes around its places in their order, or the other way around
+    turned = np.argsort(places, axis=1, kind="stable")
+    sides = 2 * keys + np.isin(turned @ [9, 3, 1], [5, 15, 19])  # 012, 120 and 201 in base 3
+    first = np.full(sides.max() + 2, -1)
+    first[sides[:n_old][::-1]] = np.arange(n_old)[::-1]
+    same, other = first[sides[n_old:]], first[sides[n_old:] ^ 1]
+    found = np.where(same >= 0, same, other)
+    left = np.flatnonzero(found < 0)
+    if left.size:
+        middles = new.vertices[new.faces[left]].mean(axis=1)
+        nearest = closest_points(old, middles).simplices
+        twins = first[sides[nearest] ^ 1]
+        normals, old_normals = (
+            area_vectors(points) for points in (new.vertices[new.faces[left]], old.vertices[old.faces[nearest]])
+        )
+        away = (np.einsum("fi,fi->f", unit_rows(normals), unit_rows(old_normals)) < 0) & (twins >= 0)
+        found[left] = np.where(away, twins, nearest)
+    return found
+
+
+def _corner_places(
+    attributes: MeshAttributes,
+    mesh: TriangleMesh,
+    starts: Int[np.ndarray, " f"],
+    places: Int[np.ndarray, "o 3"],
+) -> tuple[Int[np.ndarray, "f 3"], Float[np.ndarray, "f 3 3"]]:
+    """Return for each corner the old face in which its nearest point lies, and the weights there."""
+    old = attributes.mesh
+    middle = old.vertices.mean(axis=0)
+    corners, scale = size_one(old.vertices[old.faces] - middle)
+    wanted = (mesh.vertices[mesh.faces] - middle) / scale
+    middles = wanted.mean(axis=1)
+    radii = np.linalg.norm(wanted - middles[:, None], axis=2).max(axis=1)
+    gaps = np.linalg.norm(corners[starts].mean(axis=1) - middles, axis=1)
+    neighbors = _neighbors(attributes, places)
+    found: tuple[np.ndarray, np.ndarray] = nearest_around(
+        wanted, middles, starts, (REACH * np.maximum(radii, gaps)) ** 2, corners, neighbors
+    )
+    return found
+
+
+def _neighbors(
+    attributes: MeshAttributes, places: Int[np.ndarray, "o 3"]
+) -> Int[np.ndarray, "o 3"]:
+    """Return the face across each edge, by place; the face itself at a border or a seam."""
+    count = places.size
+    here = np.arange(count)  # corners, and the edges that begin there
+    ahead = here - here % 3 + (here % 3 + 1) % 3
+    at = places.ravel()
+    ends = np.sort(np.column_stack([at, at[ahead]]), axis=1)
+    kinds = [attributes.face_parts, attributes.face_materials, attributes.face_groups]
+    keys = np.column_stack([*(np.repeat(kind, 3) for kind in kinds), ends])
+    order = np.lexsort(keys.T)
+    begins = np.flatnonzero(np.r_[True, (np.diff(keys[order], axis=0) != 0).any(axis=1)])
+    following = np.arange(1, count + 1)
+    following[np.r_[begins[1:], count] - 1] = begins  # the last face at an edge meets the first
+    across = np.empty(count, dtype=np.int64)
+    across[order] = order[following]
+    turned = at[across] != at[here]
+    one, two = np.where(turned, ahead[across], across), np.where(turned, across, ahead[across])
+    is_smooth: Bool[np.ndarray, " e"] = np.ones(count, dtype=bool)
+    for name, step in SEAMS.items():
+        values = getattr(attributes, name)
+        if values is not None:
+            rows = values.reshape(count, -1).astype(np.float64)
+            is_smooth &= (np.abs(rows[here] - rows[one]) <= step).all(axis=1)
+            is_smooth &= (np.abs(rows[ahead] - rows[two]) <= step).all(axis=1)
+    return np.where(is_smooth, across, here).reshape(-1, 3) // 3
