@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from eigenshape import FileFormatError, TriangleMesh
 from eigenshape.geometry.repair import REPAIRS, repair
-from eigenshape.io.obj import parse
 from eigenshape.io.attributes import plain_attributes
+from eigenshape.io.obj import parse
 from eigenshape.io.obj_sheet import format_sheet, read_sheet
 
 CUBE = b"""# a cube, its last vertex twice, and one that nothing uses
@@ -44,7 +44,6 @@ p 1
 
 def rewrite(sheet, mesh, moved=None):
     return format_sheet(sheet, plain_attributes(mesh), mesh.vertices if moved is None else moved)
-
 
 
 def turned(faces):
@@ -96,9 +95,7 @@ def test_polygons_turn_over_shrink_to_triangles_and_holes_are_sealed():
         lines(rewrite(read_sheet(CUBE), TriangleMesh(vertices, flipped)), "f")[0]
         == "f 1/1 2/2 3/3 4/4"
     )
-    half = rewrite(
-        read_sheet(CUBE), TriangleMesh(vertices, np.vstack([faces[1:], [[0, 1, 9]]]))
-    )
+    half = rewrite(read_sheet(CUBE), TriangleMesh(vertices, np.vstack([faces[1:], [[0, 1, 9]]])))
     assert lines(half, "f")[0] == "f 1/1 3/3 2/2"
     assert lines(half, "f")[-1] == "f 1 2 10"
     one_turned = np.vstack([faces[:1, ::-1], faces[1:]])

@@ -8,7 +8,7 @@ import typer
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
-from eigenshape.cli.console import escape_text, out, print_json
+from eigenshape.cli.console import escape_text, out, print_json, print_repairs
 from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption
 
 
@@ -16,7 +16,10 @@ def decimate(
     mesh: MeshArgument,
     *,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ.")
+        Path,
+        typer.Option(
+            "-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ."
+        ),
     ],
     faces: Annotated[int | None, typer.Option(help="Number of faces to keep.")] = None,
     ratio: Annotated[
@@ -38,9 +41,12 @@ def decimate(
         raise InvalidParameterError(
             "The number of faces must be given by one of --faces and --ratio."
         )
+    surface = steps.load_surface(mesh, repair)
     # Vertices are double along seams of textures, where the surface would come apart.
-    names = ",".join(["weld_seams", *([repair] if repair else [])])
-    done = es.geometry.decimate(steps.load_surface(mesh, names), faces, ratio=ratio)
+    joined = es.geometry.weld_seams(surface)
+    if joined.mesh.n_vertices < surface.n_vertices:
+        print_repairs(joined.report)
+    done = es.geometry.decimate(joined.mesh, faces, ratio=ratio)
     steps.save_like(mesh, done.mesh, output)
     if as_json:
         facts = {"n_vertices": done.mesh.n_vertices, "n_faces": done.mesh.n_faces}

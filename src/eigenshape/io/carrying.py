@@ -1,6 +1,7 @@
 """Attributes carried from a mesh to a repaired or decimated one."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -68,8 +69,10 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
     shape = (3 * mesh.n_faces, 3 * old.n_faces)
     matrix = csr_array((weights.ravel(), (rows, columns)), shape=shape)
     matrix.eliminate_zeros()
-    carried = {
-        name: interpolate(matrix, values.reshape(-1, values.shape[2])).reshape(-1, 3, values.shape[2])
+    carried: dict[str, Any] = {
+        name: interpolate(matrix, values.reshape(-1, values.shape[2])).reshape(
+            -1, 3, values.shape[2]
+        )
         for name in ("texture_coordinates", "normals", "colors")
         if (values := getattr(attributes, name)) is not None
     }
@@ -91,10 +94,9 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
         mesh=mesh,
         corners=csr_array(matrix @ attributes.corners),
         fields=fields,
-        **{
-            name: getattr(attributes, name)[starts]
-            for name in ("face_parts", "face_materials", "face_groups")
-        },
+        face_parts=attributes.face_parts[starts],
+        face_materials=attributes.face_materials[starts],
+        face_groups=attributes.face_groups[starts],
         **carried,
     )
 
@@ -110,7 +112,7 @@ def interpolate(corners: csr_array, values: np.ndarray, *, blend: bool = True) -
 
 
 def _places(old: TriangleMesh, new: TriangleMesh) -> Int[np.ndarray, "g 3"]:
-    """Number the places where vertices lie; return those of the old faces, then of the new ones."""
+    """Return the numbers of the places where the corners of all faces lie, the old faces first."""
     # Adding 0.0 makes -0.0 equal to 0.0.
     points = np.concatenate([old.vertices, new.vertices]) + 0.0
     numbers = np.unique(points, axis=0, return_inverse=True)[1].ravel()
@@ -136,9 +138,12 @@ def _nearest_faces(
         nearest = closest_points(old, middles).simplices
         twins = first[sides[nearest] ^ 1]
         normals, old_normals = (
-            area_vectors(points) for points in (new.vertices[new.faces[left]], old.vertices[old.faces[nearest]])
+            area_vectors(points)
+            for points in (new.vertices[new.faces[left]], old.vertices[old.faces[nearest]])
         )
-        away = (np.einsum("fi,fi->f", unit_rows(normals), unit_rows(old_normals)) < 0) & (twins >= 0)
+        away = (np.einsum("fi,fi->f", unit_rows(normals), unit_rows(old_normals)) < 0) & (
+            twins >= 0
+        )
         found[left] = np.where(away, twins, nearest)
     return found
 

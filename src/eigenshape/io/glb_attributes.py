@@ -52,7 +52,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     gltf, scene = _open(source)
     n_faces = len(scene.piece.faces)
     corner_rows = scene.piece.rows[scene.piece.faces]
-    found: dict[str, np.ndarray] = {}
+    found: dict[str, Any] = {}
     materials = [_material(gltf, source, entry) for entry in gltf.tree.get("materials", [])]
     face_materials, face_parts = np.full((2, n_faces), -1)
     for part, (_, _, primitive, chosen) in enumerate(_placed_primitives(gltf, scene)):
@@ -305,37 +305,33 @@ def rewrite(
             if not chosen.size:
                 continue
             vertices = mesh.faces[chosen][:, order].ravel()
-            # What the corners of the file give to each corner, without those that give nothing
-            blends = attributes.corners[(3 * chosen[:, None] + order).ravel()]
-            used, columns = np.unique(blends.indices, return_inverse=True)
-            blends = csr_array((blends.data, columns.ravel(), blends.indptr))
-            rows = file_rows[used]
-
+            rows, blends = _sources(attributes, (3 * chosen[:, None] + order).ravel(), file_rows)
             table: dict[str, Any] = {}
             targets: list[dict[str, Any]] = [{} for _ in shared.get("targets", [])]
-            columns_of = [(table, shared["attributes"]), *zip(targets, shared.get("targets", []), strict=True)]
+            columns_of = [
+                (table, shared["attributes"]),
+                *zip(targets, shared.get("targets", []), strict=True),
+            ]
             blended = [
                 (place, name, index, _blend(gltf, index, name, rows, blends))
                 for place, named in columns_of
                 for name, index in named.items()
                 if place is not table or name not in MADE_ANEW
             ]
-            if blends.nnz == len(vertices):  # corners of the file: values agree as their rows do
-                keys = [vertices, rows[blends.indices]]
-            else:
-                keys = [vertices, *(column for *_, values in blended for column in values.T)]
+            # Corners of the file agree if their rows do, others if all their values do.
+            are_old = blends.nnz == len(vertices)
+            values_of = (column for *_, values in blended for column in values.T)
+            columns = [rows[blends.indices]] if are_old else [*values_of]
             normal = None
             if normals is not None and "NORMAL" in shared["attributes"]:
                 normal = normals[chosen][:, order].reshape(-1, 3)
-            first, indices = _split_corners(keys, normal)
+            first, indices = _split_corners([vertices, *columns], normal)
             local = (places[vertices[first]] - matrix[:3, 3]) @ np.linalg.pinv(matrix[:3, :3]).T
             table["POSITION"] = document.add_accessor(local.astype("<f4"), name="POSITION")
             if normal is not None:
                 local = unit_rows(normal[first] @ matrix[:3, :3])
                 table["NORMAL"] = document.add_accessor(local.astype("<f4"), name="NORMAL")
-            if "TANGENT" in shared["attributes"]:
-                lost.append(TANGENTS)
-
+            lost += [TANGENTS] if "TANGENT" in shared["attributes"] else []
             for place, name, index, values in blended:
                 is_normalized = gltf.entry("accessors", index).get("normalized") is True
                 place[name] = document.add_accessor(
@@ -376,6 +372,15 @@ def _split_corners(
     )
     kind = "<u2" if len(first) < 2**16 - 1 else "<u4"
     return first, indices.astype(kind).reshape(-1, 1)
+
+
+def _sources(
+    attributes: MeshAttributes, corners: Int[np.ndarray, " c"], file_rows: Int[np.ndarray, " r"]
+) -> tuple[Int[np.ndarray, " u"], csr_array]:
+    """Return the rows of the file that some corners come from, and what each gives to each corner."""
+    blends = attributes.corners[corners]
+    used, columns = np.unique(blends.indices, return_inverse=True)
+    return file_rows[used], csr_array((blends.data, columns.ravel(), blends.indptr))
 
 
 def _blend(

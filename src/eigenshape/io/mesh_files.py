@@ -37,7 +37,12 @@ LABELED = (".ply", ".glb", ".obj")  # formats that hold parts
 TEXT_FORMATS = (*TEXT, ".obj")
 BINARY_FORMATS = (*BINARY, ".glb", *FIELD_FORMATS)
 GLTF = (".glb", ".gltf")
-WITH_ATTRIBUTES = (*GLTF, ".obj", ".ply", *FIELD_FORMATS)  # formats that hold more than positions and faces
+WITH_ATTRIBUTES = (
+    *GLTF,
+    ".obj",
+    ".ply",
+    *FIELD_FORMATS,
+)  # formats that hold more than positions and faces
 
 
 @overload
@@ -317,14 +322,17 @@ def _encode(
     if suffix == ".obj":
         return obj_attributes.write_new(held, mesh, path)
     if suffix == ".glb":
-        return {path: glb_attributes.write_new(held, mesh)}
-    write = (BINARY if binary else TEXT).get(suffix)
-    if suffix == ".ply":
-        columns = ply_attributes.columns(held, mesh, face_labels, lost)
-        return {path: write(mesh, *columns)}
-    kept = ("fields",) if suffix in FIELD_FORMATS else ()
-    lost += [name for name, there in held.contents.items() if there and name not in kept]
-    return {path: write(mesh) if write else format_fields(mesh, suffix, held.fields)}
+        data = glb_attributes.write_new(held, mesh)
+    elif suffix == ".ply":
+        write = ply.format_binary if binary else ply.format_text
+        data = write(mesh, *ply_attributes.columns(held, mesh, face_labels, lost))
+    elif suffix in FIELD_FORMATS:
+        lost += [name for name, there in held.contents.items() if there and name != "fields"]
+        data = format_fields(mesh, suffix, held.fields)
+    else:
+        lost += [name for name, there in held.contents.items() if there]
+        data = (BINARY if binary else TEXT)[suffix](mesh)
+    return {path: data}
 
 
 def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:

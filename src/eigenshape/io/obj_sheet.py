@@ -148,7 +148,9 @@ def format_sheet(
     rows: list[str | list[Corner]] = []
     for line in sheet.rows:
         rows += [line] if isinstance(line, str) else _pieces(sheet.polygons[line], triangles[line])
-    n_textures = sum(isinstance(line, str) and line.split(None, 1)[0] == "vt" for line in sheet.rows)
+    n_textures = sum(
+        isinstance(line, str) and line.split(None, 1)[0] == "vt" for line in sheet.rows
+    )
     for face in added:
         group, material = attributes.face_groups[face], attributes.face_materials[face]
         rows += [f"g {_latin(attributes.groups[group])}"] if group >= 0 else []

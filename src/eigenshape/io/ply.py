@@ -266,7 +266,9 @@ def format_text(
     rows: list[str] = []
     for columns in tables.values():
         words = [
-            rows_text(f"{values.shape[1]} ", values) if values.ndim == 2 else map(repr, values.tolist())
+            rows_text(f"{values.shape[1]} ", values)
+            if values.ndim == 2
+            else map(repr, values.tolist())
             for values in columns.values()
         ]
         rows += map(" ".join, zip(*words, strict=True))

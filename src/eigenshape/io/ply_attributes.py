@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import MeshAttributes, corner_normals, plain_attributes
 from eigenshape.io.ply import AXES, CORNERS, LABEL, Table, read_lists, read_tables
@@ -37,22 +38,21 @@ def read_attributes(data: bytes, mesh: TriangleMesh) -> MeshAttributes:
     found: dict[str, Any] = {}
     known = {("vertex", name) for name in AXES} | {(e, n) for e, *_ in columns for n in CORNERS}
 
-    def numbers(element: str, names: Sequence[str]) -> Float[np.ndarray, "rows k"] | None:
-        if not all((element, name) in columns for name in names):
-            return None
+    def numbers(element: str, names: Sequence[str]) -> Float[np.ndarray, "rows k"]:
         known.update((element, name) for name in names)
         return np.column_stack([_numbers(tables[element][name]) for name in names])
 
-    normals = numbers("vertex", NORMALS)
-    if normals is not None:
-        found["normals"] = normals[mesh.faces]
-    for names in COORDINATES:
-        coordinates = numbers("vertex", names)
-        if coordinates is not None:
-            found["texture_coordinates"] = coordinates[mesh.faces]
+    def holds(element: str, names: Sequence[str]) -> bool:
+        return all((element, name) in columns for name in names)
+
+    if holds("vertex", NORMALS):
+        found["normals"] = numbers("vertex", NORMALS)[mesh.faces]
+    for pair in COORDINATES:
+        if holds("vertex", pair):
+            found["texture_coordinates"] = numbers("vertex", pair)[mesh.faces]
     are_faces = len(polygon_of) == mesh.n_faces  # not strips
     for element in ("vertex", *(["face"] if are_faces else [])):
-        if not all((element, name) in columns for name in TINTS) or "colors" in found:
+        if not holds(element, TINTS) or "colors" in found:
             continue
         names = [*TINTS, *(["alpha"] if (element, "alpha") in columns else [])]
         scales = [1 if columns[element, name].is_whole else 255 for name in names]
@@ -60,25 +60,22 @@ def read_attributes(data: bytes, mesh: TriangleMesh) -> MeshAttributes:
         colors = np.full((len(tints), 4), 255, np.uint8)
         colors[:, : len(names)] = np.rint(np.nan_to_num(tints).clip(0, 255))
         found["colors"] = (
-            colors[mesh.faces] if element == "vertex" else colors[polygon_of[:, None]].repeat(3, axis=1)
+            colors[mesh.faces]
+            if element == "vertex"
+            else colors[polygon_of[:, None]].repeat(3, axis=1)
         )
     if are_faces and "texture_coordinates" not in found and ("face", WEDGES) in columns:
-        sizes = [len(row) for row in face[WEDGES]]
-        if sizes == [2 * len(polygon) for polygon in polygons]:
-            rows = _numbers(np.concatenate([np.asarray(row) for row in face[WEDGES]])).reshape(-1, 2)
-            ends = np.cumsum([0, *sizes]) // 2
-            places = fans([range(first, last) for first, last in pairwise(ends.tolist())])
-            found["texture_coordinates"] = rows[places]
-            known.add(("face", WEDGES))
+        found["texture_coordinates"] = _wedges(face[WEDGES], polygons)
+        known.add(("face", WEDGES))
     label = columns.get(("face", LABEL))
-    if are_faces and label is not None and _is_field(label):
+    if are_faces and label is not None and not label.length_kind:
         labels = _numbers(face[LABEL])[polygon_of].astype(np.int64)
-        names, found["face_groups"] = np.unique(labels, return_inverse=True)
-        found["groups"] = tuple(map(str, names.tolist()))
+        distinct, found["face_groups"] = np.unique(labels, return_inverse=True)
+        found["groups"] = tuple(map(str, distinct.tolist()))
         known.add(("face", LABEL))
     fields = {}
     for (element, name), column in columns.items():
-        is_plain = _is_field(column) and (element, name) not in known and name not in fields
+        is_plain = not column.length_kind and (element, name) not in known and name not in fields
         if is_plain and element == "vertex":
             fields[name] = _typed(vertex[name], column)
         elif is_plain and element == "face" and are_faces and mesh.n_faces != mesh.n_vertices:
@@ -92,19 +89,26 @@ def read_attributes(data: bytes, mesh: TriangleMesh) -> MeshAttributes:
     return replace(plain_attributes(mesh), fields=fields, others=tuple(others), **found)
 
 
+def _wedges(rows: Any, polygons: Any) -> Float[np.ndarray, "f 3 2"]:
+    """Return the texture coordinates at the corners of triangles, from those of polygons."""
+    sizes = [len(row) for row in rows]
+    if sizes != [2 * len(polygon) for polygon in polygons]:
+        raise FileFormatError(
+            f"{WEDGES} of a face must hold two numbers for each corner; it does not."
+        )
+    pairs = np.concatenate([_numbers(row) for row in rows]).reshape(-1, 2)
+    ends = np.cumsum([0, *sizes]) // 2
+    return pairs[fans([range(first, last) for first, last in pairwise(ends.tolist())])]
+
+
 def _numbers(values: Any) -> Float[np.ndarray, "..."]:
     return np.asarray(values).astype(np.float64)
 
 
-def _is_field(column: Column) -> bool:
-    return not column.length_kind
-
-
 def _typed(values: Any, column: Column) -> np.ndarray:
     """Return a column in a type that PLY files are written in."""
-    numbers = _numbers(values).ravel()
-    is_byte = column.kind == "B"
-    return numbers.astype(np.uint8 if is_byte else np.int32 if column.kind in "bhHi" else np.float64)
+    kinds = {"B": np.uint8, "b": np.int32, "h": np.int32, "H": np.int32, "i": np.int32}
+    return _numbers(values).ravel().astype(kinds.get(column.kind, np.float64))
 
 
 def columns(
@@ -131,27 +135,31 @@ def columns(
         lost += [] if fit else ["normals that differ at one vertex"]
     if held.texture_coordinates is not None:
         rows, fit = _of_vertices(mesh, held.texture_coordinates, 1e-6)
-        if fit:
-            of_vertices |= dict(zip(COORDINATES[0], rows.T, strict=True))
-        else:
-            of_faces[WEDGES] = held.texture_coordinates.reshape(-1, 6)
+        of_vertices |= dict(zip(COORDINATES[0], rows.T, strict=True)) if fit else {}
+        of_faces |= {} if fit else {WEDGES: held.texture_coordinates.reshape(-1, 6)}
     numbered = all(re.fullmatch(r"-?\d{1,9}", name) for name in held.groups)
     if labels is not None:
         of_faces[LABEL] = labels.astype(np.int32)
     elif held.groups and numbered and held.face_groups.min() >= 0:
         of_faces[LABEL] = np.array(held.groups, dtype=np.int32)[held.face_groups]
     for name, values in held.fields.items():
-        table = of_vertices if len(values) == mesh.n_vertices else of_faces
-        if values.ndim > 1 or re.search(r"\s", name) or name in {**of_vertices, **of_faces, LABEL: 0}:
+        if values.ndim > 1 or re.search(r"\s", name) or name in {*of_vertices, *of_faces, LABEL}:
             lost.append(f"the field {name!r}")
         else:
-            is_small = values.dtype.kind in "iu" and np.abs(values.astype(float)).max() < 2**31
-            kind = values.dtype if values.dtype == np.uint8 else np.int32 if is_small else np.float64
-            table[name] = values.astype(kind)
+            table = of_vertices if len(values) == mesh.n_vertices else of_faces
+            table[name] = values.astype(_kind(values))
     lost += [name for name in ("materials", "images") if held.contents[name]]
     if held.contents["names of groups"] and not (numbered and labels is None):
         lost.append("names of groups")
     return of_vertices, of_faces
+
+
+def _kind(values: np.ndarray) -> type[np.generic]:
+    """Return the type to write a field in."""
+    if values.dtype == np.uint8:
+        return np.uint8
+    is_small = values.dtype.kind in "biu" and np.abs(values.astype(np.float64)).max() < 2**31
+    return np.int32 if is_small else np.float64
 
 
 def _of_vertices(
@@ -159,7 +167,9 @@ def _of_vertices(
 ) -> tuple[np.ndarray, bool]:
     """Return the values of vertices, and whether those of all their corners agree."""
     values = at_corners.reshape(-1, at_corners.shape[2])
-    rows = np.full((mesh.n_vertices, values.shape[1]), 255 if values.dtype == np.uint8 else 0, values.dtype)
+    rows = np.full(
+        (mesh.n_vertices, values.shape[1]), 255 if values.dtype == np.uint8 else 0, values.dtype
+    )
     rows[mesh.faces.ravel()] = values
     gaps = np.abs(rows[mesh.faces.ravel()].astype(np.float64) - values)
     return rows, bool((gaps <= step).all())
