@@ -295,8 +295,7 @@ def rewrite(
     for node, matrix in scene.matrices.items():
         primitives = gltf.entry("meshes", gltf.entry("nodes", node)["mesh"])["primitives"]
         # A reflection turns triangles over, and the reader has turned them back.
-        is_mirrored = np.linalg.slogdet(matrix[:3, :3])[0] < 0
-        order = [2, 1, 0] if is_mirrored else [0, 1, 2]
+        order = [2, 1, 0] if np.linalg.slogdet(matrix[:3, :3])[0] < 0 else [0, 1, 2]
         written[node] = [part for part in primitives if part.get("mode", 4) not in SURFACES]
         for numbers in _sharing(primitives):
             shared = primitives[numbers[0]]
