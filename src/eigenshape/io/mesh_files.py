@@ -86,7 +86,7 @@ def read_mesh(
         `read_shape`.
     attributes : bool
         Whether to return also what the file holds besides: texture coordinates, materials, images,
-        colors, groups. OBJ, PLY, GLB and glTF files hold such content.
+        colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTK and NPZ files hold such content.
 
     Returns
     -------
