@@ -155,7 +155,7 @@ end_header
 def test_ply_keeps_its_columns(tmp_path, binary):
     (tmp_path / "a.ply").write_text(PLY)
     mesh, attributes = es.read_mesh(tmp_path / "a.ply", attributes=True)
-    assert attributes.others == ("flags of face", "the image that a comment names")
+    assert attributes.others == ("flags of face", "the image 'grain.png', which a comment names")
     for name in "bc":  # what is written is read again as it is
         with_losses = save_mesh(
             mesh, tmp_path / f"{name}.ply", binary=binary, attributes=attributes
@@ -167,6 +167,16 @@ def test_ply_keeps_its_columns(tmp_path, binary):
     assert attributes.face_groups.tolist() == [0, 1]
     assert attributes.fields["quality"].tolist() == [0.5, 1.5, 2.5, 3.5]
     assert attributes.texture_coordinates[1].tolist() == [[0, 0], [1, 1], [0, 1]]
+
+
+def test_ply_takes_its_image_along(tmp_path):
+    (tmp_path / "a.ply").write_text(PLY)
+    (tmp_path / "grain.png").write_bytes(PNG)
+    mesh, attributes = es.read_mesh(tmp_path / "a.ply", attributes=True)
+    assert attributes.others == ("flags of face",)
+    assert "materials, images" in save_mesh(mesh, tmp_path / "b.ply", attributes=attributes)
+    save_mesh(mesh, tmp_path / "b.glb", attributes=attributes)
+    assert es.read_mesh(tmp_path / "b.glb", attributes=True)[1].materials[0].image == PNG
 
 
 def test_ply_wedges(tmp_path):

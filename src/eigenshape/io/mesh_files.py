@@ -150,7 +150,7 @@ def _read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     if source.suffix == ".obj":
         return obj_attributes.read_attributes(source, mesh)
     if source.suffix == ".ply":
-        return ply_attributes.read_attributes(source.data, mesh)
+        return ply_attributes.read_attributes(source, mesh)
     if source.suffix in FIELD_FORMATS:
         return read_field_attributes(source.data, source.suffix, mesh)
     return plain_attributes(mesh)

@@ -10,12 +10,21 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
+from eigenshape._files import read_regular
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.attributes import MeshAttributes, corner_normals, plain_attributes
+from eigenshape.io.attributes import (
+    Material,
+    MeshAttributes,
+    SourceFile,
+    corner_normals,
+    plain_attributes,
+)
+from eigenshape.io.obj_attributes import find_beside
 from eigenshape.io.ply import AXES, CORNERS, LABEL, Table, read_lists, read_tables
 from eigenshape.io.ply_header import Column, parse_header
 from eigenshape.io.text import fans
 
+IMAGE = re.compile(rb"(?m)^comment TextureFile[ \t]+(.+?)[ \t\r]*$")  # as MeshLab writes it
 TINTS = ("red", "green", "blue")
 NORMALS = ("nx", "ny", "nz")
 # Names of texture coordinates of vertices; those of Blender are written
@@ -23,12 +32,12 @@ COORDINATES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 WEDGES = "texcoord"  # of faces: the coordinates of all corners, as MeshLab writes them
 
 
-def read_attributes(data: bytes, mesh: TriangleMesh) -> MeshAttributes:
+def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     """Return the attributes of a PLY file; columns of numbers without a known meaning are fields."""
-    tables = read_tables(data)
+    tables, header = read_tables(source.data), parse_header(source.data)
     columns = {
         (element.name, column.name): column
-        for element in parse_header(data).elements
+        for element in header.elements
         for column in element.columns
         if element.count
     }
@@ -51,9 +60,8 @@ def read_attributes(data: bytes, mesh: TriangleMesh) -> MeshAttributes:
         if holds("vertex", pair):
             found["texture_coordinates"] = numbers("vertex", pair)[mesh.faces]
     are_faces = len(polygon_of) == mesh.n_faces  # not strips
-    for element in ("vertex", *(["face"] if are_faces else [])):
-        if not holds(element, TINTS) or "colors" in found:
-            continue
+    tinted = [e for e in ("vertex", *["face"] * are_faces) if holds(e, TINTS)]
+    for element in tinted[:1]:
         names = [*TINTS, *(["alpha"] if (element, "alpha") in columns else [])]
         scales = [1 if columns[element, name].is_whole else 255 for name in names]
         tints = numbers(element, names) * scales
@@ -84,9 +92,22 @@ def read_attributes(data: bytes, mesh: TriangleMesh) -> MeshAttributes:
             continue
         known.add((element, name))
     others = [f"{name} of {element}" for element, name in columns if (element, name) not in known]
-    if b"comment TextureFile" in data[: parse_header(data).end]:
-        others.append("the image that a comment names")
+    if are_faces and len(polygons) < mesh.n_faces:
+        others.append("polygons, of which triangles are made")
+    materials, missing = _read_images(source, header.end)
+    if materials:
+        found |= {"materials": materials, "face_materials": np.zeros(mesh.n_faces, dtype=np.int64)}
+    others += missing
     return replace(plain_attributes(mesh), fields=fields, others=tuple(others), **found)
+
+
+def _read_images(source: SourceFile, end: int) -> tuple[tuple[Material, ...], list[str]]:
+    """Return a material with the image that a comment names; if there is no such one, its name."""
+    names = [name.decode("latin-1") for name in IMAGE.findall(source.data[:end])]
+    path = find_beside(names[0], source.path.parent) if len(names) == 1 else None
+    if path is None:
+        return (), [f"the image {name[:80]!r}, which a comment names" for name in names]
+    return (Material(path.stem, image=read_regular(path, "an image"), image_name=path.name),), []
 
 
 def _wedges(rows: Any, polygons: Any) -> Float[np.ndarray, "f 3 2"]:
@@ -143,10 +164,10 @@ def columns(
     elif held.groups and numbered and held.face_groups.min() >= 0:
         of_faces[LABEL] = np.array(held.groups, dtype=np.int32)[held.face_groups]
     for name, values in held.fields.items():
-        if values.ndim > 1 or re.search(r"\s", name) or name in {*of_vertices, *of_faces, LABEL}:
+        table = of_vertices if len(values) == mesh.n_vertices else of_faces
+        if values.ndim > 1 or re.search(r"\s", name) or name in {*table, LABEL}:
             lost.append(f"the field {name!r}")
         else:
-            table = of_vertices if len(values) == mesh.n_vertices else of_faces
             table[name] = values.astype(_kind(values))
     lost += [name for name in ("materials", "images") if held.contents[name]]
     if held.contents["names of groups"] and not (numbered and labels is None):
