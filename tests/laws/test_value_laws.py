@@ -6,6 +6,7 @@ import inspect
 import pickle
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,14 @@ from test_thread_laws import digest
 from thread_calls import CALLS, Shared
 
 import eigenshape as es
+
+
+def read_attributes(mesh: es.TriangleMesh) -> es.io.MeshAttributes:
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "ball.vtu")
+        es.io.write_fields(mesh, path, {"height": mesh.vertices[:, 2]})
+        return es.read_mesh(path, attributes=True)[1]
+
 
 CLASSES = {
     name: thing
@@ -57,6 +66,9 @@ CALLED = [
 ]
 MADE: dict[str, Callable[[Shared], Any]] = {
     "BandPass": lambda v: es.spectral.BandPass(1.0, 2.0),
+    "DecimatedMesh": lambda v: es.geometry.decimate(v.ball, ratio=0.5),
+    "Material": lambda v: es.io.Material("oak", image=b"grain", image_name="grain.png"),
+    "MeshAttributes": lambda v: read_attributes(v.ball),
     "BatchReport": lambda v: es.retrieval.BatchReport(("a",), (), (("b", "no mesh"),), ()),
     "BoxRegion": lambda v: es.deformation.BoxRegion([-1, -1, -1], [1, 1, 1]),
     "BrushRegion": lambda v: es.deformation.BrushRegion([0, 0, 1], 0.5),
@@ -118,8 +130,8 @@ def arrays(entry: Any) -> Iterator[np.ndarray]:
     """Yield the arrays of an entry of a value."""
     if isinstance(entry, np.ndarray):
         yield entry
-    elif isinstance(entry, tuple):
-        for each in entry:
+    elif isinstance(entry, tuple | dict):
+        for each in entry.values() if isinstance(entry, dict) else entry:
             yield from arrays(each)
     elif sp.issparse(entry):
         yield from (entry.data, entry.indices, entry.indptr)

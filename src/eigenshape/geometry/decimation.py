@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import as_array, whole_number
+from eigenshape._arrays import ReadOnly, as_array, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, MissingExtraError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike, Integer
@@ -25,7 +25,7 @@ FEWEST_FACES = 4  # of a closed surface
 
 
 @dataclass(frozen=True, eq=False)
-class DecimatedMesh:
+class DecimatedMesh(ReadOnly):
     """A mesh after `decimate`, and where it lies on the original.
 
     Attributes
