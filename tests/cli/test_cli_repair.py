@@ -320,6 +320,6 @@ def test_a_mesh_in_the_plane_is_written_at_zero(tmp_path):
 
 
 def test_points_are_no_mesh_to_repair(tmp_path):
-    (tmp_path / "a.xyz").write_text("0 0 0\n1 0 0\n")
-    refused = run("repair", tmp_path / "a.xyz", "-o", tmp_path / "a.ply", code=1).stderr
-    assert "a.xyz: A mesh file must hold triangles; it holds 2 points and no face" in refused
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\n")
+    refused = run("repair", tmp_path / "a.obj", "-o", tmp_path / "a.ply", code=1).stderr
+    assert "a.obj: A mesh file must hold triangles; it holds 2 points and no face" in refused

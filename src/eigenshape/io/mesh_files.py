@@ -18,6 +18,7 @@ from eigenshape.io import glb_attributes, obj_attributes, off, ply, stl
 from eigenshape.io.attributes import (
     MeshAttributes,
     SourceFile,
+    carry_attributes,
     label_attributes,
     loss_sentence,
     plain_attributes,
@@ -88,8 +89,7 @@ def read_mesh(
         raise an error.
     attributes : bool
         Whether to return also what the file holds besides: texture coordinates, materials, images,
-        colors, groups. OBJ, PLY, GLB and glTF files hold such content. Every vertex must then be
-        finite.
+        colors, groups. OBJ, PLY, GLB and glTF files hold such content.
 
     Returns
     -------
@@ -126,12 +126,17 @@ def read_mesh(
     >>> mesh.faces.tolist()
     [[0, 1, 2], [0, 2, 3]]
     """
-    source, mesh, _ = _load(path, file_format, cells, drop_missing and not attributes)
+    source, mesh, left_out = _load(path, file_format, cells, drop_missing)
     if not attributes:
         return mesh
     with naming(source.path):
         try:
-            return mesh, _read_attributes(source, mesh)
+            if not left_out:
+                return mesh, _read_attributes(source, mesh)
+            # Attributes are listed by the faces of the file, so they are read with all of them.
+            points, faces = parse_mesh(source.path, source.suffix, source.data, cells)
+            whole = TriangleMesh(np.where(np.isfinite(points), points, 0.0), faces)
+            return mesh, carry_attributes(_read_attributes(source, whole), mesh)
         except FileFormatError:
             raise
         except (LookupError, TypeError, AttributeError, ValueError) as err:

@@ -7,7 +7,7 @@ from jaxtyping import Float, Int, UInt8
 from matplotlib.figure import Figure
 from numpy import ndarray
 
-from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidShapeError
+from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_written
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import carry_attributes
@@ -73,8 +73,10 @@ def save_like(
     attributes = None
     if source.suffix.lower() in WITH_ATTRIBUTES:
         try:
-            attributes = carry_attributes(read_mesh(source, attributes=True)[1], mesh)
-        except (FileFormatError, InvalidShapeError) as error:  # only the shape could be read
+            attributes = carry_attributes(
+                read_mesh(source, attributes=True, drop_missing=True)[1], mesh
+            )
+        except FileFormatError as error:  # the shape was read; only the rest is broken
             err.print(f"[yellow]lost:[/] all but the shape. {escape_text(error)}")
     written = mesh if moved is None else TriangleMesh(moved, mesh.faces)
     lost = save_mesh(written, path, colors=colors, face_labels=face_labels, attributes=attributes)
