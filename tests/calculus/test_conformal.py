@@ -104,3 +104,31 @@ def test_limbs_that_become_points_are_refused(monkeypatch):
     monkeypatch.setattr(conformal, "ROUNDING", 0.05)
     with pytest.raises(es.ConvergenceError, match="triangles become points, the first is face"):
         map_to_sphere(es.make_creature("biped", n_vertices=600))
+
+
+def test_triangles_that_turned_over_are_turned_back():
+    ball = es.icosphere(2)
+    before = ball.vertices.copy()
+    before[50] = before[ball.faces[0, 0]]  # far across its neighbors
+    turned = conformal._turned_faces(ball, before)
+    assert turned.size
+    after = conformal._relax_around(ball, before, turned, 1)
+    assert not conformal._turned_faces(ball, after).size
+    np.testing.assert_allclose(np.linalg.norm(after, axis=1), 1)
+
+
+def test_triangles_that_stay_turned_over_are_refused(monkeypatch):
+    monkeypatch.setattr(conformal, "_turned_faces", lambda mesh, sphere: np.array([3]))
+    with pytest.raises(es.ConvergenceError, match="it turns 1 of 80, the first is face 3"):
+        map_to_sphere(es.icosphere(1))
+
+
+@pytest.mark.data
+def test_a_head_with_thin_triangles_maps_to_the_sphere(data, monkeypatch):
+    head = es.read_mesh(data / "classics" / "decimated-max.obj")
+    sphere = map_to_sphere(head)
+    assert not conformal._turned_faces(head, sphere).size
+    assert np.median(angle_distortion(head, sphere)) < 1.1
+    monkeypatch.setattr(conformal, "MOST_ROUNDS", 0)
+    with pytest.raises(es.ConvergenceError, match="must not turn triangles over; it turns 11 of"):
+        map_to_sphere(head)

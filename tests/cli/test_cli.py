@@ -254,7 +254,7 @@ def test_errors_are_one_line_and_exit_code_1(sphere, arguments, message):
         ),
         (
             ("info", "{sphere}", "--repair", "everything"),
-            "Names of --repair must be among auto, weld",
+            "Names of --repair must be among auto, drop_missing, weld",
         ),
         (
             (

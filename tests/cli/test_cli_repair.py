@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from eigenshape import TriangleMesh, deform, read_mesh, repair, rig_shape, write_mesh
+from eigenshape import TriangleMesh, deform, read_mesh, read_shape, repair, rig_shape, write_mesh
 from eigenshape.cli import app
 from eigenshape.deformation.handles import Translation
 from eigenshape.geometry.repair import REPAIRS
@@ -84,7 +84,7 @@ def test_without_repairs_it_converts(tmp_path):
     [
         (
             ("--repair", "polish", "-o", "{folder}/b.ply"),
-            "Names of --repair must be among auto, weld",
+            "Names of --repair must be among auto, drop_missing, weld",
         ),
         (
             ("--repair", "weld", "-o", "{folder}/b.dxf"),
@@ -282,3 +282,44 @@ def test_broken_materials_do_not_stop_a_repair(tmp_path):
     printed = run("repair", tmp_path / "a.obj", "-o", tmp_path / "b.glb").stderr
     assert "Materials and other attributes must be whole" in " ".join(printed.split())
     assert read_mesh(tmp_path / "b.glb").n_faces == BALL.n_faces
+
+
+CUBE = """MeshVersionFormatted 2
+Dimension 3
+Vertices
+8
+0 0 0 0  1 0 0 0  1 1 0 0  0 1 0 0  0 0 1 0  1 0 1 0  1 1 1 0  0 1 1 0
+Hexahedra
+1
+1 2 3 4 5 6 7 8 0
+End
+"""
+
+
+def test_solids_are_split_and_written(tmp_path):
+    (tmp_path / "hex.mesh").write_text(CUBE)
+    done = run("repair", tmp_path / "hex.mesh", "-o", tmp_path / "tets.vtu")
+    assert "hex.mesh: 1 hexahedra were split into 6 tetrahedra" in done.stderr
+    assert "simplices" in done.stdout
+    assert read_shape(tmp_path / "tets.vtu").simplices.shape == (6, 4)
+    with pytest.warns(UserWarning, match="1 hexahedra were split into 6 tetrahedra"):
+        read_shape(tmp_path / "hex.mesh")
+    refused = run("repair", tmp_path / "hex.mesh", "-o", tmp_path / "tets.ply", code=2).stderr
+    assert "A mesh of tetrahedra or segments must be written to a file that ends in .vtu" in refused
+
+
+def test_a_mesh_in_the_plane_is_written_at_zero(tmp_path):
+    (tmp_path / "flat.obj").write_text("v 0 0\nv 1 0\nv 1 1\nv 0 1\nf 1 2 3 4\n")
+    refused = run("segment", tmp_path / "flat.obj", code=1).stderr
+    assert "it holds 2 triangles in R^2" in refused
+    assert "eigenshape repair, takes them at z = 0" in refused
+    done = run("repair", tmp_path / "flat.obj", "-o", tmp_path / "flat.ply")
+    assert "repair: a mesh in the plane was taken at z = 0" in done.stderr
+    np.testing.assert_array_equal(read_mesh(tmp_path / "flat.ply").vertices[2], [1, 1, 0])
+    run("segment", tmp_path / "flat.ply")
+
+
+def test_points_are_no_mesh_to_repair(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\n")
+    refused = run("repair", tmp_path / "a.obj", "-o", tmp_path / "a.ply", code=1).stderr
+    assert "a.obj: A mesh file must hold triangles; it holds 2 points and no face" in refused

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from eigenshape.cli import app
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.io.mesh_files import write_mesh
+from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.io.shape_files import write_points
 from eigenshape.operators.catalog import OPERATORS
 from eigenshape.shapes.domains import box, disc
@@ -195,7 +195,7 @@ def test_operators_are_listed():
         ),
         (
             ("info", "sphere.xyz", "--repair", "weld"),
-            "must be among auto, drop_duplicate_points; name 0 is 'weld'",
+            "must be among auto, drop_missing, drop_duplicate_points; name 0 is 'weld'",
         ),
         (("info", "sphere.xyz", "--dim", "4"), "dim must lie in 1..3; it is 4"),
     ],
@@ -208,8 +208,32 @@ def test_refusals(folder, arguments, said):
 
 def test_missing_points_are_left_out_when_asked(tmp_path):
     (tmp_path / "a.xyz").write_text("0 0 0\n1 0 0\nnan 0 0\n0 1 0\n1 1 0\n2 0 0\n2 1 0\n0 2 0\n")
-    assert "--drop-missing, leaves them out" in run("info", tmp_path / "a.xyz", code=1).stderr
-    assert run_json("info", tmp_path / "a.xyz", "--drop-missing")["points"] == 7
+    assert (
+        "--repair drop_missing, leaves them out" in run("info", tmp_path / "a.xyz", code=1).stderr
+    )
+    for repairs in ("drop_missing", "auto"):
+        assert run_json("info", tmp_path / "a.xyz", "--repair", repairs)["points"] == 7
+
+
+def test_faces_at_missing_vertices_are_left_out_when_asked(tmp_path):
+    ball = icosphere(2)
+    rows = [*map(str.split, map(" ".join, ball.vertices.astype(str).tolist()))]
+    rows[7] = ["nan"] * 3
+    lines = [f"v {' '.join(row)}" for row in rows]
+    lines += [f"f {a} {b} {c}" for a, b, c in (ball.faces + 1).tolist()]
+    (tmp_path / "a.obj").write_text("\n".join(lines))
+    for verb in ("spectrum", "segment"):
+        refused = run(verb, tmp_path / "a.obj", code=1).stderr
+        assert "vertices must be finite; vertex 7 is [nan, nan, nan] (1 such)" in refused
+        assert "--repair drop_missing" in refused
+        done = run(verb, tmp_path / "a.obj", "--repair", "drop_missing")
+        left_out = "drop_missing left out 1 vertex without finite coordinates and 5 faces at them"
+        assert left_out in done.stderr
+    assert left_out in run("features", tmp_path / "a.obj").stderr
+    assert "lost:" not in run("repair", tmp_path / "a.obj", "-o", tmp_path / "a.ply").stderr
+    found = read_mesh(tmp_path / "a.ply")
+    np.testing.assert_array_equal(found.vertices, np.delete(ball.vertices, 7, axis=0))
+    assert found.n_faces == ball.n_faces - 5
 
 
 def test_a_warning_is_one_line_and_no_error(folder):

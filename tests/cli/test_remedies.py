@@ -1,5 +1,6 @@
 """Every remedy that a message names is applied to the file, and ends in an answer."""
 
+import json
 import re
 from pathlib import Path
 
@@ -31,13 +32,12 @@ NAMES = "|".join(MESH_REPAIRS)
 REMEDIES = {
     "--repair": rf"--repair ((?:{NAMES})(?:,(?:{NAMES}))*)",
     "--operator": rf"--operator ({'|'.join(OPERATOR_NAMES)})",
-    "--drop-missing": "--drop-missing()",
 }
 # What cannot be answered, and why.
 UNANSWERABLE = {
     "empty": r"must hold a mesh; it is empty|must have points; it has none|must hold triangles; it holds none",
     "cut off": r"must hold the (triangles|rows) (it|they) declares?",
-    "against its format": r"must have three (numbers|corners)|must declare an element",
+    "against its format": r"must have three corners|must declare an element",
     "a few points": r"holds (no|\d) points and no face|must have at least \d+ points|must have over \d+ points",
     "curves have no parts": r"it holds \d+ segments",
     "no face has an area": r"no face would remain|Try a cloud",
@@ -151,6 +151,25 @@ def test_a_scan_of_uneven_spacing_is_answered(tmp_path):
     points = np.stack([across, np.cos(turn), np.sin(turn)], axis=-1).reshape(-1, 3)
     far = np.array([[60.0, 1, 0], [60.0, -1, 0], [60.0, 0, 1]])
     write_points(PointCloud(np.concatenate([points, far])), tmp_path / "corridor.pts")
-    message, applied = answer("spectrum", tmp_path / "corridor.pts")
-    assert message is None, message
-    assert applied == {"--operator": "robust"}
+    assert answer("spectrum", tmp_path / "corridor.pts") == (None, {})
+    done = CliRunner().invoke(app, ["spectrum", str(tmp_path / "corridor.pts"), "--json"])
+    assert "too uneven for a kernel of one width" in done.stderr
+    assert json.loads(done.stdout)["operator"] == "robust"
+    asked = answer("spectrum", tmp_path / "corridor.pts", "--operator", "point-cloud")
+    assert asked == (None, {"--operator": "robust"})
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", ["mice/WSB.ply", "nasty/pymesh/quad_s1.obj"])
+def test_missing_vertices_and_planes_are_answered(data, name):
+    for verb in ("spectrum", "features"):
+        assert answer(verb, data / name)[0] is None
+
+
+@pytest.mark.data
+def test_a_cloud_that_becomes_no_surface_has_a_spectrum(data):
+    path = data / "points" / "fragment_000.ply"
+    message, _ = answer("features", path)
+    assert "The points alone have a spectrum" in message
+    assert "eigenshape spectrum" in message
+    assert answer("spectrum", path, "-k", "5")[0] is None

@@ -167,7 +167,8 @@ def test_no_repair_changes_nothing():
 
 def test_an_unknown_repair_is_refused_before_any_is_done():
     with pytest.raises(
-        InvalidParameterError, match=r"must be among auto, weld, .*; name 1 is 'polish'"
+        InvalidParameterError,
+        match=r"must be among auto, drop_missing, weld, .*; name 1 is 'polish'",
     ):
         repair(icosphere(0), ["weld", "polish"])
 
@@ -237,7 +238,8 @@ def test_tetrahedra_are_repaired_too():
     )
     np.testing.assert_array_equal(done.mesh.points, ugly.points[done.source_vertices])
     with pytest.raises(
-        InvalidParameterError, match=r"must be among auto, weld, .*; name 0 is 'orient'"
+        InvalidParameterError,
+        match=r"must be among auto, drop_missing, weld, .*; name 0 is 'orient'",
     ):
         repair(mesh, ["orient"])
 
@@ -252,7 +254,8 @@ def test_copies_of_points_go():
     assert suggest_repairs(done.cloud) == ()
     assert repair(cloud, []).cloud is cloud
     with pytest.raises(
-        InvalidParameterError, match="must be among auto, drop_duplicate_points; name 1 is 'weld'"
+        InvalidParameterError,
+        match="must be among auto, drop_missing, drop_duplicate_points; name 1 is 'weld'",
     ):
         repair(cloud, ["auto", "weld"])
 

@@ -581,3 +581,14 @@ def test_real_obj_and_ply_files_keep_their_looks(data, tmp_path):
             assert [m.name for m in kept.materials] == [m.name for m in attributes.materials]
         n_read += 1
     assert n_read > 50
+
+
+def test_attributes_stay_where_vertices_are_left_out(tmp_path):
+    text = "v nan 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvt 1 1\n"
+    (tmp_path / "a.obj").write_text(
+        f"{text}usemtl red\nf 1/1 2/2 3/3\nusemtl blue\nf 2/2 4/4 3/3\n"
+    )
+    mesh, held = es.read_mesh(tmp_path / "a.obj", attributes=True, drop_missing=True)
+    assert mesh.faces.tolist() == [[0, 2, 1]]
+    assert held.texture_coordinates[0].tolist() == [[1, 0], [1, 1], [0, 1]]
+    assert [held.materials[i].name for i in held.face_materials] == ["blue"]

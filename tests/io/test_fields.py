@@ -111,3 +111,26 @@ def test_what_is_no_field_is_refused(tmp_path):
         FileFormatError, match="must unpack to at most 40 times the size of its file"
     ):
         es.read_mesh(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        es.SimplicialMesh(BALL.vertices, np.arange(40).reshape(10, 4)),
+        es.SimplicialMesh(BALL.vertices, np.arange(42).reshape(21, 2)),
+    ],
+    ids=["tetrahedra", "segments"],
+)
+def test_other_cells_than_triangles_go_to_vtu(tmp_path, mesh):
+    path = tmp_path / "a.vtu"
+    values = np.arange(float(mesh.n_simplices))
+    write_fields(mesh, path, {"volume": values})
+    found = es.read_shape(path)
+    np.testing.assert_array_equal(found.points, mesh.points)
+    np.testing.assert_array_equal(found.simplices, mesh.simplices)
+    np.testing.assert_array_equal(read_fields(path)["volume"], values)
+    (block,) = meshio.read(path).cells
+    assert block.type == {4: "tetra", 2: "line"}[mesh.simplices.shape[1]]
+    for suffix in (".vtk", ".npz"):
+        with pytest.raises(FileFormatError, match=r"hold triangles in R\^3.*Write it to \.vtu"):
+            write_fields(mesh, tmp_path / f"a{suffix}", {})

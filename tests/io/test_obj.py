@@ -54,7 +54,7 @@ def test_polygons_become_fans_in_order():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("v 0 0\n" + TRIANGLES, "A vertex must have three numbers; line 1 is '0 0'"),
+        (POINTS + "v 0 0\n" + TRIANGLES, "A vertex must have three numbers; line 5 is '0 0'"),
         ("v\n" + POINTS + TRIANGLES, "A vertex must have three numbers; line 1 is ''"),
         (POINTS + "f 1 2\n", "A face must have three corners or more; line 5 is '1 2'"),
         (POINTS + "f\n", "A face must have three corners or more; line 5 is ''"),
@@ -87,3 +87,9 @@ def test_corner_beyond_the_vertices_is_refused():
 def test_many_joined_lines_stay_quick():
     text = b"f \\\n" + b"\\\n" * 300_000 + b"1 2 3\n" + POINTS.encode()
     assert parse(text)[1].tolist() == [[0, 1, 2]]
+
+
+def test_vertices_of_two_numbers_are_in_the_plane():
+    vertices, faces = parse(b"v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n")
+    assert vertices.tolist() == [[0, 0], [1, 0], [0, 1]]
+    assert faces.tolist() == [[0, 1, 2]]

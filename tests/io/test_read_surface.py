@@ -67,7 +67,7 @@ def test_points_that_measured_nothing_or_the_same_are_left_out_and_counted(tmp_p
     (tmp_path / "ball.pcd").write_text(head + lines + "\n")
     made = es.io.read_surface(tmp_path / "ball.pcd")
     assert made.report[:2] == (
-        "left out 1 point that is not finite",
+        "drop_missing left out 1 point without finite coordinates",
         "drop_duplicate_points removed 5 points at the places of others",
     )
     far = np.linalg.norm(made.mesh.vertices - points[made.source_vertices], axis=1)

@@ -2,13 +2,14 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from eigenshape._errors import InvalidParameterError
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.operators.catalog import OPERATORS, build_laplacian
 from eigenshape.operators.choices import OPERATOR_NAMES
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.domains import box, interval
+from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere
 
 SHAPES = {
@@ -67,3 +68,23 @@ def test_unknown_names_and_options_are_refused():
         InvalidParameterError, match="The p2 operator takes no options; the option mass was given"
     ):
         build_laplacian(SHAPES["triangles"], "p2", mass="lumped")
+
+
+def test_uneven_points_get_the_robust_operator():
+    ball = fibonacci_sphere(300).vertices
+    far = np.array([[60.0, 1, 0], [60.0, -1, 0], [60.0, 0, 1]])
+    cloud = PointCloud(np.concatenate([ball, far]))
+    with pytest.warns(UserWarning, match="too uneven for a kernel of one width"):
+        found = build_laplacian(cloud)
+    wanted = robust_laplacian(cloud)
+    assert abs(found.stiffness - wanted.stiffness).max() == 0
+    for named in ({"operator": "point-cloud"}, {"t": 0.2}):  # what is asked for is not replaced
+        with pytest.raises(InvalidShapeError, match="Choose a larger t"):
+            build_laplacian(cloud, **named)
+    assert build_laplacian(PointCloud(ball)).kernel is not None
+
+
+def test_uneven_points_off_a_surface_are_refused():
+    line = np.concatenate([np.linspace(0, 1, 50), [60.0, 61.0]])[:, None]
+    with pytest.raises(InvalidShapeError, match="Choose a larger t"):
+        build_laplacian(PointCloud(line, dim=1))

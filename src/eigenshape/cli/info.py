@@ -7,7 +7,6 @@ from eigenshape.cli.console import escape_text, out, print_json
 from eigenshape.cli.inputs import (
     CellsOption,
     DimOption,
-    DropMissingOption,
     JsonOption,
     RepairOption,
     ShapeArgument,
@@ -19,12 +18,11 @@ def info(
     *,
     repair: RepairOption = "",
     dim: DimOption = 2,
-    drop_missing: DropMissingOption = False,
     cells: CellsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show the size, topology and faults of a shape, and which repairs would help."""
-    found = steps.load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
+    found = steps.load_shape(shape, repair, dim, cells)
     facts = steps.shape_facts(found)
     if as_json:
         print_json({"path": str(shape), **facts})

@@ -65,13 +65,6 @@ ShapeArgument = Annotated[
         "(.pts, .xyz, .pcd, PLY)."
     ),
 ]
-DropMissingOption = Annotated[
-    bool,
-    typer.Option(
-        "--drop-missing",
-        help="Leave out points whose coordinates are not finite, from a point cloud.",
-    ),
-]
 CellsOption = Annotated[
     CellKind | None,
     typer.Option(
@@ -160,6 +153,11 @@ def repair_names(text: str) -> tuple[str, ...]:
         return ()
     names = [name.strip() for name in text.split(",") if name.strip()]
     return require_repairs(names, KNOWN_REPAIRS, "Names of --repair")
+
+
+def drops_missing(names: Sequence[str]) -> bool:
+    """Tell whether points that are not finite are to be left out when a file is read."""
+    return "auto" in names or "drop_missing" in names
 
 
 def memory_bytes(gigabytes: float | None) -> float | None:

@@ -7,14 +7,15 @@ import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
-from eigenshape.cli.console import err, escape_text, print_json, print_table
-from eigenshape.cli.inputs import CellsOption, JsonOption, MeshArgument, repair_names
+from eigenshape.cli.console import print_json, print_repairs, print_table, print_written
+from eigenshape.cli.inputs import CellsOption, JsonOption, MeshArgument
 from eigenshape.geometry.repair_names import MESH_REPAIRS
 
 USUAL = "auto"
 ROWS = (
-    "vertices", "faces", "components", "boundary_loops", "closed", "faces_without_area", "duplicate_faces",
-    "loose_vertices", "coinciding_vertices", "non_manifold_edges", "turned_over_edges",
+    "vertices", "faces", "points", "simplices", "components", "boundary_loops", "boundary_points", "closed",
+    "faces_without_area", "without_volume", "duplicate_faces", "duplicates", "loose_vertices", "loose_points",
+    "coinciding_vertices", "non_manifold_edges", "turned_over_edges",
 )  # fmt: skip
 
 
@@ -24,7 +25,9 @@ def repair(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ."
+            "-o",
+            "--output",
+            help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ; for tetrahedra VTU.",
         ),
     ],
     names: Annotated[
@@ -43,21 +46,28 @@ def repair(
 ) -> None:
     """Repair a mesh and write it, and report what was done. All else that the file holds stays, or is named.
 
+    Hexahedra, wedges and pyramids are split into tetrahedra.
+
     For instance: eigenshape repair scan.ply --repair auto -o clean.ply
     """
     steps.require_mesh_path(output)
-    chosen = repair_names(names)
-    before = es.read_mesh(mesh, cells=cells)
-    done = es.repair(before, chosen)
-    for line in done.report:
-        err.print(f"[yellow]repair:[/] {escape_text(line)}")
-    facts = {"before": steps.mesh_facts(before), "after": steps.mesh_facts(done.mesh)}
-    steps.save_like(mesh, done.mesh, output)
+    before, done = steps.load_repaired(mesh, names, cells)
+    if not isinstance(done.mesh, es.TriangleMesh):
+        steps.require_output(output, (".vtu",), "A mesh of tetrahedra or segments")
+    print_repairs(done.report)
+    facts = {"before": steps.shape_facts(before), "after": steps.shape_facts(done.mesh)}
+    if isinstance(done.mesh, es.TriangleMesh):
+        steps.save_like(mesh, done.mesh, output)
+    else:
+        es.io.write_fields(done.mesh, output, {})
+        print_written(output)
     if as_json:
         print_json({"path": str(mesh), "output": str(output), "report": list(done.report), **facts})
         return
     rows = [
-        [name.replace("_", " "), *(_format(fact[name]) for fact in facts.values())] for name in ROWS
+        [name.replace("_", " "), *(_format(fact[name]) for fact in facts.values())]
+        for name in ROWS
+        if name in facts["before"]
     ]
     print_table("Repaired", ["", *facts], rows)
 

@@ -12,7 +12,6 @@ from eigenshape.cli.console import print_json, print_written, progress_bar
 from eigenshape.cli.inputs import (
     CellsOption,
     DimOption,
-    DropMissingOption,
     JsonOption,
     RepairOption,
     ShapeArgument,
@@ -123,7 +122,6 @@ def spectrum(
         ),
     ] = None,
     dim: DimOption = 2,
-    drop_missing: DropMissingOption = False,
     cells: CellsOption = None,
     repair: RepairOption = "",
     output: Annotated[
@@ -177,7 +175,7 @@ def spectrum(
     options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if correct == "none":
         options["correct"] = None
-    found = steps.load_shape(shape, repair, dim, drop_missing=drop_missing, cells=cells)
+    found = steps.load_shape(shape, repair, dim, cells)
     steps.require_drawable(found, eigenfunctions)
     bounded = steps.require_bracketable(found) if brackets else None
     name = steps.operator_name(found, operator)
@@ -186,7 +184,9 @@ def spectrum(
     fixed = steps.boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
-        laplacian = es.build_laplacian(found, name, **options)
+        laplacian = es.build_laplacian(found, operator, **options)
+        if name == "point-cloud" and laplacian.kernel is None:
+            name = "robust"  # as a warning says
         wanted = USUAL if k is None and below is None else k
         n_pairs = None if wanted is None else steps.limit_pairs(laplacian, fixed, wanted)
         solved = es.solve_spectrum(

@@ -11,7 +11,6 @@ from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, progress_bar
 from eigenshape.cli.inputs import (
     DimOption,
-    DropMissingOption,
     JsonOption,
     RepairOption,
     Scale,
@@ -70,7 +69,6 @@ def stability(
         ),
     ] = False,
     dim: DimOption = 2,
-    drop_missing: DropMissingOption = False,
     repair: RepairOption = "",
     picture: Annotated[Path | None, typer.Option(help="Draw the report (PNG, SVG or PDF).")] = None,
     view: ViewOption = "auto",
@@ -88,8 +86,7 @@ def stability(
     side = steps.parse_side(view, up)
     partners = steps.read_partners(map_file)
     first, second = (
-        steps.scale_shape(steps.load_shape(path, repair, dim, drop_missing=drop_missing), scale)
-        for path in (one, two)
+        steps.scale_shape(steps.load_shape(path, repair, dim), scale) for path in (one, two)
     )
     plan = StabilityPlan(
         k=k, n_samples=n_samples, times=tuple(t or ()), seed=seed, brackets=brackets

@@ -63,9 +63,15 @@ AUTO = (
     "orient",
 )
 
-# The function of each name in `MESH_REPAIRS`.
+
+def _start_report(mesh: MeshT) -> RepairedMesh[MeshT]:
+    return RepairedMesh(mesh, (), np.arange(mesh.n_points))
+
+
+# The function of each name in `MESH_REPAIRS`. Readers drop missing points: a mesh cannot hold them.
 REPAIRS: dict[str, Callable[[Any], RepairedMesh[Any]]] = {
     "auto": repair_as_needed,
+    "drop_missing": _start_report,
     "weld": weld,
     "weld_seams": weld_seams,
     "collapse_needles": collapse_needles,
@@ -106,7 +112,8 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
         "auto", `weld`, `weld_seams`, `collapse_needles`, `drop_degenerate`, `drop_duplicate_faces`,
         `drop_unreferenced`. For triangle meshes also `orient`, `largest_component`, `fill_holes`,
         `cut_one_sided`.
-        For clouds: "auto", `drop_duplicate_points`.
+        For clouds: "auto", `drop_duplicate_points`. `drop_missing` acts when a file is read, as
+        `read_mesh(path, drop_missing=True)`, and changes no shape that was read.
 
     Returns
     -------
@@ -145,8 +152,10 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
     names = require_repairs(names, names_of_repairs(shape), f"Repairs of {shape!r}")
     if isinstance(shape, PointCloud):
         done = RepairedCloud(shape, (), np.arange(shape.n_points))
-        for _ in names:
-            step = drop_duplicate_points(done.cloud)  # whichever of the two names it has
+        for name in names:
+            if name == "drop_missing":
+                continue
+            step = drop_duplicate_points(done.cloud)  # which is also all that auto does
             source = done.source_points[step.source_points]
             done = RepairedCloud(step.cloud, done.report + step.report, source)
         return done
@@ -220,10 +229,6 @@ def _until_sound(mesh: MeshT, names: Sequence[str]) -> tuple[RepairedMesh[MeshT]
                 done = _combine(done, step)
                 applied.append(name)
     return done, tuple(applied)
-
-
-def _start_report(mesh: MeshT) -> RepairedMesh[MeshT]:
-    return RepairedMesh(mesh, (), np.arange(mesh.n_points))
 
 
 def _combine(done: RepairedMesh[MeshT], step: RepairedMesh[MeshT]) -> RepairedMesh[MeshT]:

@@ -7,6 +7,7 @@ from eigenshape._errors import InvalidParameterError
 # Of meshes of any dimension and of surfaces, in the order in which messages and help list them.
 MESH_REPAIRS = (
     "auto",
+    "drop_missing",
     "weld",
     "weld_seams",
     "collapse_needles",
@@ -19,7 +20,7 @@ MESH_REPAIRS = (
     "cut_one_sided",
 )
 SURFACE_REPAIRS = ("orient", "largest_component", "fill_holes", "cut_one_sided")  # of surfaces only
-CLOUD_REPAIRS = ("auto", "drop_duplicate_points")
+CLOUD_REPAIRS = ("auto", "drop_missing", "drop_duplicate_points")
 
 
 def require_repairs(

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape.geometry.solids import split_solids
+from eigenshape.geometry.solids import N_TETRAHEDRA, split_solids
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.text import fans
 
@@ -81,6 +81,16 @@ def select_cells(
         return found[cells]
     by_dimension = [tetrahedra, surface, blocks.get(SEGMENTS, surface)]
     return next((block for block in by_dimension if len(block)), surface)
+
+
+def split_sentence(blocks: Blocks) -> str:
+    """Say which cells of a file were split into tetrahedra; nothing if there are none."""
+    solids = {name: blocks[name] for name in SOLIDS if name in blocks and len(blocks[name])}
+    if not solids:
+        return ""
+    counts = [f"{len(cells):,} {name}" for name, cells in solids.items()]
+    n_made = sum(len(cells) * N_TETRAHEDRA[cells.shape[1]] for cells in solids.values())
+    return f"{' and '.join(counts)} were split into {n_made:,} tetrahedra"
 
 
 def four_cornered(

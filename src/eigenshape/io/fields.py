@@ -1,4 +1,4 @@
-"""Meshes with functions on vertices and faces: .vtu, .vtk and .npz."""
+"""Meshes with functions on vertices and faces: .vtu, .vtk and .npz. Only .vtu holds other cells than triangles."""
 
 import base64
 import re
@@ -12,17 +12,18 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from eigenshape._arrays import freeze
-from eigenshape._errors import InvalidParameterError
+from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import as_path, read_regular, replace_file
 from eigenshape._typing import ArrayLike
-from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io import npz, vtk_legacy, vtu
 from eigenshape.io.attributes import MeshAttributes, plain_attributes
 from eigenshape.io.parsing import naming, suffix_of
 
 FIELD_FORMATS = (".vtu", ".vtk", ".npz")
-TRIANGLE = 5  # VTK's number of the type of cell
+CELL_TYPES = {2: 3, 3: 5, 4: 10}  # VTK's number of the type of cell, by its number of corners
 VERTEX_FIELD, FACE_FIELD = "vertex_", "face_"  # how names of arrays begin in .npz
 # VTK's names of types of numbers in XML and in legacy files. Other types are stored as float64.
 XML_TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
@@ -42,7 +43,7 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     Parameters
     ----------
     mesh : MeshLike
-        With n vertices and f faces.
+        With n vertices and f faces. Tetrahedra and segments, which go to .vtu, count as faces.
     path : str or Path
         Must end in .vtu, .vtk or .npz.
     fields : mapping of str to array
@@ -52,7 +53,7 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     Raises
     ------
     FileFormatError
-        If the suffix is another one.
+        If the suffix is another one, or another one than .vtu for tetrahedra or segments.
     InvalidParameterError
         If a field has another number of rows, or is not of numbers.
     OSError
@@ -72,16 +73,18 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     >>> es.io.read_fields(path)["area"].shape
     (80,)
     """
-    mesh, path = as_mesh(mesh), as_path(path)
+    mesh, path = as_simplicial(mesh), as_path(path)
     suffix = suffix_of(path, None, FIELD_FORMATS)
     replace_file(path, format_fields(mesh, suffix, fields))
 
 
-def format_fields(mesh: TriangleMesh, suffix: str, fields: Mapping[str, ArrayLike]) -> bytes:
+def format_fields(mesh: Mesh, suffix: str, fields: Mapping[str, ArrayLike]) -> bytes:
     """Write a mesh and its fields; each has a row for every vertex, or for every face.
 
     Raises
     ------
+    FileFormatError
+        If the format holds triangles only, and the mesh has other cells.
     InvalidParameterError
         If a field has another number of rows, or is not of numbers.
     """
@@ -93,16 +96,22 @@ def format_fields(mesh: TriangleMesh, suffix: str, fields: Mapping[str, ArrayLik
             raise InvalidParameterError(
                 f"fields must be lists or tables of numbers; {name!r} is {array.dtype} of shape {array.shape}."
             )
-        if len(array) not in (mesh.n_vertices, mesh.n_faces):
+        if len(array) not in (mesh.n_points, len(mesh.simplices)):
             raise InvalidParameterError(
-                f"fields must have a row for each of {mesh.n_vertices} vertices or {mesh.n_faces} faces; "
+                f"fields must have a row for each of {mesh.n_points} vertices or {len(mesh.simplices)} faces; "
                 f"{name!r} has {len(array)}."
             )
         if array.dtype.str[1:] not in XML_TYPES:
             array = array.astype(np.int64 if array.dtype.kind in "bui" else np.float64)
-        held = of_vertices if len(array) == mesh.n_vertices else of_faces
+        held = of_vertices if len(array) == mesh.n_points else of_faces
         held[name] = np.ascontiguousarray(array)
-    writers = {".vtu": _format_vtu, ".vtk": _format_vtk, ".npz": _format_npz}
+    if suffix == ".vtu":
+        return _format_vtu(mesh, of_vertices, of_faces)
+    if not isinstance(mesh, TriangleMesh):
+        raise FileFormatError(
+            f"Files in {suffix} hold triangles in R^3; the mesh is {mesh!r}. Write it to .vtu."
+        )
+    writers = {".vtk": _format_vtk, ".npz": _format_npz}
     return writers[suffix](mesh, of_vertices, of_faces)
 
 
@@ -114,7 +123,7 @@ def _format_npz(mesh: TriangleMesh, of_vertices: Fields, of_faces: Fields) -> by
     return file.getvalue()
 
 
-def _format_vtu(mesh: TriangleMesh, of_vertices: Fields, of_faces: Fields) -> bytes:
+def _format_vtu(mesh: Mesh, of_vertices: Fields, of_faces: Fields) -> bytes:
     def element(name: str, values: np.ndarray) -> str:
         data = values.astype(values.dtype.newbyteorder("<")).tobytes()
         text = base64.b64encode(struct.pack("<Q", len(data)) + data).decode()
@@ -124,16 +133,19 @@ def _format_vtu(mesh: TriangleMesh, of_vertices: Fields, of_faces: Fields) -> by
             f'{width}format="binary">{text}</DataArray>'
         )
 
-    ends = 3 * np.arange(1, mesh.n_faces + 1)
-    types = np.full(mesh.n_faces, TRIANGLE, np.uint8)
+    n_cells, n_corners = mesh.simplices.shape
+    ends = n_corners * np.arange(1, n_cells + 1)
+    types = np.full(n_cells, CELL_TYPES[n_corners], np.uint8)
+    places = np.zeros((mesh.n_points, 3))  # VTK has no points in the plane
+    places[:, : mesh.points.shape[1]] = mesh.points
     lines = [
         '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
         "<UnstructuredGrid>",
-        f'<Piece NumberOfPoints="{mesh.n_vertices}" NumberOfCells="{mesh.n_faces}">',
+        f'<Piece NumberOfPoints="{mesh.n_points}" NumberOfCells="{n_cells}">',
         "<PointData>", *(element(name, values) for name, values in of_vertices.items()), "</PointData>",
         "<CellData>", *(element(name, values) for name, values in of_faces.items()), "</CellData>",
-        "<Points>", element("Points", mesh.vertices), "</Points>",
-        "<Cells>", element("connectivity", mesh.faces.ravel()), element("offsets", ends),
+        "<Points>", element("Points", places), "</Points>",
+        "<Cells>", element("connectivity", mesh.simplices.ravel()), element("offsets", ends),
         element("types", types), "</Cells>", "</Piece>", "</UnstructuredGrid>", "</VTKFile>", "",
     ]  # fmt: skip
     return "\n".join(lines).encode()

@@ -17,6 +17,7 @@ from eigenshape.io import glb_attributes, obj_attributes, off, ply, ply_attribut
 from eigenshape.io.attributes import (
     MeshAttributes,
     SourceFile,
+    carry_attributes,
     label_attributes,
     loss_sentence,
     plain_attributes,
@@ -24,7 +25,7 @@ from eigenshape.io.attributes import (
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.cells import require_kind
 from eigenshape.io.fields import FIELD_FORMATS, format_fields, read_field_attributes
-from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
+from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, require_finite, suffix_of
 
 TEXT: dict[str, Callable[..., bytes]] = {
     ".off": off.format_mesh,
@@ -51,6 +52,7 @@ def read_mesh(
     *,
     file_format: str | None = None,
     cells: CellKind | None = None,
+    drop_missing: bool = False,
     attributes: Literal[False] = False,
 ) -> TriangleMesh: ...
 @overload
@@ -59,6 +61,7 @@ def read_mesh(
     *,
     file_format: str | None = None,
     cells: CellKind | None = None,
+    drop_missing: bool = False,
     attributes: Literal[True],
 ) -> tuple[TriangleMesh, MeshAttributes]: ...
 def read_mesh(
@@ -66,6 +69,7 @@ def read_mesh(
     *,
     file_format: str | None = None,
     cells: CellKind | None = None,
+    drop_missing: bool = False,
     attributes: bool = False,
 ) -> TriangleMesh | tuple[TriangleMesh, MeshAttributes]:
     r"""Read a triangle mesh from a file.
@@ -84,6 +88,9 @@ def read_mesh(
     cells : {"triangles", "quads", "tetrahedra"}, optional
         Kind of cells to read, if the file holds several kinds or does not name the kind; see
         `read_shape`.
+    drop_missing : bool
+        Whether to leave out vertices that are not finite, and the faces at them. By default they
+        raise an error.
     attributes : bool
         Whether to return also what the file holds besides: texture coordinates, materials, images,
         colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTK and NPZ files hold such content.
@@ -123,18 +130,17 @@ def read_mesh(
     >>> mesh.faces.tolist()
     [[0, 1, 2], [0, 2, 3]]
     """
-    path = as_path(path)
-    suffix = suffix_of(path, file_format, MESH_FORMATS)
-    require_kind(cells)
-    data = read_regular(path)
-    with naming(path):
-        points, simplices = parse_mesh(path, suffix, data, cells)
-        require_surface(points, simplices)
-        mesh = TriangleMesh(points, simplices)
-        if not attributes:
-            return mesh
+    source, mesh, left_out = _load(path, file_format, cells, drop_missing)
+    if not attributes:
+        return mesh
+    with naming(source.path):
         try:
-            return mesh, _read_attributes(SourceFile(path, suffix, data), mesh)
+            if not left_out:
+                return mesh, _read_attributes(source, mesh)
+            # Attributes are listed by the faces of the file, so they are read with all of them.
+            points, faces = parse_mesh(source.path, source.suffix, source.data, cells)
+            whole = TriangleMesh(np.where(np.isfinite(points), points, 0.0), faces)
+            return mesh, carry_attributes(_read_attributes(source, whole), mesh)
         except FileFormatError:
             raise
         except (LookupError, TypeError, AttributeError, ValueError) as err:
@@ -142,6 +148,27 @@ def read_mesh(
                 f"Materials and other attributes must be whole; these are not: {err!r}. "
                 "Without attributes=True the file can be read."
             ) from err
+
+
+def load_mesh(
+    path: str | Path, *, cells: CellKind | None = None, drop_missing: bool = False
+) -> tuple[TriangleMesh, tuple[str, ...]]:
+    """Read a mesh as `read_mesh` does, and report what was left out."""
+    return _load(path, None, cells, drop_missing)[1:]
+
+
+def _load(
+    path: str | Path, file_format: str | None, cells: CellKind | None, drop_missing: bool
+) -> tuple[SourceFile, TriangleMesh, tuple[str, ...]]:
+    path = as_path(path)
+    suffix = suffix_of(path, file_format, MESH_FORMATS)
+    require_kind(cells)
+    data = read_regular(path)
+    with naming(path):
+        points, simplices = parse_mesh(path, suffix, data, cells)
+        require_surface(points, simplices)
+        points, simplices, _, report = require_finite(points, simplices, drop_missing=drop_missing)
+        return SourceFile(path, suffix, data), TriangleMesh(points, simplices), report
 
 
 def _read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
@@ -166,14 +193,13 @@ def require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
     n_corners, dim = simplices.shape[1], points.shape[1]
     if (n_corners, dim) != (3, 3):
         what = {2: "segments", 3: "triangles", 4: "tetrahedra"}[n_corners]
-        remedy = (
-            ' cells="triangles" reads the triangles beside them, if there are any.'
-            if n_corners == 4
-            else ""
-        )
+        remedies = {
+            4: ' cells="triangles" reads the triangles beside them, if there are any.',
+            3: " es.io.read_surface, or eigenshape repair, takes them at z = 0.",
+        }
         raise FileFormatError(
             f"A mesh file must hold triangles in R^3; it holds {len(simplices)} {what} in R^{dim}, which read_shape "
-            f"reads.{remedy}"
+            f"reads.{remedies.get(n_corners, '')}"
         )
 
 

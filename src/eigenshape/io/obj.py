@@ -24,7 +24,10 @@ AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/nor
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces; without faces, the segments of lines; without both, none."""
+    """Read vertices and faces; without faces, the segments of lines; without both, none.
+
+    Vertices are in the plane if all of them have two numbers.
+    """
     positions: list[Line] = []
     polygons: list[Line] = []
     polylines: list[Line] = []
@@ -39,7 +42,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
         elif keyword == b"l":
             polylines.append((number, AFTER_POSITION.sub(b"", text[1:])))
             n_so_far[keyword].append(len(positions))
-    vertices = coordinates(positions)
+    vertices = coordinates(positions, least=2)
     return vertices, _triangles(polygons, n_so_far[b"f"]) if polygons else _segments(
         polylines, n_so_far[b"l"]
     )

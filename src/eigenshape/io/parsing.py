@@ -1,5 +1,6 @@
 """Parse the bytes of a file of any format to points and simplices; errors name the file."""
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,9 +10,10 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape._files import require_regular
+from eigenshape.geometry.repair_report import PLURALS, count_nouns
 from eigenshape.io import glb, gmsh, medit, npz, obj, off, ply, stl, vtk_legacy, vtu
 from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.cells import SEGMENTS, Blocks, select_cells
+from eigenshape.io.cells import SEGMENTS, Blocks, select_cells, split_sentence
 
 # Formats that are parsed to vertices, and triangles or segments.
 PARSERS = {
@@ -71,9 +73,62 @@ def naming(path: Path) -> Iterator[None]:
 def parse_mesh(
     path: Path, suffix: str, data: bytes, cells: CellKind | None
 ) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "s corners"]]:
-    """Return points and the selected simplices, of shape (0, 3) if there are only points."""
+    """Return points and the selected simplices, of shape (0, 3) if there are only points.
+
+    Warns
+    -----
+    UserWarning
+        If hexahedra, wedges or pyramids were split.
+    """
     points, blocks = _blocks(path, suffix, data, cells)
-    return points, select_cells(points, blocks, cells)
+    simplices = select_cells(points, blocks, cells)
+    if simplices.shape[1] == 4 and (sentence := split_sentence(blocks)):
+        warnings.warn(f"{path}: {sentence}", stacklevel=4)
+    return points, simplices
+
+
+def require_finite(
+    points: Float[np.ndarray, "n d"],
+    simplices: Int[np.ndarray, "s corners"],
+    *,
+    drop_missing: bool,
+) -> tuple[
+    Float[np.ndarray, "m d"],
+    Int[np.ndarray, "r corners"],
+    Int[np.ndarray, " m"],
+    tuple[str, ...],
+]:
+    """Leave out points that are not finite, and the simplices at them, if that is requested.
+
+    Returns the points and simplices that stay, the indices of these points in the file, and a
+    report of one sentence or none.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a point is not finite, and such points are not to be left out.
+    """
+    is_surface = len(simplices) > 0 and simplices.shape[1] == points.shape[1] == 3
+    noun = "vertex" if is_surface else "point"
+    missing = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if missing.size and not drop_missing:
+        first = int(missing[0])
+        raise InvalidShapeError(
+            f"{PLURALS.get(noun, 'points')} must be finite; {noun} {first} is {points[first].tolist()} "
+            f"({missing.size} such). Scanners write such points if they measured nothing: "
+            "drop_missing=True, or --repair drop_missing, leaves them out, and the faces at them."
+        )
+    kept = np.delete(np.arange(len(points)), missing)
+    if not missing.size:
+        return points, simplices, kept, ()
+    stays = ~np.isin(simplices, missing).any(axis=1)
+    # An index is lower by the number of missing points before it.
+    renumbered = simplices[stays] - np.searchsorted(missing, simplices[stays])
+    sentence = f"drop_missing left out {count_nouns(missing.size, noun)} without finite coordinates"
+    if len(simplices):
+        cell = "face" if is_surface else "cell"
+        sentence += f" and {count_nouns(int((~stays).sum()), cell)} at them"
+    return points[kept], renumbered, kept, (sentence,)
 
 
 def _blocks(

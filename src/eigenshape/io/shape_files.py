@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidShapeError
@@ -15,7 +14,7 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io import pcd, ply, points
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.cells import require_kind
-from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, suffix_of
+from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, require_finite, suffix_of
 
 POINTS = {".pts": points.parse, ".xyz": points.parse, ".pcd": pcd.parse}
 WRITERS = {".xyz": points.format_text, ".pts": points.format_counted, ".ply": ply.format_points}
@@ -52,8 +51,8 @@ def read_shape(
     dim : int
         Dimension of the manifold that a point cloud samples.
     drop_missing : bool
-        Whether to leave out points of a cloud that are not finite. Scanners write such points if
-        they measured nothing. By default they raise an error.
+        Whether to leave out points that are not finite, and the simplices at them. Scanners write
+        such points if they measured nothing. By default they raise an error.
     cells : {"triangles", "quads", "tetrahedra"}, optional
         Kind of cells to read, such as the boundary triangles of a tetrahedral mesh. Quads become
         two triangles each, and triangles between them are read too. By default the cells of the
@@ -91,30 +90,36 @@ def read_shape(
     >>> curve.dim, curve.simplices.tolist()
     (1, [[0, 1], [1, 2]])
     """
+    return load_shape(
+        path, file_format=file_format, dim=dim, drop_missing=drop_missing, cells=cells
+    )[0]
+
+
+def load_shape(
+    path: str | Path,
+    *,
+    file_format: str | None = None,
+    dim: Integer = 2,
+    drop_missing: bool = False,
+    cells: CellKind | None = None,
+) -> tuple[Shape, tuple[str, ...]]:
+    """Read a shape as `read_shape` does, and report what was left out."""
     path = as_path(path)
     suffix = suffix_of(path, file_format, SHAPE_FORMATS)
     require_kind(cells)
     data = read_regular(path)
     with naming(path):
         if suffix in POINTS:
-            return PointCloud(_finite(POINTS[suffix](data), drop_missing), dim)
-        coordinates, simplices = parse_mesh(path, suffix, data, cells)
-        if not len(simplices):
-            return PointCloud(_finite(coordinates, drop_missing), dim)
-        if simplices.shape[1] == 3 and coordinates.shape[1] == 3:
-            return TriangleMesh(coordinates, simplices)
-        return SimplicialMesh(coordinates, simplices)
-
-
-def _finite(coordinates: Float[np.ndarray, "n d"], drop_missing: bool) -> Float[np.ndarray, "m d"]:
-    finite = np.isfinite(coordinates).all(axis=1)
-    if drop_missing or finite.all():
-        return coordinates[finite]
-    first = int(np.argmin(finite))
-    raise InvalidShapeError(
-        f"points must be finite; point {first} is {coordinates[first].tolist()} ({np.count_nonzero(~finite)} such). "
-        "Scanners write such points if they measured nothing: drop_missing=True, or --drop-missing, leaves them out."
-    )
+            points, simplices = POINTS[suffix](data), np.empty((0, 3), dtype=np.int64)
+        else:
+            points, simplices = parse_mesh(path, suffix, data, cells)
+        n_cells, n_corners = simplices.shape
+        points, simplices, _, report = require_finite(points, simplices, drop_missing=drop_missing)
+        if not n_cells:
+            return PointCloud(points, dim), report
+        if n_corners == points.shape[1] == 3:
+            return TriangleMesh(points, simplices), report
+        return SimplicialMesh(points, simplices), report
 
 
 def read_points(

@@ -14,7 +14,7 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.io import pcd
 from eigenshape.io.mesh_files import require_surface
-from eigenshape.io.parsing import naming, parse_mesh, suffix_of
+from eigenshape.io.parsing import naming, parse_mesh, require_finite, suffix_of
 from eigenshape.io.shape_files import POINTS, SHAPE_FORMATS
 from eigenshape.scans.frames import triangulate_frame
 from eigenshape.scans.reconstruction import reconstruct_surface
@@ -27,8 +27,9 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
     are joined, as a camera at the origin sees them, and the surface faces the camera. Points
     without an order become the surface whose normals fit theirs (Poisson reconstruction). It is
     closed where they leave only small holes, and rounds off what is thinner than a few times the
-    distance between them. Points that are not finite, and all but the first of equal points, are
-    left out. Of tetrahedra it is the boundary.
+    distance between them. Points that are not finite, with the faces at them, and all but the
+    first of equal points of a cloud are left out. Of tetrahedra it is the boundary. Triangles in
+    the plane are taken at z = 0.
 
     Parameters
     ----------
@@ -74,32 +75,36 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
             points = POINTS[suffix](data)
         else:
             points, simplices = parse_mesh(path, suffix, data, None)
-            if simplices.shape[1] == 4:
-                return _surface_of_solid(SimplicialMesh(points, simplices))
             if len(simplices):
-                require_surface(points, simplices)
-                return RepairedMesh(TriangleMesh(points, simplices), (), np.arange(len(points)))
+                return _surface_of_cells(points, simplices)
         n_rows = pcd.n_rows(data) if suffix == ".pcd" else 1
         if n_rows > 1:
             return triangulate_frame(points.reshape(n_rows, -1, 3))
         return _surface_of_cloud(points)
 
 
-def _surface_of_solid(solid: SimplicialMesh) -> RepairedMesh[TriangleMesh]:
-    surface = boundary_surface(solid)
-    report = (
-        f"boundary_surface took the {surface.n_faces:,} triangles around "
-        f"{solid.n_simplices:,} tetrahedra"
-    )
-    return RepairedMesh(surface, (report,), boundary_vertices(solid))
+def _surface_of_cells(points: np.ndarray, simplices: np.ndarray) -> RepairedMesh[TriangleMesh]:
+    points, simplices, kept, report = require_finite(points, simplices, drop_missing=True)
+    if simplices.shape[1] == 4:
+        solid = SimplicialMesh(points, simplices)
+        surface = boundary_surface(solid)
+        taken = (
+            f"boundary_surface took the {surface.n_faces:,} triangles around "
+            f"{solid.n_simplices:,} tetrahedra"
+        )
+        return RepairedMesh(surface, (*report, taken), kept[boundary_vertices(solid)])
+    if simplices.shape[1] == 3 and points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+        report = (*report, "a mesh in the plane was taken at z = 0")
+    require_surface(points, simplices)
+    return RepairedMesh(TriangleMesh(points, simplices), report, kept)
 
 
 def _surface_of_cloud(points: np.ndarray) -> RepairedMesh[TriangleMesh]:
-    finite = np.flatnonzero(np.isfinite(points).all(axis=1))
-    n_lost = len(points) - len(finite)
-    what = "point that is" if n_lost == 1 else "points that are"
-    lost = (f"left out {n_lost:,} {what} not finite",) if n_lost else ()
-    cloud = PointCloud(points[finite])
+    points, _, finite, lost = require_finite(
+        points, np.empty((0, 3), dtype=np.int64), drop_missing=True
+    )
+    cloud = PointCloud(points)
     different = repair(cloud, suggest_repairs(cloud))
     made = reconstruct_surface(different.cloud)
     source = finite[different.source_points[made.source_vertices]]

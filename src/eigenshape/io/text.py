@@ -44,9 +44,11 @@ def _table(lines: Sequence[Line], allowed: bytes) -> np.ndarray | None:
     return values if len(values) == len(lines) else None  # loadtxt ignores empty lines
 
 
-def coordinates(lines: Sequence[Line]) -> Float[np.ndarray, "n 3"]:
-    """Read the first three numbers of each line."""
+def coordinates(lines: Sequence[Line], *, least: int = 3) -> Float[np.ndarray, "n d"]:
+    """Read the first three numbers of each line, or two if all lines have two and that is enough."""
     values = number_table(lines)
+    if values is not None and least == values.shape[1] == 2:
+        return values
     if values is not None and values.shape[1] >= 3:
         return values[:, :3]
     return np.array([_three_numbers(line) for line in lines], dtype=np.float64).reshape(-1, 3)

@@ -1,5 +1,6 @@
 """Operators by name, with what each takes."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -7,7 +8,7 @@ from typing import Any
 
 import scipy.sparse as sp
 
-from eigenshape._errors import InvalidParameterError
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
@@ -18,6 +19,7 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_laplacian
 from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
+from eigenshape.operators.kernel import UnevenSpacingError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.robust import robust_laplacian
 
@@ -107,7 +109,8 @@ def build_laplacian(
         A mesh, a point cloud, or the adjacency matrix of a graph.
     operator : str, optional
         A name in `es.operators.OPERATORS`. The default is "cotangent" for meshes, "point-cloud" for
-        points and "weighted" for graphs.
+        points and "weighted" for graphs. Surface points in R³ that are too uneven for the kernel of
+        "point-cloud" get "robust", with a warning, if no option is given.
     **options
         Options of the operator, such as `mass` or `t`.
 
@@ -122,6 +125,11 @@ def build_laplacian(
         one of the options.
     InvalidShapeError
         If the operator cannot be built on this shape.
+
+    Warns
+    -----
+    UserWarning
+        If points get the robust operator by default.
 
     See Also
     --------
@@ -156,7 +164,29 @@ def build_laplacian(
         raise InvalidParameterError(
             f"The {name} operator takes {', '.join(entry.options) or 'no options'}; the option {unknown[0]} was given."
         )
+    if operator is None and isinstance(shape, PointCloud) and not options:
+        return _cloud_laplacian(shape)
     return entry.build(shape, **options)
+
+
+def _cloud_laplacian(cloud: PointCloud) -> Laplacian:
+    """Build the kernel operator, or the robust one if points are too uneven for one width."""
+    try:
+        return point_cloud_laplacian(cloud)
+    except UnevenSpacingError as error:
+        # A width that reaches the farthest point would blur all others: no width is right.
+        if cloud.dim != 2 or cloud.points.shape[1] != 3:
+            raise
+        try:
+            robust = robust_laplacian(cloud)
+        except InvalidShapeError:
+            raise error from None
+    warnings.warn(
+        "The points are too uneven for a kernel of one width, so robust_laplacian joins each point "
+        "with its nearest ones. Pass a heat time t to use the kernel.",
+        stacklevel=3,
+    )
+    return robust
 
 
 def default_operator(shape: Shape | sp.sparray) -> str:

@@ -110,11 +110,11 @@ def point_cloud_laplacian(  # noqa: PLR0913 - as mesh_laplacian
     if t is None and h is None and edge_factor is None:
         edge_factor = _width_factor(measure, edge)
     kernel = choose_kernel(KernelOptions(t, h, edge_factor, correct, form, cutoff), edge)
-    warn_of_narrow(kernel)
-    warn_of_few(measure, kernel)
     laplacian = kernel_laplacian(measure, kernel)
     joined = neighbor_graph(cloud.points, min(_near(cloud.dim), cloud.n_points - 1))
     require_whole(laplacian, connected_components(joined, directed=False)[1], kernel)
+    warn_of_narrow(kernel)
+    warn_of_few(measure, kernel)
     return laplacian
 
 

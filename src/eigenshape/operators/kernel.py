@@ -44,6 +44,10 @@ PEAK = 30
 OR_ROBUST = "On a surface in R^3 robust_laplacian(shape) fits any spacing; on the command line, --operator robust."
 
 
+class UnevenSpacingError(InvalidShapeError):
+    """A kernel of one width does not reach the neighbors of all points."""
+
+
 @dataclass(frozen=True)
 class KernelOptions:
     """Options of a kernel, as in `mesh_laplacian`."""
@@ -202,7 +206,7 @@ def _scale_by_power(values: Float[np.ndarray, " z"], exponent: int) -> Float[np.
 def _require_partners(measure: Quadrature, n_partners: np.ndarray, kernel: GaussianKernel) -> None:
     alone = np.flatnonzero(n_partners == 0)
     if alone.size:
-        raise InvalidShapeError(
+        raise UnevenSpacingError(
             f"Every point must have another one within the cutoff of the kernel; point {alone[0]} at "
             f"{measure.points[alone[0]].tolist()} has none within {kernel.cutoff * kernel.width:.4g} ({alone.size} "
             f"such). Choose a larger t than {kernel.t:.4g}, or remove such points. {OR_ROBUST}"
@@ -215,7 +219,7 @@ def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKern
     pairs = np.unique(np.column_stack([labels, parts]), axis=0)
     torn = np.flatnonzero(np.bincount(pairs[:, 0]) > 1)
     if torn.size:
-        raise InvalidShapeError(
+        raise UnevenSpacingError(
             f"The kernel must connect each component of the shape; at t = {kernel.t:.4g} "
             f"component {torn[0]} falls into "
             f"{np.count_nonzero(pairs[:, 0] == torn[0])} parts ({parts.max() + 1} in all). Choose a larger t. "

@@ -99,7 +99,8 @@ def reconstruct_surface(
         raise InvalidShapeError(
             f"A surface must reach the points of a cloud; it misses {100 * missed:.0f} % of these "
             f"{cloud.n_points}, where parts are thinner than the distance between points. Give more "
-            "points, or a mesh that another program made of them."
+            "points, or a mesh that another program made of them. The points alone have a spectrum: "
+            "solve_spectrum(build_laplacian(cloud), 20), or eigenshape spectrum."
         )
     vertices = (mesh.vertices * cell - MARGIN * extent) * scale + low
     sentence = (

@@ -4,7 +4,6 @@ from .bending import read_edits_for as read_edits_for
 from .comparison import print_stability as print_stability
 from .comparison import scale_shape as scale_shape
 from .comparison import stability_facts as stability_facts
-from .facts import mesh_facts as mesh_facts
 from .facts import shape_facts as shape_facts
 from .heat import count_fragments as count_fragments
 from .heat import find_features as find_features
@@ -33,6 +32,7 @@ from .parts import require_colored_path as require_colored_path
 from .parts import require_label_path as require_label_path
 from .parts import save_labels as save_labels
 from .reading import load_mesh as load_mesh
+from .reading import load_repaired as load_repaired
 from .reading import load_shape as load_shape
 from .reading import load_surface as load_surface
 from .reading import read_examples as read_examples

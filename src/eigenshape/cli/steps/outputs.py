@@ -73,7 +73,9 @@ def save_like(
     attributes = None
     if source.suffix.lower() in WITH_ATTRIBUTES:
         try:
-            attributes = carry_attributes(read_mesh(source, attributes=True)[1], mesh)
+            attributes = carry_attributes(
+                read_mesh(source, attributes=True, drop_missing=True)[1], mesh
+            )
         except FileFormatError as error:  # the shape was read; only the rest is broken
             err.print(f"[yellow]lost:[/] all but the shape. {escape_text(error)}")
     written = mesh if moved is None else TriangleMesh(moved, mesh.faces)

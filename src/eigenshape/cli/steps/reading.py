@@ -1,6 +1,7 @@
 """Reading the shapes that a verb is given, and repairing them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,13 @@ from scipy.spatial import cKDTree
 
 from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_repairs
-from eigenshape.cli.inputs import repair_names
-from eigenshape.geometry.cloud import Shape
+from eigenshape.cli.inputs import drops_missing, repair_names
+from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair
-from eigenshape.geometry.repair_report import RepairedCloud
+from eigenshape.geometry.repair_report import RepairedCloud, RepairedMesh
+from eigenshape.geometry.simplicial import Mesh
+from eigenshape.io import mesh_files, shape_files
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.labeled_shapes import (
     find_labeled_shapes,
@@ -21,16 +24,16 @@ from eigenshape.io.labeled_shapes import (
     read_labeled_shape,
 )
 from eigenshape.io.labels import read_map
-from eigenshape.io.mesh_files import read_mesh
-from eigenshape.io.shape_files import read_shape
 from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 
 
 def load_mesh(path: Path, repairs: str) -> TriangleMesh:
     """Read a mesh, apply the requested repairs, and print on stderr what they did."""
-    done = repair(read_mesh(path), repair_names(repairs))
-    print_repairs(done.report)
+    names = repair_names(repairs)
+    mesh, left_out = mesh_files.load_mesh(path, drop_missing=drops_missing(names))
+    done = repair(mesh, names)
+    print_repairs(left_out + done.report)
     return done.mesh
 
 
@@ -42,14 +45,31 @@ def load_surface(path: Path, repairs: str) -> TriangleMesh:
     return done.mesh
 
 
-def load_shape(
-    path: Path, repairs: str, dim: int, *, drop_missing: bool, cells: CellKind | None = None
-) -> Shape:
+def load_shape(path: Path, repairs: str, dim: int, cells: CellKind | None = None) -> Shape:
     """Read a shape of any kind, apply the requested repairs, and print on stderr what they did."""
     names = repair_names(repairs)
-    done = repair(read_shape(path, dim=dim, drop_missing=drop_missing, cells=cells), names)
-    print_repairs(done.report)
+    shape, left_out = shape_files.load_shape(
+        path, dim=dim, drop_missing=drops_missing(names), cells=cells
+    )
+    done = repair(shape, names)
+    print_repairs(left_out + done.report)
     return done.cloud if isinstance(done, RepairedCloud) else done.mesh
+
+
+def load_repaired(
+    path: Path, repairs: str, cells: CellKind | None
+) -> tuple[Mesh, RepairedMesh[Mesh]]:
+    """Read a mesh of any dimension and repair it; return it as it was read and as it is now."""
+    names = repair_names(repairs)
+    found, left_out = shape_files.load_shape(path, drop_missing=drops_missing(names), cells=cells)
+    if isinstance(found, PointCloud):  # for the error that says what reads points
+        found, left_out = mesh_files.load_mesh(path)
+    elif found.dim == 2 and not isinstance(found, TriangleMesh):  # in the plane
+        made = read_surface(path)
+        found, left_out = made.mesh, made.report
+    mesh: Mesh = found
+    done = repair(mesh, names)
+    return mesh, replace(done, report=left_out + done.report)
 
 
 def read_examples(
