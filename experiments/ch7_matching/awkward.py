@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import re
 import sys
 import tempfile
 import time
@@ -23,12 +24,13 @@ from real_shapes import DATA, require_data
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 N_HOLES, HOLE = 5, 0.05  # holes of a part, and their radius in roots of the area
 LEFT_OUT = 0.2  # share of the vertices of a part that a plane removes
+REMEDY = re.compile(r"--repair (\w+)")  # as messages name it
 GAP = 0.55, 0.58  # the share of the vertices below the two planes between which a part is torn
 
 
-def prepare(path: Path) -> es.TriangleMesh:
-    """Read a file as `eigenshape match` does."""
-    return es.repair(es.io.read_surface(path).mesh, ["auto"]).mesh
+def prepare(path: Path, *remedies: str) -> es.TriangleMesh:
+    """Read a file as `eigenshape match` does, with these repairs after the usual ones."""
+    return es.repair(es.io.read_surface(path).mesh, ["auto", *remedies]).mesh
 
 
 def landmarks(path: Path) -> dict[str, list[float]]:
@@ -66,22 +68,51 @@ def skulls(names: list[str]) -> dict[str, dict[str, object]]:
 
 
 def awkward(paths: list[Path]) -> list[dict[str, object]]:
-    """Match each file to itself, turned: the error in hundredths of √area, or why it is refused."""
+    """Match each file to itself, turned, by the remedy of a refusal if it names one."""
     rows: list[dict[str, object]] = []
     for path in track(paths, "awkward files"):
         row: dict[str, object] = {"file": str(path.relative_to(DATA / "nasty"))}
         try:
-            mesh = prepare(path)
-            match = es.match_shapes(es.TriangleMesh(mesh.vertices @ TURN.T, mesh.faces), mesh)
+            rows.append(row | match_to_itself(prepare(path)))
         except es.EigenshapeError as err:
-            rows.append(row | {"refused": str(err).replace(str(path), path.name)})
-            continue
-        gaps = np.linalg.norm(match.pull(mesh.vertices) - mesh.vertices, axis=1)
-        unit = np.sqrt(es.geometry.surface_area(mesh))
-        row |= {"mean error": float(100 * gaps.mean() / unit)}
-        row |= {"mean confidence": float(match.confidence.mean())}
-        rows.append(row | {"equally good": match.n_equally_good, "report": list(match.report)})
+            row |= {"refused": str(err).replace(str(path), path.name)}
+            if remedy := REMEDY.search(str(err)):
+                row |= {"remedy": remedy[1]} | match_to_itself(prepare(path, remedy[1]))
+            rows.append(row)
     return rows
+
+
+def match_to_itself(mesh: es.TriangleMesh) -> dict[str, object]:
+    """Match a mesh to itself, turned: the error in hundredths of √area, and how sure it is."""
+    match = es.match_shapes(es.TriangleMesh(mesh.vertices @ TURN.T, mesh.faces), mesh)
+    gaps = np.linalg.norm(match.pull(mesh.vertices) - mesh.vertices, axis=1)
+    return {
+        "vertices": mesh.n_vertices,
+        "mean error": float(100 * gaps.mean() / np.sqrt(es.geometry.surface_area(mesh))),
+        "mean confidence": float(match.confidence.mean()),
+        "equally good": match.n_equally_good,
+        "report": list(match.report),
+    }
+
+
+def summary(rows: list[dict[str, object]]) -> dict[str, dict[str, object]]:
+    """Count what became of files: matched as they are, by the remedy that is named, or refused."""
+    of_refusal = {
+        "no surface of 100 points or more": "A cloud must|must have points|it is empty",
+        "no triangles": "must hold triangles|holds no triangles|segments",
+        "against the format": "must have three|must hold the|must declare",
+    }
+    groups: dict[str, list[dict[str, object]]] = {"matched": [], "by the remedy": []}
+    groups |= {name: [] for name in of_refusal} | {"refused otherwise": []}
+    for row in rows:
+        if "mean error" in row:
+            name = "by the remedy" if "remedy" in row else "matched"
+        else:
+            text = str(row["refused"])
+            fitting = [name for name, words in of_refusal.items() if re.search(words, text)]
+            name = (*fitting, "refused otherwise")[0]
+        groups[name].append(row)
+    return {name: {"files": len(found)} for name, found in groups.items()}
 
 
 def torn_part(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMesh:
