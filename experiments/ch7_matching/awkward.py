@@ -17,7 +17,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import give_out, output_file, save_figures
+from outputs import give_out, output_file
 from real_shapes import DATA, require_data
 
 # A turn, so that awkward files are not matched to themselves in place
@@ -134,9 +134,9 @@ def torn_part(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMes
     return es.TriangleMesh(mesh.vertices @ TURN.T, np.vstack([faces, faces[:1]]))
 
 
-def torn(names: list[str], folder: Path) -> list[dict[str, object]]:
+def torn(names: list[str], folder: Path) -> dict[str, dict[str, object]]:
     """Match torn parts of animals, read from files, to the next pose with the same vertices."""
-    rows: list[dict[str, object]] = []
+    rows: dict[str, dict[str, object]] = {}
     for number, (one, two) in enumerate(pairwise(names)):
         if one.split("-")[0] != two.split("-")[0]:
             continue
@@ -154,21 +154,15 @@ def torn(names: list[str], folder: Path) -> list[dict[str, object]]:
         n_pieces, piece = es.geometry.vertex_components(done.mesh)
         areas = np.bincount(piece, weights=es.geometry.dual_volumes(done.mesh))
         large = piece == areas.argmax()
-        rows.append(
-            {
-                "part": one,
-                "whole": two,
-                "pieces": n_pieces,
-                "error of the largest piece": float(errors[large].mean()),
-                "confidence of the largest piece": float(match.confidence[large].mean()),
-                "error of the others": float(errors[~large].mean()) if n_pieces > 1 else None,
-                "confidence of the others": float(match.confidence[~large].mean())
-                if n_pieces > 1
-                else None,
-                "repairs": list(done.report),
-                "report": list(match.report),
-            }
-        )
+        rows[f"{one} on {two}"] = {
+            "pieces": n_pieces,
+            "error of the largest piece": float(errors[large].mean()),
+            "confidence of the largest piece": float(match.confidence[large].mean()),
+            "error of the others": float(errors[~large].mean()),
+            "confidence of the others": float(match.confidence[~large].mean()),
+            "repairs": list(done.report),
+            "report": list(match.report),
+        }
     return rows
 
 
@@ -178,6 +172,7 @@ def main() -> None:
     parser.add_argument(
         "--quick", action="store_true", help="three awkward files and one torn part"
     )
+    parser.add_argument("--skulls", action="store_true", help="the skulls instead of the files")
     parser.add_argument("--out", type=output_file, default="ch7-awkward.json")
     arguments = parser.parse_args()
     require_data()
@@ -191,15 +186,13 @@ def main() -> None:
             )
             return
         results: dict[str, object] = {}
-        for what, measure in {
-            "skulls": lambda: skulls(
-                sorted(p.stem for p in (DATA / "mice" / "full").glob("*.ply"))
-            ),
-            "torn": lambda: torn(names, Path(folder)),
-            "awkward": lambda: awkward(files),
-        }.items():
-            results[what] = measure()
-            save_figures(rounded(results), arguments.out)
+        if arguments.skulls:
+            full = (DATA / "mice" / "full").glob("*.ply")
+            results["skulls"] = skulls(sorted(path.stem for path in full))
+        else:
+            results["awkward"] = rows = awkward(files)
+            results["awkward files"] = summary(rows)
+            results["torn"] = torn(names, Path(folder))
     give_out(rounded(results), arguments.out)
 
 
