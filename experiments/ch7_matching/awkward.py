@@ -96,17 +96,18 @@ def match_to_itself(mesh: es.TriangleMesh) -> dict[str, object]:
 
 
 def summary(rows: list[dict[str, object]]) -> dict[str, dict[str, object]]:
-    """Count what became of files: matched as they are, by the remedy that is named, or refused."""
+    """Count what became of files: matched, by the remedy that is named if not as they are, or refused."""
     of_refusal = {
         "no surface of 100 points or more": "A cloud must|must have points|it is empty",
         "no triangles": "must hold triangles|holds no triangles|segments",
         "against the format": "must have three|must hold the|must declare",
     }
-    groups: dict[str, list[dict[str, object]]] = {"matched": [], "by the remedy": []}
-    groups |= {name: [] for name in of_refusal} | {"refused otherwise": []}
+    names = ("matched", "too few points", "by the remedy", *of_refusal, "refused otherwise")
+    groups: dict[str, list[dict[str, object]]] = {name: [] for name in names}
     for row in rows:
         if "mean error" in row:
-            name = "by the remedy" if "remedy" in row else "matched"
+            as_it_is = "matched" if row["mean confidence"] else "too few points"
+            name = "by the remedy" if "remedy" in row else as_it_is
         else:
             text = str(row["refused"])
             fitting = [name for name, words in of_refusal.items() if re.search(words, text)]
