@@ -75,7 +75,7 @@ def test_normals_that_fit_no_surface_are_refused():
     points = es.icosphere(2).vertices
     normals = np.random.default_rng(0).normal(size=points.shape)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    with pytest.raises(es.InvalidShapeError, match="must reach the points .* misses 100 %"):
+    with pytest.raises(es.InvalidShapeError, match=r"must reach the points .* misses 100 %"):
         reconstruct_surface(es.PointCloud(points), normals)
 
 

@@ -75,9 +75,7 @@ def label(
     steps.require_picture(picture)
     side = steps.parse_side(view, up)
     steps.require_label_path(output)
-    examples, names, left_out = steps.read_examples(
-        like or [], labels or [], library, repair
-    )
+    examples, names, left_out = steps.read_examples(like or [], labels or [], library, repair)
     target = steps.load_surface(mesh, repair)
     with progress_bar("label") as progress:
         found = es.transfer_labels(list(examples.values()), target, progress=progress)
