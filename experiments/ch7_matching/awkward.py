@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import re
 import sys
 import tempfile
 import time
@@ -16,19 +17,20 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import give_out, output_file, save_figures
+from outputs import give_out, output_file
 from real_shapes import DATA, require_data
 
 # A turn, so that awkward files are not matched to themselves in place
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 N_HOLES, HOLE = 5, 0.05  # holes of a part, and their radius in roots of the area
 LEFT_OUT = 0.2  # share of the vertices of a part that a plane removes
+REMEDY = re.compile(r"--repair (\w+)")  # as messages name it
 GAP = 0.55, 0.58  # the share of the vertices below the two planes between which a part is torn
 
 
-def prepare(path: Path) -> es.TriangleMesh:
-    """Read a file as `eigenshape match` does."""
-    return es.repair(es.io.read_surface(path).mesh, ["auto"]).mesh
+def prepare(path: Path, *remedies: str) -> es.TriangleMesh:
+    """Read a file as `eigenshape match` does, with these repairs after the usual ones."""
+    return es.repair(es.io.read_surface(path).mesh, ["auto", *remedies]).mesh
 
 
 def landmarks(path: Path) -> dict[str, list[float]]:
@@ -66,22 +68,52 @@ def skulls(names: list[str]) -> dict[str, dict[str, object]]:
 
 
 def awkward(paths: list[Path]) -> list[dict[str, object]]:
-    """Match each file to itself, turned: the error in hundredths of √area, or why it is refused."""
+    """Match each file to itself, turned, by the remedy of a refusal if it names one."""
     rows: list[dict[str, object]] = []
     for path in track(paths, "awkward files"):
         row: dict[str, object] = {"file": str(path.relative_to(DATA / "nasty"))}
         try:
-            mesh = prepare(path)
-            match = es.match_shapes(es.TriangleMesh(mesh.vertices @ TURN.T, mesh.faces), mesh)
+            rows.append(row | match_to_itself(prepare(path)))
         except es.EigenshapeError as err:
-            rows.append(row | {"refused": str(err).replace(str(path), path.name)})
-            continue
-        gaps = np.linalg.norm(match.pull(mesh.vertices) - mesh.vertices, axis=1)
-        unit = np.sqrt(es.geometry.surface_area(mesh))
-        row |= {"mean error": float(100 * gaps.mean() / unit)}
-        row |= {"mean confidence": float(match.confidence.mean())}
-        rows.append(row | {"equally good": match.n_equally_good, "report": list(match.report)})
+            row |= {"refused": str(err).replace(str(path), path.name)}
+            if remedy := REMEDY.search(str(err)):
+                row |= {"remedy": remedy[1]} | match_to_itself(prepare(path, remedy[1]))
+            rows.append(row)
     return rows
+
+
+def match_to_itself(mesh: es.TriangleMesh) -> dict[str, object]:
+    """Match a mesh to itself, turned: the error in hundredths of √area, and how sure it is."""
+    match = es.match_shapes(es.TriangleMesh(mesh.vertices @ TURN.T, mesh.faces), mesh)
+    gaps = np.linalg.norm(match.pull(mesh.vertices) - mesh.vertices, axis=1)
+    return {
+        "vertices": mesh.n_vertices,
+        "mean error": float(100 * gaps.mean() / np.sqrt(es.geometry.surface_area(mesh))),
+        "mean confidence": float(match.confidence.mean()),
+        "equally good": match.n_equally_good,
+        "report": list(match.report),
+    }
+
+
+def summary(rows: list[dict[str, object]]) -> dict[str, dict[str, object]]:
+    """Count what became of files: matched, by the remedy that is named if not as they are, or refused."""
+    of_refusal = {
+        "no surface of 100 points or more": "A cloud must|must have points|it is empty",
+        "no triangles": "must hold triangles|holds no triangles|segments",
+        "against the format": "must have three|must hold the|must declare",
+    }
+    names = ("matched", "too few points", "by the remedy", *of_refusal, "refused otherwise")
+    groups: dict[str, list[dict[str, object]]] = {name: [] for name in names}
+    for row in rows:
+        if "mean error" in row:
+            as_it_is = "matched" if row["mean confidence"] else "too few points"
+            name = "by the remedy" if "remedy" in row else as_it_is
+        else:
+            text = str(row["refused"])
+            fitting = [name for name, words in of_refusal.items() if re.search(words, text)]
+            name = (*fitting, "refused otherwise")[0]
+        groups[name].append(row)
+    return {name: {"files": len(found)} for name, found in groups.items()}
 
 
 def torn_part(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMesh:
@@ -103,9 +135,9 @@ def torn_part(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMes
     return es.TriangleMesh(mesh.vertices @ TURN.T, np.vstack([faces, faces[:1]]))
 
 
-def torn(names: list[str], folder: Path) -> list[dict[str, object]]:
+def torn(names: list[str], folder: Path) -> dict[str, dict[str, object]]:
     """Match torn parts of animals, read from files, to the next pose with the same vertices."""
-    rows: list[dict[str, object]] = []
+    rows: dict[str, dict[str, object]] = {}
     for number, (one, two) in enumerate(pairwise(names)):
         if one.split("-")[0] != two.split("-")[0]:
             continue
@@ -123,21 +155,15 @@ def torn(names: list[str], folder: Path) -> list[dict[str, object]]:
         n_pieces, piece = es.geometry.vertex_components(done.mesh)
         areas = np.bincount(piece, weights=es.geometry.dual_volumes(done.mesh))
         large = piece == areas.argmax()
-        rows.append(
-            {
-                "part": one,
-                "whole": two,
-                "pieces": n_pieces,
-                "error of the largest piece": float(errors[large].mean()),
-                "confidence of the largest piece": float(match.confidence[large].mean()),
-                "error of the others": float(errors[~large].mean()) if n_pieces > 1 else None,
-                "confidence of the others": float(match.confidence[~large].mean())
-                if n_pieces > 1
-                else None,
-                "repairs": list(done.report),
-                "report": list(match.report),
-            }
-        )
+        rows[f"{one} on {two}"] = {
+            "pieces": n_pieces,
+            "error of the largest piece": float(errors[large].mean()),
+            "confidence of the largest piece": float(match.confidence[large].mean()),
+            "error of the others": float(errors[~large].mean()),
+            "confidence of the others": float(match.confidence[~large].mean()),
+            "repairs": list(done.report),
+            "report": list(match.report),
+        }
     return rows
 
 
@@ -147,6 +173,7 @@ def main() -> None:
     parser.add_argument(
         "--quick", action="store_true", help="three awkward files and one torn part"
     )
+    parser.add_argument("--skulls", action="store_true", help="the skulls instead of the files")
     parser.add_argument("--out", type=output_file, default="ch7-awkward.json")
     arguments = parser.parse_args()
     require_data()
@@ -160,15 +187,13 @@ def main() -> None:
             )
             return
         results: dict[str, object] = {}
-        for what, measure in {
-            "skulls": lambda: skulls(
-                sorted(p.stem for p in (DATA / "mice" / "full").glob("*.ply"))
-            ),
-            "torn": lambda: torn(names, Path(folder)),
-            "awkward": lambda: awkward(files),
-        }.items():
-            results[what] = measure()
-            save_figures(rounded(results), arguments.out)
+        if arguments.skulls:
+            full = (DATA / "mice" / "full").glob("*.ply")
+            results["skulls"] = skulls(sorted(path.stem for path in full))
+        else:
+            results["awkward"] = rows = awkward(files)
+            results["awkward files"] = summary(rows)
+            results["torn"] = torn(names, Path(folder))
     give_out(rounded(results), arguments.out)
 
 

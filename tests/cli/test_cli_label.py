@@ -109,7 +109,7 @@ def test_a_library_with_slivers_and_a_broken_file_serves_the_rest(poses, tmp_pat
     found = json.loads(done.stdout)
     assert (list(found["like"]), found["left_out"]) == (["sliver"], ["broken.ply"])
     (tmp_path / "sliver.ply").unlink()
-    done = run("label", poses / "posed.ply", "--library", tmp_path, code=1)
+    done = run("label", poses / "posed.ply", "--library", tmp_path, code=2)
     assert "that can be described" in done.stderr
 
 

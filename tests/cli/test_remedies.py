@@ -23,6 +23,7 @@ from eigenshape.geometry.repair_names import MESH_REPAIRS
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.io.shape_files import write_points
+from eigenshape.io.surfaces import read_surface
 from eigenshape.operators.choices import OPERATOR_NAMES
 from eigenshape.shapes.surfaces import icosphere
 
@@ -32,6 +33,7 @@ NAMES = "|".join(MESH_REPAIRS)
 REMEDIES = {
     "--repair": rf"--repair ((?:{NAMES})(?:,(?:{NAMES}))*)",
     "--operator": rf"--operator ({'|'.join(OPERATOR_NAMES)})",
+    "--scale": "--scale (unknown)",
 }
 # What cannot be answered, and why.
 UNANSWERABLE = {
@@ -142,6 +144,47 @@ def test_real_files_are_answered_or_refused_for_a_known_reason(data, verb):
             refused.append((path.name, applied, message))
     assert count > 80
     assert not refused
+
+
+RAW = "trimesh/tube.obj", "geometrycentral/triple_vierbein.obj"
+ONE_SIDED = "geometrycentral/moebius.obj"
+VERBS = "match", "label", "pose", "pose --rest", "fuse"
+
+
+@pytest.mark.data
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("verb", "name", "given", "remedy"),
+    [
+        # These have too few points to be fused.
+        *((verb, name, ["--repair", "none"], "auto") for verb in VERBS[:4] for name in RAW),
+        *((verb, ONE_SIDED, [], "cut_one_sided") for verb in VERBS),
+    ],
+)
+def test_remedies_of_maps_of_real_files_end_in_an_answer(data, tmp_path, verb, name, given, remedy):
+    path, labels = data / "nasty" / name, tmp_path / "labels.txt"
+    labels.write_text("1\n" * read_surface(path).mesh.n_faces)
+    others = {
+        "match": [path],
+        "label": ["--like", path, "--labels", labels],
+        "pose": ["--like", path],
+        "pose --rest": ["--like", path, "--rest", path],
+        "fuse": [path, "-o", tmp_path / "fused.ply"],
+    }[verb]
+    message, applied = answer(verb.split()[0], path, *map(str, others), *given)
+    assert message is None, (applied, message)
+    assert applied["--repair"].endswith(remedy)
+
+
+@pytest.mark.data
+@pytest.mark.long
+def test_a_part_that_is_too_large_for_its_unit_finds_its_size(data, tmp_path):
+    whole, part = data / "nasty" / "geometrycentral" / "fox.ply", tmp_path / "part.ply"
+    mesh = read_surface(whole).mesh
+    write_mesh(TriangleMesh(2 * mesh.vertices, mesh.faces), part)
+    message, applied = answer("match", part, str(whole), "--scale", "known")
+    assert message is None, message
+    assert applied == {"--scale": "unknown"}
 
 
 def test_a_scan_of_uneven_spacing_is_answered(tmp_path):

@@ -37,11 +37,14 @@ def test_constants_fitted_to_three_parts_tell_right_vertices_from_wrong_ones(qui
 @pytest.mark.data
 def test_torn_and_awkward_files_are_matched_or_refused_with_the_reason(quick_form):
     found = quick_form("ch7_matching/awkward.py")
-    (part,) = found["torn"]
+    (part,) = found["torn"].values()
     assert part["repairs"]
     assert part["error of the largest piece"] < 5
     assert part["confidence of the others"] < 0.2  # limbs of 1 % of the area
     rows = {row["file"]: row for row in found["awkward"]}
     assert rows["geometrycentral/fox.ply"]["mean error"] < 1
     assert rows["trimesh/cylinder.stl"]["equally good"] > 1
-    assert "one side only" in rows["geometrycentral/moebius.obj"]["refused"]
+    strip = rows["geometrycentral/moebius.obj"]
+    assert "one side only" in strip["refused"]
+    assert strip["remedy"] == "cut_one_sided"
+    assert strip["mean error"] < 1

@@ -71,6 +71,14 @@ def test_two_balls_are_two_surfaces():
     assert es.geometry.enclosed_volume(made.mesh) == pytest.approx(8 / 3 * np.pi, rel=0.1)
 
 
+def test_normals_that_fit_no_surface_are_refused():
+    points = es.icosphere(2).vertices
+    normals = np.random.default_rng(0).normal(size=points.shape)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    with pytest.raises(es.InvalidShapeError, match=r"must reach the points .* misses 100 %"):
+        reconstruct_surface(es.PointCloud(points), normals)
+
+
 def test_what_has_no_surface_is_refused():
     with pytest.raises(es.InvalidShapeError, match="at least 100 points in R\\^3"):
         reconstruct_surface(es.PointCloud(np.eye(3)))

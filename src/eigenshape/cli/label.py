@@ -69,14 +69,13 @@ def label(
 ) -> None:
     """Copy the labels of one mesh or several to another: label a horse, and get a labeled camel.
 
-    Left and right may be exchanged. The options of repair are for the mesh that gets the labels;
-    labeled meshes are repaired where they need it. A mesh of the library that still cannot be
-    described is left out by name, and the exit code is 3.
+    Left and right may be exchanged. All meshes are repaired. A mesh of the library that still cannot
+    be described is left out by name, and the exit code is 3.
     """
     steps.require_picture(picture)
     side = steps.parse_side(view, up)
     steps.require_label_path(output)
-    examples, names, left_out = steps.read_examples(like or [], labels or [], library)
+    examples, names, left_out = steps.read_examples(like or [], labels or [], library, repair)
     target = steps.load_surface(mesh, repair)
     with progress_bar("label") as progress:
         found = es.transfer_labels(list(examples.values()), target, progress=progress)

@@ -42,17 +42,15 @@ def pose(
 ) -> None:
     """Bend a mesh into the pose of another one; what corresponds is found by itself.
 
-    Repairs are applied to both meshes; with --rest, to the mesh that is bent alone.
+    All meshes are repaired; what is done to --rest is done to the same faces of --like.
 
     For instance: eigenshape pose cat.ply --like lion.ply -o bent.ply --picture bent.png
     """
     steps.require_picture(picture)
     side = steps.parse_side(view, up)
     steps.require_mesh_path(output)
-    # A repair may change the faces, which --rest and --like must share.
-    other = "" if rest else repair
-    target, posed = steps.load_mesh(mesh, repair), steps.load_mesh(like, other)
-    source = steps.load_mesh(rest, "") if rest else posed
+    target = steps.load_mesh(mesh, repair)
+    source, posed = steps.load_poses(rest or like, like, repair)
     factor = sqrt(es.geometry.surface_area(source) / es.geometry.surface_area(target))
     with progress_bar("match") as progress:
         found = es.match_shapes(target, source, scale=factor, progress=progress)

@@ -187,7 +187,8 @@ def _match_pieces(
     if not matched:
         raise InvalidParameterError(
             f"A part must have a piece with {LEAST_AREA:.0%} of the area of the whole; none of its "
-            f'{vertex_components(mesh)[0]} pieces has. Pass scale="unknown" if units may differ.'
+            f'{vertex_components(mesh)[0]} pieces has. Pass scale="unknown" if units may differ '
+            "(--scale unknown on the command line)."
         )
     report += report_left_out(mesh, matched, "part") + target.report
     found: list[_Piece] = []

@@ -96,12 +96,7 @@ def reconstruct_surface(
     mesh = _supported(surface, places, normals, np.sqrt(areas) / cell)
     missed = np.mean(cKDTree(mesh.vertices).query(places)[0] > MISSED_CELLS)
     if missed > MOST_MISSED:
-        raise InvalidShapeError(
-            f"A surface must reach the points of a cloud; it misses {100 * missed:.0f} % of these "
-            f"{cloud.n_points}, where parts are thinner than the distance between points. Give more "
-            "points, or a mesh that another program made of them. The points alone have a spectrum: "
-            "solve_spectrum(build_laplacian(cloud), 20), or eigenshape spectrum."
-        )
+        raise _misses_points(missed, cloud.n_points)
     vertices = (mesh.vertices * cell - MARGIN * extent) * scale + low
     sentence = (
         f"reconstruct_surface made {mesh.n_vertices:,} vertices and {mesh.n_faces:,} faces of "
@@ -234,7 +229,19 @@ def _supported(
         share = corner_of @ ((corner_of.T @ share) / n_around) / 3
     bare = share > 0.5
     bare = _large_pieces(mesh, bare)  # smaller ones close holes
-    return submesh(mesh, _large_pieces(mesh, ~bare))[0]
+    kept = _large_pieces(mesh, ~bare)
+    if not kept.any():
+        raise _misses_points(1, len(places))
+    return submesh(mesh, kept)[0]
+
+
+def _misses_points(share: float, n_points: int) -> InvalidShapeError:
+    return InvalidShapeError(
+        f"A surface must reach the points of a cloud; it misses {100 * share:.0f} % of these "
+        f"{n_points}, where parts are thinner than the distance between points. Give more points, or a "
+        "mesh that another program made of them. The points alone have a spectrum: "
+        "solve_spectrum(build_laplacian(cloud), 20), or eigenshape spectrum."
+    )
 
 
 def _large_pieces(mesh: TriangleMesh, chosen: Bool[np.ndarray, " f"]) -> Bool[np.ndarray, " f"]:

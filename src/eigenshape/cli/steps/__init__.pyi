@@ -32,6 +32,7 @@ from .parts import require_colored_path as require_colored_path
 from .parts import require_label_path as require_label_path
 from .parts import save_labels as save_labels
 from .reading import load_mesh as load_mesh
+from .reading import load_poses as load_poses
 from .reading import load_repaired as load_repaired
 from .reading import load_shape as load_shape
 from .reading import load_surface as load_surface

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_repairs
 from eigenshape.cli.inputs import drops_missing, repair_names
+from eigenshape.deformation.distortion import require_poses
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repair import repair
@@ -35,6 +36,15 @@ def load_mesh(path: Path, repairs: str) -> TriangleMesh:
     done = repair(mesh, names)
     print_repairs(left_out + done.report)
     return done.mesh
+
+
+def load_poses(before: Path, after: Path, repairs: str) -> tuple[TriangleMesh, TriangleMesh]:
+    """Read two poses of one mesh; repair the first, and do the same to the faces of the second."""
+    first, second = mesh_files.read_mesh(before), mesh_files.read_mesh(after)
+    require_poses(first, second)
+    done = repair(first, repair_names(repairs))
+    print_repairs(done.report)
+    return done.mesh, TriangleMesh(second.vertices[done.source_vertices], done.mesh.faces)
 
 
 def load_surface(path: Path, repairs: str) -> TriangleMesh:
@@ -73,12 +83,12 @@ def load_repaired(
 
 
 def read_examples(
-    like: Sequence[Path], labels: Sequence[Path], library: Path | None
+    like: Sequence[Path], labels: Sequence[Path], library: Path | None, repairs: str
 ) -> tuple[dict[str, LabeledShape], list[str], list[str]]:
     """Read the labeled shapes of a verb by name, and the names of labels that a library has.
 
-    Each shape is repaired where it needs it. Last come the names of those of the library that
-    still cannot be described; they are left out, with a line on stderr.
+    Last come the names of those of the library that cannot be described once they are repaired; they
+    are left out, with a line on stderr.
     """
     if labels and len(labels) != len(like):
         raise InvalidParameterError(
@@ -87,15 +97,17 @@ def read_examples(
     if not like and library is None:
         raise InvalidParameterError("Labels must come from --like or from --library; give one.")
     beside: Sequence[Path | None] = labels or [None] * len(like)
+    steps = repair_names(repairs)
     found = {
-        str(path): _read_example(path, given) for path, given in zip(like, beside, strict=True)
+        str(path): _read_example(path, given, steps)
+        for path, given in zip(like, beside, strict=True)
     }
     if library is None:
         return found, [], []
     left_out = []
     for path in find_labeled_shapes(library):
         try:
-            example = _read_example(path)
+            example = _read_example(path, None, steps)
             example.points  # noqa: B018 - described here, and kept, so that a failure has a name
         except (EigenshapeError, OSError) as error:
             err.print(f"[yellow]left out:[/] {escape_text(path.name)}: {escape_text(error)}")
@@ -109,10 +121,10 @@ def read_examples(
     return found, read_label_names(library), left_out
 
 
-def _read_example(path: Path, labels: Path | None = None) -> LabeledShape:
-    """Read a labeled shape and repair what is needed; faces keep their labels."""
+def _read_example(path: Path, labels: Path | None, repairs: tuple[str, ...]) -> LabeledShape:
+    """Read a labeled shape and repair it; faces keep their labels."""
     given = read_labeled_shape(path, labels)
-    done = repair(given.mesh, ("auto",))
+    done = repair(given.mesh, repairs)
     if not done.report:
         return given
     print_repairs(tuple(f"{path.name}: {line}" for line in done.report))
