@@ -44,6 +44,7 @@ from .recipes import index_recipe as index_recipe
 from .recipes import query_recipe as query_recipe
 from .records import count_shapes as count_shapes
 from .records import parse_filters as parse_filters
+from .records import require_attributes as require_attributes
 from .records import read_stage as read_stage
 from .records import record_facts as record_facts
 from .regions import parse_region as parse_region

@@ -1,5 +1,7 @@
 """Pairs of shapes of an index that are nearly the same."""
 
+from functools import partial
+
 import numpy as np
 
 from eigenshape._arguments import require_type
@@ -72,13 +74,22 @@ def find_duplicates(
             name = snapshot.name(place)
             if progress is not None:
                 progress(number / len(places), name)
-            descriptor, n_matches = snapshot.descriptor(place), AT_FIRST
-            found = reader.query(descriptor, n_matches=n_matches)
+            search = partial(
+                reader.search,
+                reader.state,
+                snapshot.descriptor(place),
+                where=None,
+                without=name,
+                exact=False,
+                is_scaled=False,  # or shapes would be less alike where others are like them
+            )
+            n_matches = AT_FIRST
+            found = search(n_matches)
             while len(found) == n_matches and found[-1].score <= most_score:
                 n_matches *= 4
-                found = reader.query(descriptor, n_matches=n_matches)
+                found = search(n_matches)
             for match in found:
-                if match.name != name and match.score <= most_score:
+                if match.score <= most_score:
                     pair = min(name, match.name), max(name, match.name)
                     pairs[pair] = min(match.score, pairs.get(pair, np.inf))
     return sorted(((*pair, score) for pair, score in pairs.items()), key=lambda row: (row[2], row))

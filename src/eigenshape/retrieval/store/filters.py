@@ -88,8 +88,7 @@ def choose_shapes(shapes: Shapes, where: Mapping[str, Any]) -> Bool[np.ndarray, 
     InvalidParameterError
         If a condition is none.
     """
-    require_type(where, Mapping, "where")
-    require_each(list(where), str, "where")
+    _require_keys(where)
     # The key without its sign, whether the condition must be met, and its test
     tests = [
         (key.removesuffix(NOT), not key.endswith(NOT), _condition(key.removesuffix(NOT), value))
@@ -115,9 +114,15 @@ def choose_shapes(shapes: Shapes, where: Mapping[str, Any]) -> Bool[np.ndarray, 
     return chosen
 
 
+def _require_keys(where: Mapping[str, Any]) -> None:
+    require_type(where, Mapping, "where")
+    require_each(list(where), str, "where")
+
+
 def require_attributes(shapes: Shapes, where: Mapping[str, Any]) -> None:
     """Raise an error if a condition is about an attribute of no shape, which is often misspelled."""
-    keys = {str(key).removesuffix(NOT) for key in where} - set(RESERVED)
+    _require_keys(where)
+    keys = {key.removesuffix(NOT) for key in where} - set(RESERVED)
     known: set[str] = set()
     for place in range(len(shapes.ids)):
         if keys <= known:  # usually after the first shape

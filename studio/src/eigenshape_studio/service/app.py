@@ -189,6 +189,8 @@ class Service:
         self, wanted: dict[str, Any], where: Mapping[str, Any] | None, suffix: str, data: bytes
     ) -> Response:
         await self._refresh()
+        if where is not None:  # before the mesh is described, which takes seconds
+            self.shelf.require_attributes(where)
         began = perf_counter()
         scan = await self.describers.describe(
             suffix, data, self.shelf.recipe, with_picture=wanted["picture"]
