@@ -146,8 +146,8 @@ def query(
             f"A picture shows one scan, of a file; {scan} is none. Leave --picture and --explain out."
         )
     with shelf.reader() as reader:
-        if filters is not None:  # before scans are described, which takes seconds
-            steps.require_attributes(reader.state.shapes, filters)
+        # Before scans are described, which takes seconds
+        steps.require_attributes(reader.state.shapes, filters)
         ask_index = partial(reader.query, where=filters, exact=exact)
         if is_file or is_folder:
             items = es.io.find_items(scan)
@@ -334,7 +334,9 @@ def print_matches(
 ) -> None:
     """Print matches, best first."""
     if not matches:
-        out.print(f"{escape_text(title)}: none; the index holds no other shape, or none agrees with the filters")
+        out.print(
+            f"{escape_text(title)}: none; the index holds no other shape, or none agrees with the filters"
+        )
         return
     rows = [
         [

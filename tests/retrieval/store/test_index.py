@@ -86,7 +86,7 @@ def test_a_shape_is_left_out_where_it_asks_itself(index):
         index.add_descriptors(name, [descriptor(seed)])
     assert [match.name for match in index.query(descriptor(0), without="one")] == ["two"]
     assert len(index.query(descriptor(0), without="one", where={"label": "cat"})) == 0
-    with pytest.raises(InvalidParameterError, match="without must be the name .*; 'six' is no"):
+    with pytest.raises(InvalidParameterError, match=r"without must be the name .*; 'six' is no"):
         index.query(descriptor(0), without="six")
 
 

@@ -82,16 +82,14 @@ def find_duplicates(
                 reader.search,
                 reader.state,
                 snapshot.descriptor(place),
-                where=None,
-                without=name,
-                exact=False,
+                chosen=np.arange(len(reader)) != snapshot.shape_of[place],
                 is_scaled=False,  # or shapes would be less alike where others are like them
             )
             n_matches = AT_FIRST
-            found = search(n_matches)
+            found = search(n_matches=n_matches)
             while len(found) == n_matches and found[-1].score <= most_score:
                 n_matches *= 4
-                found = search(n_matches)
+                found = search(n_matches=n_matches)
             for match in found:
                 if match.score <= most_score:
                     pair = min(name, match.name), max(name, match.name)

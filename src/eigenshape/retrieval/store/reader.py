@@ -178,39 +178,39 @@ class IndexReader:
         """
         wanted = whole_number(n_matches, "n_matches", 1, 2**31)
         state = self.state
-        if where is not None:  # before a mesh is described, which takes seconds
-            require_attributes(state.shapes, where)
-        if isinstance(shape, Descriptor):
-            descriptor = shape
-        else:
-            mesh, recipe = as_mesh(shape, "shape"), choose_recipe(list(state.recipes.values()))
-            descriptor = kind_of(recipe).describe_query(mesh, recipe)
-        return self.search(state, descriptor, wanted, where, without=without, exact=exact)
-
-    def search(
-        self,
-        state: IndexState,
-        descriptor: Descriptor,
-        n_matches: int,
-        where: Mapping[str, Any] | None,
-        *,
-        without: str | None = None,
-        exact: bool,
-        is_scaled: bool = True,
-    ) -> Matches:
-        """Search one state for a descriptor; an attribute of a condition may be that of no shape."""
-        chosen = None if where is None else choose_shapes(state.shapes, where)
-        snapshot = state.snapshot(descriptor.recipe)
-        allowed = np.ones(snapshot.n_shapes, dtype=bool)
-        if chosen is not None:
-            allowed = snapshot.mask(chosen)
+        # Before a mesh is described, which takes seconds
+        chosen = choose_shapes(state.shapes, where)
+        require_attributes(state.shapes, where)
         if without is not None:
             if without not in state.names:
                 raise InvalidParameterError(
                     f"without must be the name of a shape of the index; {without!r} is none. "
                     "`records` lists them."
                 )
-            allowed &= snapshot.shape_of != state.names[without]
+            chosen[state.names[without]] = False
+        if isinstance(shape, Descriptor):
+            descriptor = shape
+        else:
+            mesh, recipe = as_mesh(shape, "shape"), choose_recipe(list(state.recipes.values()))
+            descriptor = kind_of(recipe).describe_query(mesh, recipe)
+        return self.search(state, descriptor, wanted, chosen, exact=exact)
+
+    def search(
+        self,
+        state: IndexState,
+        descriptor: Descriptor,
+        n_matches: int,
+        chosen: Bool[np.ndarray, " n"],
+        *,
+        exact: bool = False,
+        is_scaled: bool = True,
+    ) -> Matches:
+        """Search one state for a descriptor, among the chosen ones of its n shapes.
+
+        Scores may be scaled by how isolated each shape is.
+        """
+        snapshot = state.snapshot(descriptor.recipe)
+        allowed = snapshot.mask(chosen)
         candidates = self._candidates(snapshot, descriptor, allowed, n_matches, exact=exact)
         matches, damages = search_candidates(
             snapshot, descriptor, candidates, n_matches, is_scaled=is_scaled
