@@ -346,6 +346,7 @@ WRONG_PARAMETERS = {
     "a long filter": ("/v1/query?name=a.ply&filter=" + "x" * 5000, "filter must have at most 4,0"),
     "no condition": ("/v1/query?name=a.ply&filter=cat", "such as label=cat, .*; it is 'cat'"),
     "no range": ("/v1/query?name=a.ply&filter=legs=a..b", "least and a largest number"),
+    "no attribute": ("/v1/query?name=a.ply&filter=height=1", "no shape has 'height'"),
     "two of one": ("/v1/query?name=a.ply&filter=tag=a&filter=tag=b", "'tag' has two"),
 }
 

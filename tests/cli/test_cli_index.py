@@ -210,7 +210,7 @@ def test_a_merge_names_shapes_that_queries_do_not_find(index, tmp_path):
     assert (again["added"], again["not_compared"]) == (0, ["apart"])
     assert run("query", index, "apart", code=1).stderr.count("Choose another --method") == 1
     empty = run("query", index, "fish/a", "--filter", "label=nobody").stdout
-    assert "none; no shape of the index agrees with the filters" in empty
+    assert "none; the index holds no other shape, or none agrees with the filters" in empty
 
 
 @pytest.mark.parametrize("text", ["3", "0/2", "3/2", "1/0", "a/b"])
@@ -265,6 +265,8 @@ def test_a_folder_and_a_shape_of_the_index_are_queries_too(meshes, index, tmp_pa
     alike = run_json("query", index, "fish/a", "-n", 1)["matches"]
     assert [match["name"] for match in alike] == ["fish/b"]
     assert "nobody is none of them" in run("query", index, "nobody", code=2).stderr
+    misspelled = run("query", index, meshes, "--filter", "sead=1", code=2).stderr
+    assert ("no shape has 'sead'" in misspelled, "not searched for" in misspelled) == (True, False)
     only = run_json("query", index, "fish/a", "--filter", "label=bird")["matches"]
     assert {match["label"] for match in only} == {"bird"}
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import typer
+from rich.cells import cell_len
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -49,8 +50,13 @@ def _plain(value: Any) -> Any:
 def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
     """Print rows under their headings, numbers to the right."""
     table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    rows = [
+        [printable(text) for text in row] for row in rows
+    ]  # escapes are wider than what they name
     cells = [[row[index] for row in rows] for index in range(len(columns))]
-    widths = [max(map(len, [name, *texts])) for name, texts in zip(columns, cells, strict=True)]
+    widths = [
+        max(map(cell_len, [name, *texts])) for name, texts in zip(columns, cells, strict=True)
+    ]
     numeric = [all(text[:1] in NUMBERS for text in texts) and any(texts) for texts in cells]
     # In a narrow terminal the longest texts are cut, numbers are not. Rich alone would leave no
     # character of a short column beside a long one.
@@ -66,7 +72,7 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
         justify: Literal["left", "right"] = "right" if numeric[index] and index else "left"
         table.add_column(column, justify=justify, no_wrap=True, width=width)
     for row in rows:
-        table.add_row(*map(escape_text, row))
+        table.add_row(*map(escape, row))
     out.print(table)
 
 

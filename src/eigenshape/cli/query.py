@@ -75,7 +75,7 @@ def query(
         typer.Argument(
             help="File to search for: a mesh, a point cloud or a frame of a depth camera (.pcd), of a "
             "whole shape or a part of one, in any pose; a folder of such files; or the name of a "
-            "shape of the index."
+            "shape of the index, which is left out of the answer."
         ),
     ],
     *,
@@ -146,6 +146,8 @@ def query(
             f"A picture shows one scan, of a file; {scan} is none. Leave --picture and --explain out."
         )
     with shelf.reader() as reader:
+        # Before scans are described, which takes seconds
+        steps.require_attributes(reader.state.shapes, filters)
         ask_index = partial(reader.query, where=filters, exact=exact)
         if is_file or is_folder:
             items = es.io.find_items(scan)
@@ -227,12 +229,11 @@ def _stored_descriptor(
 
 
 def _answer_stored(ask: Ask, name: str, descriptor: Descriptor, n_matches: int) -> _Answer:
-    """Search for shapes like one of the index, which itself is no match."""
+    """Search for the other shapes that are like one of the index."""
     began = perf_counter()
-    found = ask(descriptor, n_matches=n_matches + 1)
-    others = tuple(match for match in found if match.name != name)[:n_matches]
+    matches = ask(descriptor, n_matches=n_matches, without=name)
     seconds = {"describe": 0.0, "query": perf_counter() - began}
-    return _Answer(name, descriptor, replace(found, found=others), seconds)
+    return _Answer(name, descriptor, matches, seconds)
 
 
 def _write(answers: Sequence[_Answer], output: Path | None) -> None:
@@ -333,7 +334,9 @@ def print_matches(
 ) -> None:
     """Print matches, best first."""
     if not matches:
-        out.print(f"{escape_text(title)}: none; no shape of the index agrees with the filters")
+        out.print(
+            f"{escape_text(title)}: none; the index holds no other shape, or none agrees with the filters"
+        )
         return
     rows = [
         [

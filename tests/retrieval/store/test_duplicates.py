@@ -20,6 +20,17 @@ def test_copies_are_found_and_kinds_are_apart():
     assert len(find_duplicates(index, most_score=9)) == 6
 
 
+def test_two_shapes_are_as_alike_whatever_else_is_there():
+    index = es.ShapeIndex.create(None)
+    fish = es.make_creature("fish", n_vertices=500)
+    index.add("fish", fish, n_views=0)
+    index.add("turned", es.TriangleMesh(fish.vertices[:, [1, 2, 0]], fish.faces), n_views=0)
+    alone = find_duplicates(index)
+    for seed in (1, 2):
+        index.add(f"pose {seed}", es.make_creature("fish", seed, n_vertices=500), n_views=0)
+    assert alone[0] in find_duplicates(index)
+
+
 def test_more_copies_than_are_looked_at_first():
     index = es.ShapeIndex.create(None)
     described = [es.describe(es.make_creature("fish", n_vertices=500))]

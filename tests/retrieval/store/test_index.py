@@ -28,6 +28,7 @@ from eigenshape.retrieval.store import files as store
 from eigenshape.retrieval.store.change import Change
 from eigenshape.retrieval.store.damage import StoreWarning
 from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.shapes import icosphere, make_creature
 
 OTHER = replace(RECIPE, name="other", scales=tuple(float(2**step) for step in range(40)))
 
@@ -78,6 +79,25 @@ def test_a_shape_in_the_index_can_ask_for_its_like(index):
         match="A shape must be described by the requested recipe; 'two' is not described",
     ):
         index.descriptors("two", RECIPE)
+
+
+def test_a_shape_is_left_out_where_it_asks_itself(index):
+    for seed, name in enumerate(("one", "two")):
+        index.add_descriptors(name, [descriptor(seed)])
+    assert [match.name for match in index.query(descriptor(0), without="one")] == ["two"]
+    assert len(index.query(descriptor(0), without="one", where={"label": "cat"})) == 0
+    with pytest.raises(InvalidParameterError, match=r"without must be the name .*; 'six' is no"):
+        index.query(descriptor(0), without="six")
+
+
+def test_nothing_is_like_a_shape_but_itself():
+    index = ShapeIndex.create(None)
+    for name, mesh in {"fish": make_creature("fish", n_vertices=500), "ball": icosphere(3)}.items():
+        index.add(name, mesh, label=name, n_views=0)
+    (fish,) = index.descriptors("fish", index.default_recipe())
+    assert not index.query(fish).nothing_alike
+    others = index.query(fish, without="fish")
+    assert (others.nothing_alike, list(others.classify())) == (True, ["ball"])
 
 
 def test_equal_scores_are_sorted_by_name(index):

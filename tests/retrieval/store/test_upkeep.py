@@ -19,11 +19,8 @@ NAMES = (
     "/absolute",
     "C:\\windows\\path",
     "line\nbreak\ttab\rreturn\x1b[31m",
-    "nul\0inside",
     "'; DROP TABLE shape; --",
     "<script>alert(1)</script>",
-    "",
-    " ",
     4096 * "x",
 )
 

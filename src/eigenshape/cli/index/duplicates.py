@@ -19,7 +19,7 @@ def duplicates(
         typer.Option(
             min=0,
             help="Largest score of two shapes that count as nearly the same. Copies have a score "
-            "near 0, also if they are moved or scaled, and other poses mostly less than 0.1.",
+            "near 0, also if they are moved or scaled, and other poses often less than 0.1.",
         ),
     ] = 0.1,
     as_json: JsonOption = False,

@@ -45,6 +45,7 @@ from .records import count_shapes as count_shapes
 from .records import parse_filters as parse_filters
 from .records import read_stage as read_stage
 from .records import record_facts as record_facts
+from .records import require_attributes as require_attributes
 from .regions import parse_region as parse_region
 from .regions import parse_rotation as parse_rotation
 from .regions import parse_translation as parse_translation

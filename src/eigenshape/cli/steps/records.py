@@ -3,10 +3,10 @@
 from typing import Any
 
 from eigenshape.retrieval.store.batch import read_stage
-from eigenshape.retrieval.store.filters import parse_filters
+from eigenshape.retrieval.store.filters import parse_filters, require_attributes
 from eigenshape.retrieval.store.records import Record
 
-__all__ = ["count_shapes", "parse_filters", "read_stage", "record_facts"]
+__all__ = ["count_shapes", "parse_filters", "read_stage", "record_facts", "require_attributes"]
 
 
 def record_facts(record: Record) -> dict[str, Any]:

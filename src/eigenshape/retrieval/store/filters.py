@@ -74,20 +74,23 @@ def _number_or_text(text: str) -> float | str:
         return text
 
 
-def choose_shapes(shapes: Shapes, where: Mapping[str, Any]) -> Bool[np.ndarray, " n"]:
+def choose_shapes(shapes: Shapes, where: Mapping[str, Any] | None) -> Bool[np.ndarray, " n"]:
     """Return which shapes agree with all conditions of a filter.
 
     Parameters
     ----------
     shapes : Shapes
-    where : mapping
-        As of `ShapeIndex.query`.
+    where : mapping, optional
+        As of `ShapeIndex.query`; without it all are chosen.
 
     Raises
     ------
     InvalidParameterError
         If a condition is none.
     """
+    chosen = np.ones(len(shapes.ids), dtype=bool)
+    if where is None:
+        return chosen
     require_type(where, Mapping, "where")
     require_each(list(where), str, "where")
     # The key without its sign, whether the condition must be met, and its test
@@ -95,7 +98,6 @@ def choose_shapes(shapes: Shapes, where: Mapping[str, Any]) -> Bool[np.ndarray, 
         (key.removesuffix(NOT), not key.endswith(NOT), _condition(key.removesuffix(NOT), value))
         for key, value in where.items()
     ]
-    chosen = np.ones(len(shapes.ids), dtype=bool)
     for key, wanted, test in tests:
         if key == "label" and shapes.labels:  # by the codes alone: no text is read
             known = np.array([test(each) == wanted for each in shapes.labels], dtype=bool)
@@ -115,9 +117,11 @@ def choose_shapes(shapes: Shapes, where: Mapping[str, Any]) -> Bool[np.ndarray, 
     return chosen
 
 
-def require_attributes(shapes: Shapes, where: Mapping[str, Any]) -> None:
+def require_attributes(shapes: Shapes, where: Mapping[str, Any] | None) -> None:
     """Raise an error if a condition is about an attribute of no shape, which is often misspelled."""
-    keys = {str(key).removesuffix(NOT) for key in where} - set(RESERVED)
+    if where is None:
+        return
+    keys = {key.removesuffix(NOT) for key in where} - set(RESERVED)
     known: set[str] = set()
     for place in range(len(shapes.ids)):
         if keys <= known:  # usually after the first shape

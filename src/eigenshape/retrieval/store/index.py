@@ -463,6 +463,7 @@ class ShapeIndex:
         *,
         n_matches: SupportsIndex = 5,
         where: Mapping[str, Any] | None = None,
+        without: str | None = None,
         exact: bool = False,
     ) -> Matches:
         """Find the shapes that are most similar to a mesh, whole or partial, in any pose.
@@ -483,6 +484,9 @@ class ShapeIndex:
             ``{"label": ["cat", "dog"], "height": (1.5, None)}``. A key that ends in ``!=`` chooses
             the shapes that do not meet its condition, also those without the attribute:
             ``{"label!=": "cat"}``.
+        without : str, optional
+            Name of a shape that is left out, such as that of `descriptors` which are passed here:
+            it is like itself, whatever else the index holds.
         exact : bool
             Whether to compare all shapes with the query, however many there are. By default, of
             more than 2,000 shapes those are compared that a coarse scan finds nearest: some
@@ -500,8 +504,8 @@ class ShapeIndex:
         InvalidShapeError
             If a mesh is given, as `describe`.
         InvalidParameterError
-            If `n_matches` is not positive, a number of the descriptor is not finite, or a condition
-            is none or about an attribute that no shape has.
+            If `n_matches` is not positive, a number of the descriptor is not finite, a condition
+            is none or about an attribute that no shape has, or `without` names no shape.
         StoreError
             If no shape is described by the recipe, or the index cannot be read.
 
@@ -515,7 +519,9 @@ class ShapeIndex:
         describe, matching_score, patch_scores
         """
         with self.reader() as reader:
-            return reader.query(shape, n_matches=n_matches, where=where, exact=exact)
+            return reader.query(
+                shape, n_matches=n_matches, where=where, without=without, exact=exact
+            )
 
     def descriptors(self, name: str, recipe: AnyRecipe) -> list[Descriptor]:
         """Return the descriptors of a shape by a recipe, as they are stored.

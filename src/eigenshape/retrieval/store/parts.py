@@ -18,6 +18,7 @@ from eigenshape.retrieval.kinds import Descriptor, kind_of
 from eigenshape.retrieval.patches.verification import N_VERIFIED
 from eigenshape.retrieval.search.chances import chances
 from eigenshape.retrieval.store.catalog import DATABASE
+from eigenshape.retrieval.store.filters import choose_shapes
 from eigenshape.retrieval.store.reader import IndexReader, choose_recipe
 from eigenshape.retrieval.store.records import Match, Matches
 
@@ -184,7 +185,8 @@ def _ask(
     reader = _open_reader(folder)
     reader.refresh()
     # One of several indexes need not have each attribute.
-    return reader.search(reader.state, descriptor, n_matches, where, exact=exact)
+    chosen = choose_shapes(reader.state.shapes, where)
+    return reader.search(reader.state, descriptor, n_matches, chosen, exact=exact)
 
 
 def _open_reader(folder: Path) -> IndexReader:

@@ -154,6 +154,7 @@ class IndexReader:
         *,
         n_matches: SupportsIndex = 5,
         where: Mapping[str, Any] | None = None,
+        without: str | None = None,
         exact: bool = False,
     ) -> Matches:
         """Find the shapes that are most similar, as `ShapeIndex.query` does.
@@ -163,6 +164,7 @@ class IndexReader:
         shape : MeshLike, HeatDescriptor or PatchDescriptor
         n_matches : int
         where : mapping, optional
+        without : str, optional
         exact : bool
 
         Returns
@@ -176,34 +178,43 @@ class IndexReader:
         """
         wanted = whole_number(n_matches, "n_matches", 1, 2**31)
         state = self.state
+        # Before a mesh is described, which takes seconds
+        chosen = choose_shapes(state.shapes, where)
+        require_attributes(state.shapes, where)
+        if without is not None:
+            if without not in state.names:
+                raise InvalidParameterError(
+                    f"without must be the name of a shape of the index; {without!r} is none. "
+                    "`records` lists them."
+                )
+            chosen[state.names[without]] = False
         if isinstance(shape, Descriptor):
             descriptor = shape
         else:
             mesh, recipe = as_mesh(shape, "shape"), choose_recipe(list(state.recipes.values()))
             descriptor = kind_of(recipe).describe_query(mesh, recipe)
-        matches = self.search(state, descriptor, wanted, where, exact=exact)
-        if where is not None:
-            require_attributes(state.shapes, where)
-        return matches
+        return self.search(state, descriptor, wanted, chosen, exact=exact)
 
     def search(
         self,
         state: IndexState,
         descriptor: Descriptor,
         n_matches: int,
-        where: Mapping[str, Any] | None,
+        chosen: Bool[np.ndarray, " n"],
         *,
-        exact: bool,
+        exact: bool = False,
+        is_scaled: bool = True,
     ) -> Matches:
-        """Search one state for a descriptor; an attribute of a condition may be that of no shape."""
-        # Of the descriptor first, whose numbers may be refused
-        chosen = None if where is None else choose_shapes(state.shapes, where)
+        """Search one state for a descriptor, among the chosen ones of its n shapes.
+
+        Scores may be scaled by how isolated each shape is.
+        """
         snapshot = state.snapshot(descriptor.recipe)
-        allowed = np.ones(snapshot.n_shapes, dtype=bool)
-        if chosen is not None:
-            allowed = snapshot.mask(chosen)
+        allowed = snapshot.mask(chosen)
         candidates = self._candidates(snapshot, descriptor, allowed, n_matches, exact=exact)
-        matches, damages = search_candidates(snapshot, descriptor, candidates, n_matches)
+        matches, damages = search_candidates(
+            snapshot, descriptor, candidates, n_matches, is_scaled=is_scaled
+        )
         warn_of_damage(str(state.folder), damages)
         return matches
 

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.kinds import Descriptor, kind_of
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
+from eigenshape.retrieval.patches.isolation import USUAL_ISOLATION
 from eigenshape.retrieval.search.candidates import Candidates
 from eigenshape.retrieval.search.chances import chances, nothing_alike
 from eigenshape.retrieval.store.damage import Damage
@@ -18,12 +19,18 @@ from eigenshape.retrieval.store.writing import require_columns, rows_of_each
 
 @one_blas_thread()
 def search_candidates(
-    snapshot: Snapshot, descriptor: Descriptor, candidates: Candidates, n_matches: int
+    snapshot: Snapshot,
+    descriptor: Descriptor,
+    candidates: Candidates,
+    n_matches: int,
+    *,
+    is_scaled: bool = True,
 ) -> tuple[Matches, list[Damage]]:
     """Find the shapes with the lowest scores among the candidates of a query.
 
     Checksums are verified of the shapes that are returned, and of those whose points are matched.
-    A damaged shape is left out, and the search is made again.
+    A damaged shape is left out, and the search is made again. Unless the scores are scaled by how
+    isolated each shape is, they depend on the two shapes alone.
 
     Returns
     -------
@@ -41,7 +48,9 @@ def search_candidates(
     while len(places):
         # An exact search reads all shapes one after the other in any case.
         stored = snapshot.rows_of(places, read_ahead=candidates.method != "exact")
-        distances = kind.scores(query, stored, snapshot.isolations[places])
+        usual = np.full(len(places), USUAL_ISOLATION)
+        isolations = snapshot.isolations[places] if is_scaled else usual
+        distances = kind.scores(query, stored, isolations)
         try:
             for bad in places[~np.isfinite(distances)].tolist():
                 snapshot.verify(bad)

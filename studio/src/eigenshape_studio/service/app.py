@@ -189,6 +189,7 @@ class Service:
         self, wanted: dict[str, Any], where: Mapping[str, Any] | None, suffix: str, data: bytes
     ) -> Response:
         await self._refresh()
+        self.shelf.require_attributes(where)  # before the mesh is described, which takes seconds
         began = perf_counter()
         scan = await self.describers.describe(
             suffix, data, self.shelf.recipe, with_picture=wanted["picture"]

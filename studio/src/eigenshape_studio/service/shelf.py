@@ -133,6 +133,10 @@ class ShelfReader:
             self._index.remove(name)
         self.refresh(now=True)
 
+    def require_attributes(self, where: Mapping[str, Any] | None) -> None:
+        """Refuse conditions about an attribute that no shape has."""
+        require_attributes(self._reader.state.shapes, where)
+
     def query(
         self,
         descriptor: Any,
