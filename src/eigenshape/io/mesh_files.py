@@ -17,11 +17,11 @@ from eigenshape.io import glb_attributes, obj_attributes, off, ply, ply_attribut
 from eigenshape.io.attributes import (
     MeshAttributes,
     SourceFile,
-    carry_attributes,
     label_attributes,
     loss_sentence,
     plain_attributes,
 )
+from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.cells import require_kind
 from eigenshape.io.fields import FIELD_FORMATS, format_fields, read_field_attributes
