@@ -262,6 +262,8 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         1,
         lambda s: es.scans.random_planes(s.mesh, np.random.default_rng(0))[:, 3],
     ),
+    "cut_one_sided": (1, lambda s: es.geometry.cut_one_sided(s.mesh).mesh),
+    "decimate": (1, lambda s: es.geometry.decimate(s.mesh, ratio=0.5).mesh),
     "repair": (1, lambda s: es.repair(s.mesh, ["auto"]).mesh),
     "rig_shape": (1, lambda s: es.deform(s.rig, s.region, TURN)),
     "transport_vectors": (
@@ -347,6 +349,8 @@ ELSEWHERE = {
     "drop_unreferenced",
     "fuse_scans",
     "prepare_target",
+    "carry_attributes",
+    "write_fields",
 }
 
 

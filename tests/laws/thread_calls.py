@@ -178,6 +178,8 @@ class Shared:
         (self.labeled_folder / "animal.seg").write_text("\n".join(map(str, self.labels)))
         (self.labeled_folder / "names.txt").write_text("torso\nleg\n")
         self.bytes = es.retrieval.write_codebook(self.codebook)
+        es.io.write_fields(self.animal, self.folder / "fields.vtu", {"heat": self.heat})
+        self.attributes = es.read_mesh(self.folder / "ball.ply", attributes=True)[1]
 
 
 def drawn(figure: Any) -> bytes:
@@ -244,6 +246,17 @@ def answers(v: Shared) -> tuple[object, ...]:
     )
 
 
+def classes(v: Shared) -> dict[str, float]:
+    """Return the chances of the classes of a query by patches."""
+    return v.reader.query(v.by_patches[0], n_matches=5).classify()
+
+
+def decimated(v: Shared) -> tuple[object, ...]:
+    """Decimate a mesh, and carry a function and labels to the smaller one."""
+    done = es.geometry.decimate(v.animal, ratio=0.5)
+    return done, done.carry_values(v.heat), done.carry_labels(v.labels)
+
+
 def asked(v: Shared) -> tuple[object, ...]:
     """Ask the reader that all threads share."""
     snapshot = v.reader.snapshot(v.by_heat[0].recipe)
@@ -267,6 +280,7 @@ def cached(v: Shared) -> es.Spectrum:
 
 
 CALLS: dict[str, Callable[[Shared], object]] = {
+    "DecimatedMesh": decimated,
     "DeformationSession": session_of,
     "DepthCamera": lambda v: es.scans.simulate_scan(
         v.ball, rng(), camera=es.scans.DepthCamera(resolution=40)
@@ -294,6 +308,18 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "CoarseRows": engines,
     "FaissEngine": engines,
     "IndexReader": asked,
+    "Matches.classify": classes,
+    "carry_attributes": lambda v: es.io.carry_attributes(v.attributes, es.icosphere(1)).mesh,
+    "cut_one_sided": lambda v: es.geometry.cut_one_sided(v.animal),
+    "decimate": decimated,
+    "find_duplicates": lambda v: es.retrieval.find_duplicates(es.ShapeIndex.open(v.index.folder)),
+    "read_fields": lambda v: es.io.read_fields(v.folder / "fields.vtu"),
+    "split_solids": lambda v: es.geometry.split_solids(
+        v.solid.points, [[0, 1, 5, 4, 16, 17, 21, 20]]
+    ),
+    "write_fields": lambda v: written(
+        v.folder, ".vtu", lambda path: es.io.write_fields(v.animal, path, {"heat": v.heat})
+    ),
     "QdrantEngine": engines,
     "SpectralClusterer": lambda v: es.spectral.SpectralClusterer(3).fit_predict(v.torus.vertices),
     "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3).fit_transform(v.torus.vertices),

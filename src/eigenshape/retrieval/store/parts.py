@@ -186,7 +186,7 @@ def _ask(
     reader.refresh()
     # One of several indexes need not have each attribute.
     chosen = choose_shapes(reader.state.shapes, where)
-    return reader.search(reader.state, descriptor, n_matches, chosen, exact=exact)
+    return reader._search(reader.state, descriptor, n_matches, chosen, exact=exact)
 
 
 def _open_reader(folder: Path) -> IndexReader:

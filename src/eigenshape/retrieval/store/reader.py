@@ -193,9 +193,9 @@ class IndexReader:
         else:
             mesh, recipe = as_mesh(shape, "shape"), choose_recipe(list(state.recipes.values()))
             descriptor = kind_of(recipe).describe_query(mesh, recipe)
-        return self.search(state, descriptor, wanted, chosen, exact=exact)
+        return self._search(state, descriptor, wanted, chosen, exact=exact)
 
-    def search(
+    def _search(
         self,
         state: IndexState,
         descriptor: Descriptor,
