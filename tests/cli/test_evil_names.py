@@ -205,13 +205,13 @@ def test_messages(zoo, arguments, code):
 
 
 def test_warnings(zoo, monkeypatch):
-    def warn(path):
+    def warn(path, **_):
         import warnings
 
         warnings.warn(f"{path} is odd", UserWarning, stacklevel=1)
-        return es.icosphere(0)
+        return es.icosphere(0), ()
 
-    monkeypatch.setattr("eigenshape.cli.steps.reading.read_mesh", warn)
+    monkeypatch.setattr("eigenshape.io.mesh_files.load_mesh", warn)
     assert f"{SPELLED}0.ply is odd" in run("segment", zoo / f"{EVIL}0.ply").stderr
 
 

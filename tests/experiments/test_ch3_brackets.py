@@ -1,6 +1,7 @@
 """The brackets of ten shapes: the quick form shows what the text claims."""
 
 import json
+import runpy
 from pathlib import Path
 
 import pytest

@@ -151,6 +151,13 @@ def height() -> np.ndarray:
 
 
 # A right value of each type; of a mesh and its kin, `body` itself.
+def written_attributes() -> es.io.MeshAttributes:
+    """Return what a file of a mesh holds besides."""
+    es.write_mesh(body(), FOLDER / "held.ply")
+    attributes: es.io.MeshAttributes = es.read_mesh(FOLDER / "held.ply", attributes=True)[1]
+    return attributes
+
+
 VALUES: dict[Any, Callable[[], Any]] = {
     es.TriangleMesh: body,
     es.PointCloud: lambda: es.PointCloud(body().vertices),
@@ -213,6 +220,10 @@ VALUES: dict[Any, Callable[[], Any]] = {
 # A right value of each argument whose type is not ours, by its name; "function.name" where a name has several meanings.
 NAMED: dict[str, Callable[[], Any]] = {
     "alpha": lambda: 1.0,
+    "carry_attributes.attributes": written_attributes,
+    "decimate.n_faces": lambda: 100,
+    "write_fields.fields": lambda: {"height": height()},
+    "write_fields.path": lambda: FOLDER / "written.vtu",
     "set_threads.n": lambda: None,
     "match_shapes.scale": lambda: "known",
     "average_onto_points.values": face_vectors,

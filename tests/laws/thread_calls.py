@@ -772,7 +772,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ],
     "register_scans": lambda v: es.matching.register_scans(v.fish, v.fish).rotation,
     "fuse_scans": lambda v: es.matching.fuse_scans([v.fish_scan]).mesh.vertices,
-    "prepare_target": lambda v: es.matching.prepare_target(v.fish).unit,
+    "prepare_target": lambda v: es.matching.prepare_target(v.fish).area,
     "take_pose": lambda v: es.matching.take_pose(v.fish, v.fish_pose, match=v.fish_match),
     "figure_match": lambda v: drawn(es.plot.figure_match(v.fish, v.fish_pose, v.fish_match)),
     "transfer_deformation": lambda v: es.deformation.transfer_deformation(

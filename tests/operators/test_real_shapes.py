@@ -14,7 +14,11 @@ from eigenshape.operators.catalog import OPERATORS, build_laplacian
 FOLDERS = ("nasty", "tets", "points")
 pytestmark = [
     pytest.mark.data,
-    pytest.mark.filterwarnings("ignore:With the heat time", "ignore:A kernel of width"),
+    pytest.mark.filterwarnings(
+        "ignore:With the heat time",
+        "ignore:A kernel of width",
+        "ignore:.* were split into .* tetrahedra",
+    ),
 ]
 
 

@@ -58,7 +58,7 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
         max(map(cell_len, [name, *texts])) for name, texts in zip(columns, cells, strict=True)
     ]
     numeric = [all(text[:1] in NUMBERS for text in texts) and any(texts) for texts in cells]
-    # In a narrow terminal the longest texts are cut, numbers are not. Rich alone would leave no
+    # In a narrow terminal the longest texts are wrapped, numbers are not. Rich alone would leave no
     # character of a short column beside a long one.
     room = out.width - FRAME * len(columns) - 1
     longest = max(widths)
@@ -70,7 +70,7 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
         ]
     for index, (column, width) in enumerate(zip(columns, widths, strict=True)):
         justify: Literal["left", "right"] = "right" if numeric[index] and index else "left"
-        table.add_column(column, justify=justify, no_wrap=True, width=width)
+        table.add_column(column, justify=justify, no_wrap=numeric[index], width=width)
     for row in rows:
         table.add_row(*map(escape, row))
     out.print(table)
