@@ -40,7 +40,7 @@ K = 36
 Build = Callable[[es.TriangleMesh | es.SimplicialMesh], es.Laplacian]
 
 LINEAR: dict[str, Build] = {
-    "cotangent, lumped": es.cotangent_laplacian,
+    "cotangent, lumped": lambda mesh: es.cotangent_laplacian(mesh, "lumped"),
     "cotangent, consistent": lambda mesh: es.cotangent_laplacian(mesh, "consistent"),
     "cotangent, averaged": lambda mesh: es.cotangent_laplacian(mesh, "averaged"),
 }

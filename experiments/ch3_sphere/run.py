@@ -87,7 +87,7 @@ def noise_errors(n: int, k: int) -> dict[str, np.ndarray]:
     heard = {
         CORRECTED: es.mesh_laplacian(mesh, t=t, correct="log"),
         RANDOM_WALK: es.mesh_laplacian(mesh, t=t, correct="log", form="random-walk"),
-        LUMPED: es.cotangent_laplacian(mesh),
+        LUMPED: es.cotangent_laplacian(mesh, "lumped"),
     }
     exact = es.shapes.sphere_eigenvalues(k)[1:]
     return {

@@ -47,7 +47,7 @@ QUICK = {
 OPERATORS = {
     "mesh, literal": lambda mesh, t: es.mesh_laplacian(mesh, t=t),
     "mesh, corrected": lambda mesh, t: es.mesh_laplacian(mesh, t=t, correct="log"),
-    "cotangent, lumped": lambda mesh, t: es.cotangent_laplacian(mesh),
+    "cotangent, lumped": lambda mesh, t: es.cotangent_laplacian(mesh, "lumped"),
 }
 
 
