@@ -188,7 +188,7 @@ def read_fields(path: str | Path) -> Fields:
     -------
     dict of str to array
         By name; each has a row for every vertex or for every face. If a function on faces has the
-        name of one on vertices, it comes under "face_" and its name.
+        name of one on vertices, it comes under ``face_`` and its name.
 
     Raises
     ------
