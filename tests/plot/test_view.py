@@ -38,6 +38,7 @@ def test_view_hands_the_shape_and_its_values_to_the_widget(widgets):
 
 @pytest.mark.parametrize("missing", ["eigenshape_studio", "eigenshape_studio.widget"])
 def test_without_the_studio_view_says_what_to_install(monkeypatch, missing):
+    monkeypatch.delitem(sys.modules, "eigenshape_studio.widget", raising=False)
     monkeypatch.setitem(sys.modules, missing, None)
     with pytest.raises(es.MissingExtraError, match=r"pip install 'eigenshape-studio\[notebook\]'"):
         es.view(es.icosphere(1))
