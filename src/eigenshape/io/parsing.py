@@ -106,22 +106,28 @@ def require_finite(
     Raises
     ------
     InvalidShapeError
-        If a point is not finite, and such points are not to be left out.
+        If a point is not finite, and such points are not to be left out, or no face is without one.
     """
     is_surface = len(simplices) > 0 and simplices.shape[1] == points.shape[1] == 3
     noun = "vertex" if is_surface else "point"
     missing = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if missing.size and not drop_missing:
+    stays = ~np.isin(simplices, missing).any(axis=1)
+    nothing_stays = len(simplices) > 0 and not stays.any()
+    if missing.size and (nothing_stays or not drop_missing):
         first = int(missing[0])
+        remedy = (
+            "Without them no face is left."
+            if nothing_stays
+            else "Scanners write such points if they measured nothing: drop_missing=True, or "
+            "--repair drop_missing, leaves them out, and the faces at them."
+        )
         raise InvalidShapeError(
             f"{PLURALS.get(noun, 'points')} must be finite; {noun} {first} is {points[first].tolist()} "
-            f"({missing.size} such). Scanners write such points if they measured nothing: "
-            "drop_missing=True, or --repair drop_missing, leaves them out, and the faces at them."
+            f"({missing.size} such). {remedy}"
         )
     kept = np.delete(np.arange(len(points)), missing)
     if not missing.size:
         return points, simplices, kept, ()
-    stays = ~np.isin(simplices, missing).any(axis=1)
     # An index is lower by the number of missing points before it.
     renumbered = simplices[stays] - np.searchsorted(missing, simplices[stays])
     sentence = f"drop_missing left out {count_nouns(missing.size, noun)} without finite coordinates"
