@@ -27,30 +27,22 @@ RepairOption = Annotated[
         ),
     ),
 ]
+AUTO_REPAIRS = (
+    "Repairs to apply to each mesh first, in this order, separated by commas: "
+    f"{', '.join(MESH_REPAIRS)}. auto does what is needed, but fills no hole and "
+    "drops no component; none refuses meshes that need repair. "
+)
 IndexRepairOption = Annotated[
     str,
     typer.Option(
         "--repair",
         metavar="NAMES",
-        help=(
-            "Repairs to apply to each mesh first, in this order, separated by commas: "
-            f"{', '.join(MESH_REPAIRS)}. auto does what is needed, but fills no hole and "
-            "drops no component; none refuses meshes that need repair. Clouds and frames of a "
-            "depth camera become a surface first. By default auto."
-        ),
+        help=f"{AUTO_REPAIRS}Clouds and frames of a depth camera become a surface first. "
+        "By default auto.",
     ),
 ]
 AutoRepairOption = Annotated[
-    str,
-    typer.Option(
-        "--repair",
-        metavar="NAMES",
-        help=(
-            "Repairs to apply to each mesh first, in this order, separated by commas: "
-            f"{', '.join(MESH_REPAIRS)}. auto does what is needed, but fills no hole and "
-            "drops no component; none refuses meshes that need repair. By default auto."
-        ),
-    ),
+    str, typer.Option("--repair", metavar="NAMES", help=f"{AUTO_REPAIRS}By default auto.")
 ]
 MeshArgument = Annotated[
     Path,
