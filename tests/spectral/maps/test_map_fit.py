@@ -54,18 +54,19 @@ def test_the_map_does_not_depend_on_the_unit(hand, size):
 
 
 def test_orientation_tells_a_shape_from_its_mirror_image():
-    """An ellipsoid has seven symmetries besides itself; with faces turned inward a mirror image is found."""
-    ball = es.icosphere(3)
-    bumps = 1 + 0.1 * ball.vertices[:, 0] * ball.vertices[:, 1] * ball.vertices[:, 2]
-    shape = es.TriangleMesh(ball.vertices * [1.0, 1.5, 2.2] * bumps[:, None], ball.faces)
+    """An animal has one symmetry besides itself; with faces turned inward its mirror image is found."""
+    shape = es.make_creature("quadruped", n_vertices=500)
     spectrum = solve(shape, 60)
     inward = es.TriangleMesh(shape.vertices, shape.faces[:, ::-1])
+    centered = shape.vertices - shape.vertices.mean(axis=0)
     for target, handed in ((shape, 1), (inward, -1)):
         found = es.functional_map(
             spectrum, spectrum, n_modes=12, descriptors="waves", meshes=(shape, target)
         )
-        turned = np.linalg.lstsq(shape.vertices, shape.vertices[refined_points(found)])[0]
-        assert np.sign(np.linalg.det(turned)) == handed
+        turned = np.linalg.lstsq(centered, centered[refined_points(found)])[0]
+        assert np.linalg.det(turned) == pytest.approx(
+            handed, abs=0.2
+        )  # vertices are not quite mirrored
 
 
 def test_pairs_and_descriptors_work_together(hand, copy):
