@@ -33,7 +33,7 @@ from ugly_shapes import broken_variants
 
 import eigenshape as es
 from eigenshape.cli import app
-from eigenshape.geometry.repair import REPAIRS
+from eigenshape.geometry.repairs.repair import REPAIRS
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("EIGENSHAPE_DATA", ROOT.parent / "shared" / "data"))

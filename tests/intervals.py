@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from eigenshape.geometry.subdivision import subdivide
+from eigenshape.geometry.resolution.subdivision import subdivide
 
 
 def finer(mesh, times):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from eigenshape.geometry.subdivision import subdivide
+from eigenshape.geometry.resolution.subdivision import subdivide
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian

@@ -7,7 +7,7 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.calculus.signed_heat import signed_heat_distance
 from eigenshape.calculus.vector_heat import prepare_vector_heat
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.subdivision import subdivide
+from eigenshape.geometry.resolution.subdivision import subdivide
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.surfaces import grid, torus
 

@@ -14,7 +14,7 @@ from eigenshape.deformation.region import BoxRegion, BrushRegion, region_boundar
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.measure import surface_area
-from eigenshape.geometry.subdivision import subdivide
+from eigenshape.geometry.resolution.subdivision import subdivide
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.shapes.creatures import make_creature
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from eigenshape import TriangleMesh, deform, read_mesh, read_shape, repair, rig_shape, write_mesh
 from eigenshape.cli import app
 from eigenshape.deformation.handles import Translation
-from eigenshape.geometry.repair import REPAIRS
+from eigenshape.geometry.repairs.repair import REPAIRS
 from eigenshape.io.folders import find_items
 from eigenshape.io.labels import read_labels
 from eigenshape.shapes.creatures import make_creature

@@ -17,7 +17,7 @@ from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import region_boundary
 from eigenshape.deformation.rig import eigen_skeleton, rig_shape
 from eigenshape.deformation.skeleton import move_skeleton, skeleton_response
-from eigenshape.geometry.crossings import self_intersections
+from eigenshape.geometry.distances.crossings import self_intersections
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table

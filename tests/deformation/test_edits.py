@@ -18,7 +18,7 @@ from eigenshape.deformation.edits import (
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import BoxRegion, BrushRegion, region_mask
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.subdivision import subdivide
+from eigenshape.geometry.resolution.subdivision import subdivide
 
 HEAD, TAIL = (lump().vertices[:, 0] > 0.6, lump().vertices[:, 0] < -0.7)
 PULL = Translation([0.1, 1 / 3, -2e-17])

@@ -15,7 +15,7 @@ from eigenshape.features.segmentation import FeaturePoints, Segmentation, adjace
 from eigenshape.geometry.facets import facet_components, facet_table
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.subdivision import subdivide
+from eigenshape.geometry.resolution.subdivision import subdivide
 from eigenshape.geometry.topology import edge_table, face_pairs, submesh
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import curvature_tensors

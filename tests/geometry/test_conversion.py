@@ -12,7 +12,7 @@ from eigenshape.geometry.conversion import as_mesh, as_shape, as_simplicial, fro
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair_steps import weld
+from eigenshape.geometry.repairs.repair_steps import weld
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import is_closed
 from eigenshape.io.bridges import to_pyvista, to_trimesh

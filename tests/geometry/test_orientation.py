@@ -7,8 +7,8 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import enclosed_volume, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward, outward_vote
-from eigenshape.geometry.repair import repair
-from eigenshape.geometry.repair_steps import orient
+from eigenshape.geometry.repairs.repair import repair
+from eigenshape.geometry.repairs.repair_steps import orient
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.curvature import mean_curvature
 from eigenshape.retrieval.patches.patches import surface_patches

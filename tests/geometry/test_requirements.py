@@ -16,21 +16,21 @@ from broken_meshes import (
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.features.parts import find_parts
-from eigenshape.geometry.average_distance import average_geodesic_distance
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.cloud_measure import cloud_quadrature
 from eigenshape.geometry.curvature import gaussian_curvature
+from eigenshape.geometry.distances.average_distance import average_geodesic_distance
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.quadrature import mesh_quadrature
-from eigenshape.geometry.repair import REPAIRS, repair
+from eigenshape.geometry.repairs.repair import REPAIRS, repair
 from eigenshape.geometry.requirements import require_joined
+from eigenshape.geometry.samples.cloud_measure import cloud_quadrature
+from eigenshape.geometry.samples.quadrature import mesh_quadrature
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import curvature_tensors
+from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.operators.fem import fem_laplacian
-from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.smoothing import noise_level

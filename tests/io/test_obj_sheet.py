@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape import FileFormatError, TriangleMesh
-from eigenshape.geometry.repair import REPAIRS, repair
+from eigenshape.geometry.repairs.repair import REPAIRS, repair
 from eigenshape.io.attributes import plain_attributes
 from eigenshape.io.obj import parse
 from eigenshape.io.obj_sheet import format_sheet, read_sheet

@@ -16,19 +16,19 @@ from hypothesis import strategies as st
 
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair_steps import drop_duplicate_faces
+from eigenshape.geometry.repairs.repair_steps import drop_duplicate_faces
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.boundary import dirichlet_laplacian
-from eigenshape.operators.cloud_kernel import point_cloud_laplacian
+from eigenshape.operators.clouds.cloud_kernel import point_cloud_laplacian
+from eigenshape.operators.clouds.gaussian import gaussian_laplacian, mesh_laplacian
+from eigenshape.operators.clouds.kernel import neighbor_distance
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
-from eigenshape.operators.gaussian import gaussian_laplacian, mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
-from eigenshape.operators.kernel import neighbor_distance
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.creatures import make_creature

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import repair, suggest_repairs
+from eigenshape.geometry.repairs.repair import repair, suggest_repairs
 from eigenshape.geometry.requirements import require_describable, require_oriented, require_sound
 from eigenshape.geometry.topology import is_closed
 from eigenshape.geometry.union import disjoint_union

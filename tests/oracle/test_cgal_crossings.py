@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from igl.copyleft import cgal
 
-from eigenshape.geometry.crossings import self_intersections
+from eigenshape.geometry.distances.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import read_mesh
 

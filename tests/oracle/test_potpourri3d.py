@@ -18,7 +18,7 @@ from eigenshape.calculus.vector_heat import (
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_loops
-from eigenshape.operators.cloud_triangles import local_triangles
+from eigenshape.operators.clouds.cloud_triangles import local_triangles
 from eigenshape.operators.connection import tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian

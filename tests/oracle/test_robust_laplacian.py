@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import repair
+from eigenshape.geometry.repairs.repair import repair
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.operators.cloud_triangles import local_triangles
+from eigenshape.operators.clouds.cloud_triangles import local_triangles
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

@@ -23,7 +23,7 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, simplex_volumes, size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.operators import elements, flip_loops
-from eigenshape.operators.cloud_triangles import cloud_cover
+from eigenshape.operators.clouds.cloud_triangles import cloud_cover
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import delaunay_cover
 from eigenshape.operators.tufted import Triangulation

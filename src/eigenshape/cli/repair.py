@@ -9,7 +9,7 @@ import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, print_repairs, print_table, print_written
 from eigenshape.cli.inputs import CellsOption, JsonOption, MeshArgument
-from eigenshape.geometry.repair_names import MESH_REPAIRS
+from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 
 USUAL = "auto"
 ROWS = (

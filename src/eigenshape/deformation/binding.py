@@ -20,7 +20,7 @@ from eigenshape.deformation.rigidity import (
     pull_part,
     require_fixed_vertices,
 )
-from eigenshape.geometry.geodesic import geodesic_distance_to_set
+from eigenshape.geometry.distances.geodesic import geodesic_distance_to_set
 
 # (least extent of a region over that of the rest, number of modes): the rule of thesis 6.3.2.
 MODE_RULE = ((0.75, 8), (0.1, 50), (0.0, 300))

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from eigenshape.deformation.binding import Binding, pull_binding
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.rigidity import relax
-from eigenshape.geometry.crossings import self_intersections
+from eigenshape.geometry.distances.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 
 # Rounds of relaxation, at most: most bends settle in fewer than 30. A bar of 12,700 vertices that is

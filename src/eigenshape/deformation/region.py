@@ -23,7 +23,7 @@ from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.deformation.handles import as_vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.geodesic import geodesic_distance_to_set
+from eigenshape.geometry.distances.geodesic import geodesic_distance_to_set
 from eigenshape.geometry.mesh import TriangleMesh
 
 

@@ -12,8 +12,8 @@ from eigenshape.features.loops import extended_loops
 from eigenshape.features.union_loops import join_points
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
+from eigenshape.operators.clouds.neighbors import neighbor_graph
 from eigenshape.operators.graph import edge_graph
-from eigenshape.operators.neighbors import neighbor_graph
 
 # Nearest neighbors to which each point of a cloud is joined. More join what is separate, fewer
 # break what is whole.

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.sparse import csr_array
 
-from eigenshape.geometry.closest import closest_points
-from eigenshape.geometry.closest_loops import nearest_around
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.distances.closest import closest_points
+from eigenshape.geometry.distances.closest_loops import nearest_around
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape._files import require_regular
-from eigenshape.geometry.repair_report import PLURALS, count_nouns
+from eigenshape.geometry.repairs.repair_report import PLURALS, count_nouns
 from eigenshape.io import glb, gmsh, medit, npz, obj, off, ply, stl, vtk_legacy, vtu
 from eigenshape.io.cell_kinds import CellKind
 from eigenshape.io.cells import SEGMENTS, Blocks, select_cells, split_sentence

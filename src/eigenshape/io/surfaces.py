@@ -8,8 +8,8 @@ from eigenshape._files import as_path, read_regular
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import repair, suggest_repairs
-from eigenshape.geometry.repair_report import RepairedMesh
+from eigenshape.geometry.repairs.repair import repair, suggest_repairs
+from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.io import pcd

@@ -8,7 +8,7 @@ from jaxtyping import Int
 
 from eigenshape.geometry.measure import face_areas, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair_report import count_nouns
+from eigenshape.geometry.repairs.repair_report import count_nouns
 from eigenshape.geometry.topology import submesh, vertex_components
 from eigenshape.matching.working_copy import WorkingCopy, make_working_copy
 from eigenshape.operators.smoothing import denoise

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._threads import map_in_threads
-from eigenshape.geometry.geodesic import geodesic_waves
+from eigenshape.geometry.distances.geodesic import geodesic_waves
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes

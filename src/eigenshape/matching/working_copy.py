@@ -11,9 +11,9 @@ from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import edge_lengths, mean_normals, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
-from eigenshape.geometry.repair import repair
-from eigenshape.geometry.repair_steps import largest_component
-from eigenshape.geometry.thinning import thin_out
+from eigenshape.geometry.repairs.repair import repair
+from eigenshape.geometry.repairs.repair_steps import largest_component
+from eigenshape.geometry.resolution.thinning import thin_out
 from eigenshape.geometry.topology import edge_table, submesh
 from eigenshape.matching.refinement_loops import nearest_face_points
 

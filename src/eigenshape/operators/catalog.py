@@ -14,12 +14,12 @@ from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.operators.cloud_kernel import point_cloud_laplacian
+from eigenshape.operators.clouds.cloud_kernel import point_cloud_laplacian
+from eigenshape.operators.clouds.gaussian import mesh_laplacian
+from eigenshape.operators.clouds.kernel import UnevenSpacingError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_laplacian
-from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.graph import graph_laplacian
-from eigenshape.operators.kernel import UnevenSpacingError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.robust import robust_laplacian
 

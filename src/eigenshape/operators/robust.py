@@ -19,7 +19,7 @@ from eigenshape.geometry.simplices import (
 )
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops
-from eigenshape.operators.cloud_triangles import cloud_cover
+from eigenshape.operators.clouds.cloud_triangles import cloud_cover
 from eigenshape.operators.graph import require_distinct_corners
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import (

@@ -13,7 +13,7 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair_steps import faces_of_largest
+from eigenshape.geometry.repairs.repair_steps import faces_of_largest
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import submesh
 from eigenshape.scans.frames import pixel_faces

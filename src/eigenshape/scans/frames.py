@@ -7,7 +7,7 @@ from scipy.spatial import Delaunay
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair_report import RepairedMesh
+from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import submesh
 

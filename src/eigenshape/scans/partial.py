@@ -15,7 +15,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import face_areas, mean_normals, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair_steps import faces_of_largest
+from eigenshape.geometry.repairs.repair_steps import faces_of_largest
 from eigenshape.geometry.topology import is_closed, submesh
 from eigenshape.scans.raster import rasterize
 

@@ -5,7 +5,7 @@ from jaxtyping import Int
 
 from eigenshape._arrays import positive_values, whole_number
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.subdivision import subdivide
+from eigenshape.geometry.resolution.subdivision import subdivide
 
 
 def icosphere(level: int = 3) -> TriangleMesh:

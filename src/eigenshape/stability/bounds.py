@@ -12,7 +12,7 @@ from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.kernel import EDGE_FACTOR, LAST
+from eigenshape.operators.clouds.kernel import EDGE_FACTOR, LAST
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 
 # Points up to which the norm comes from a dense eigensolver: Lanczos' method needs more points than

@@ -14,8 +14,8 @@ from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.least_matching import least_perfect, near_pairs
 from eigenshape.features.matching_loops import match_rows
+from eigenshape.geometry.samples.surface_points import SurfacePoints
 from eigenshape.geometry.simplices import size_one
-from eigenshape.geometry.surface_points import SurfacePoints
 from eigenshape.stability.anchors import preimages, regions_met
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 

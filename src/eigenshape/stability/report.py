@@ -15,7 +15,7 @@ from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.catalog import build_laplacian
-from eigenshape.operators.kernel import neighbor_distance
+from eigenshape.operators.clouds.kernel import neighbor_distance
 from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.comparison.spectra import SpectrumComparison, compare_spectra

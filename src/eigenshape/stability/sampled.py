@@ -11,17 +11,17 @@ from eigenshape._arrays import freeze
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
-from eigenshape.geometry.quadrature import uniform_quadrature
-from eigenshape.geometry.surface_points import sample_surface
-from eigenshape.operators.kernel import (
+from eigenshape.geometry.samples.quadrature import uniform_quadrature
+from eigenshape.geometry.samples.surface_points import sample_surface
+from eigenshape.operators.clouds.kernel import (
     KernelOptions,
     choose_kernel,
     kernel_laplacian,
     neighbor_distance,
     require_whole,
 )
+from eigenshape.operators.clouds.neighbors import neighbor_graph
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.operators.neighbors import neighbor_graph
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum

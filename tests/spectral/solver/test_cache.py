@@ -9,8 +9,8 @@ import pytest
 
 import eigenshape
 from eigenshape._errors import InvalidParameterError
+from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral import archive, solve

@@ -5,7 +5,7 @@ import pytest
 import scipy.linalg as sl
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.operators.gaussian import mesh_laplacian
+from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy

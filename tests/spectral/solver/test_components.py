@@ -7,8 +7,8 @@ from pencils import cycle, dense_eigenvalues, graph, path
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union
+from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads

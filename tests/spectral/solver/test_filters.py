@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.operators.gaussian import mesh_laplacian
+from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import torus
 from eigenshape.spectral.solver import filters
 from eigenshape.spectral.solver.filters import chebyshev_filter

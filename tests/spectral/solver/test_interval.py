@@ -4,8 +4,8 @@ from pencils import cycle, dense_eigenvalues, graph, hypercube, tetrahedra
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.gaussian import mesh_laplacian
 from eigenshape.shapes.domains import irregular_grid
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere, torus

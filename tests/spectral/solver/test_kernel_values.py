@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape.operators.gaussian import mesh_laplacian
+from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.certify import certify

@@ -12,7 +12,7 @@ from eigenshape.deformation.binding import bind
 from eigenshape.deformation.distortion import measure_distortion
 from eigenshape.deformation.edits import Edit
 from eigenshape.deformation.rig import EigenRig
-from eigenshape.geometry.crossings import self_intersections
+from eigenshape.geometry.distances.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.edits import read_edits
 

@@ -9,8 +9,8 @@ from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import suggest_repairs
-from eigenshape.geometry.repair_steps import drop_duplicate_points
+from eigenshape.geometry.repairs.repair import suggest_repairs
+from eigenshape.geometry.repairs.repair_steps import drop_duplicate_points
 from eigenshape.geometry.simplices import degenerate_simplices, mean_side_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import (
@@ -25,7 +25,7 @@ from eigenshape.geometry.topology import (
     unreferenced_vertices,
     vertex_components,
 )
-from eigenshape.operators.kernel import neighbor_distance
+from eigenshape.operators.clouds.kernel import neighbor_distance
 
 MEASURES = {1: "length", 2: "area"}
 

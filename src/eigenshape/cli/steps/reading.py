@@ -14,8 +14,8 @@ from eigenshape.cli.inputs import drops_missing, repair_names
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import repair
-from eigenshape.geometry.repair_report import RepairedCloud, RepairedMesh
+from eigenshape.geometry.repairs.repair import repair
+from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io import mesh_files, shape_files
 from eigenshape.io.cell_kinds import CellKind

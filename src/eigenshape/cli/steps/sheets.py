@@ -15,7 +15,7 @@ from eigenshape.cli.console import err, escape_text, progress_bar
 from eigenshape.cli.steps.reading import read_repaired
 from eigenshape.cli.steps.views import Side
 from eigenshape.deformation.rigidity import nearest_rotations
-from eigenshape.geometry.geodesic import geodesic_distances
+from eigenshape.geometry.distances.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one

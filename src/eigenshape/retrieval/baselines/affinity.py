@@ -8,7 +8,7 @@ from jaxtyping import Float
 from eigenshape._arrays import whole_number
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.geodesic import farthest_points
+from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.retrieval.baselines.shape_dna import N_VALUES, require_same_length
 

@@ -17,9 +17,9 @@ from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.region_tree import MergeTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.fragments import fragment_vertices
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.repairs.fragments import fragment_vertices
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import boundary_edges, vertex_components
 from eigenshape.operators.boundary import dirichlet_laplacian

@@ -13,15 +13,15 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.fragments import fragment_vertices
-from eigenshape.geometry.geodesic import farthest_points
+from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_box
 from eigenshape.geometry.orientation import orient_outward
+from eigenshape.geometry.repairs.fragments import fragment_vertices
 from eigenshape.geometry.requirements import require_describable, require_oriented
+from eigenshape.geometry.resolution.thinning import thin_out
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.thinning import thin_out
 from eigenshape.geometry.topology import boundary_vertices, is_closed, submesh
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.patch_loops import (

@@ -20,9 +20,9 @@ from eigenshape._workers import Outcome, run_in_workers
 from eigenshape._workers import Workers as Workers  # noqa: PLC0414 - and this
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair import repair
-from eigenshape.geometry.repair_names import require_repairs
-from eigenshape.geometry.repair_report import RepairedMesh
+from eigenshape.geometry.repairs.repair import repair
+from eigenshape.geometry.repairs.repair_names import require_repairs
+from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descriptor

@@ -9,8 +9,8 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
+from eigenshape.operators.clouds.neighbors import nearest_others
 from eigenshape.operators.graph import edge_graph
-from eigenshape.operators.neighbors import nearest_others
 
 # Neighbors of a point of a cloud, for its normal and its gradient, as in DiffusionNet.
 CLOUD_NEIGHBORS = 30

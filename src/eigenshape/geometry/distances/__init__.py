@@ -1,0 +1,1 @@
+"""Distances: along a surface, to a surface, and faces that cross."""

@@ -1,0 +1,369 @@
+"""Geodesic distances on surfaces, and farthest points."""
+
+from collections.abc import Callable, Iterator
+from itertools import chain, islice
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from eigenshape._arrays import positive_values, whole_number, whole_numbers
+from eigenshape._errors import InvalidShapeError
+from eigenshape._threads import map_in_threads
+from eigenshape._typing import ArrayLike, Integer
+from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.distances.geodesic_loops import spread_wave, spread_waves
+from eigenshape.geometry.simplices import in_length, scaled_corners
+from eigenshape.geometry.simplicial import Mesh
+
+# Sources of one task of the thread pool: enough that starting a task costs nothing beside it, few
+# enough that all cores have work.
+SOURCES_PER_TASK = 256
+# Waves over all vertices for which a task has room at a time.
+WAVES_OF_ROOM = 2
+
+# Where the triangles at each vertex start, their other two corners, and seven lengths of each.
+Fans = tuple[
+    Int[np.ndarray, " n1"], Int[np.ndarray, " k"], Int[np.ndarray, " k"], Float[np.ndarray, "k 7"]
+]
+
+
+def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
+    """Compute the geodesic distances between all vertices within a radius of each other.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        A surface, in any R^d.
+    radius : float
+        Largest distance, in length.
+
+    Returns
+    -------
+    (n, n) scipy.sparse.csr_array
+        Distances between different vertices, in length; symmetric, with sorted columns.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh does not have dimension 2.
+    InvalidParameterError
+        If the radius is not positive and finite.
+
+    See Also
+    --------
+    geodesic_distances : Distances from some vertices to all others.
+
+    Notes
+    -----
+    Waves start at each vertex as in Dijkstra's algorithm. A wave crosses a triangle as if the
+    surface behind it were flat: the source is placed in the plane of the triangle by the distances
+    of two corners (Novotni and Klein 2002). The result is exact on flat regions. Of the distances
+    in the two directions the smaller one is returned.
+
+    Examples
+    --------
+    On a flat grid with unit squares, vertex 0 has two neighbors at distance 1 and one at √2.
+
+    >>> import eigenshape as es
+    >>> grid = es.shapes.grid(3, 3, width=3, height=3)
+    >>> es.geometry.geodesic_balls(grid, 1.5)[[0]].data.round(4).tolist()
+    [1.0, 1.0, 1.4142]
+    """
+    mesh = as_simplicial(mesh)
+    _require_surface(mesh)
+    positive_values(radius, "radius")
+    corners, scale = scaled_corners(mesh)
+    fans, n = _fans(mesh, corners), mesh.n_points
+
+    def waves_from(first: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        sources = np.arange(first, min(first + SOURCES_PER_TASK, n))
+        scratch, counts = _scratch(fans, 1), np.empty(len(sources), dtype=np.int64)
+        # Room for the longest wave, and for many short ones in each compiled call.
+        reached, distances = (
+            np.empty(WAVES_OF_ROOM * n, dtype=np.int64),
+            np.empty(WAVES_OF_ROOM * n),
+        )
+        waves = []
+        while len(sources):
+            done = spread_waves(fans, radius / scale, sources, scratch, counts, reached, distances)
+            total = counts[:done].sum()
+            waves.append((counts[:done].copy(), reached[:total].copy(), distances[:total].copy()))
+            sources = sources[done:]
+        return waves
+
+    tasks = map_in_threads(waves_from, range(0, n, SOURCES_PER_TASK))
+    parts = zip(*chain.from_iterable(tasks), strict=True)
+    counts, columns, distances = (np.concatenate(part) for part in parts)
+    rows = np.concatenate([[0], np.cumsum(counts)])
+    found = sp.csr_array((in_length(distances, scale, 1), columns, rows), shape=(n, n))
+    found.sort_indices()
+    # An entry that only one direction has is 0 in the other, and the minimum removes it.
+    return found.minimum(found.T)
+
+
+def geodesic_distances(mesh: MeshLike, sources: ArrayLike) -> Float[np.ndarray, "k n"]:
+    """Compute the geodesic distances from some vertices to all vertices.
+
+    The method is that of `geodesic_balls`, in the direction from the sources only.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        A surface, in any R^d.
+    sources : (k,) int
+        Vertices.
+
+    Returns
+    -------
+    (k, n) float
+        Distance from each source to each vertex, in length; infinite between components.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh does not have dimension 2.
+    InvalidParameterError
+        If a source is not a vertex.
+
+    See Also
+    --------
+    geodesic_distance_to_set : Distance to the nearest of several vertices.
+    geodesic_balls : Distances between all near vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> grid = es.shapes.grid(2, 2, width=2, height=2)
+    >>> es.geometry.geodesic_distances(grid, [0]).round(4).tolist()
+    [[0.0, 1.0, 2.0, 1.0, 1.4142, 2.2361, 2.0, 2.2361, 2.8284]]
+    """
+    mesh = as_simplicial(mesh)
+    wave = geodesic_waves(mesh)
+    wanted = whole_numbers(sources, "A source", 0, mesh.n_points - 1)
+    return np.array([wave(source) for source in wanted]).reshape(-1, mesh.n_points)
+
+
+def geodesic_distance_to_set(
+    mesh: MeshLike, sources: ArrayLike, *, reach: float = np.inf
+) -> Float[np.ndarray, " n"]:
+    """Compute the geodesic distance from each vertex to the nearest of several sources.
+
+    One wave starts from all sources at once. An edge between two sources is a source along its
+    whole length.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        A surface, in any R^d.
+    sources : (k,) int
+        Vertices.
+    reach : float
+        Largest distance that is needed, in length. A smaller reach takes less time.
+
+    Returns
+    -------
+    (n,) float
+        Distance of each vertex, in length; infinite beyond `reach`, and on components without a
+        source.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh does not have dimension 2.
+    InvalidParameterError
+        If a source is not a vertex.
+
+    See Also
+    --------
+    geodesic_distances : Distances from each source by itself.
+
+    Examples
+    --------
+    The distance of each vertex of a grid from its left side.
+
+    >>> import eigenshape as es
+    >>> grid = es.shapes.grid(2, 2, width=2, height=2)
+    >>> es.geometry.geodesic_distance_to_set(grid, [0, 1, 2]).round(6).tolist()
+    [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+    """
+    mesh = as_simplicial(mesh)
+    wave = geodesic_waves(mesh)
+    return wave(np.unique(whole_numbers(sources, "A source", 0, mesh.n_points - 1)), reach)
+
+
+def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
+    """Return a function that computes geodesic distances on one mesh, many times.
+
+    What `geodesic_distance_to_set` prepares at each call is prepared once. On 25,000 vertices that
+    takes 60 ms, and a disc of a thousand vertices then takes less than 1 ms.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        A surface, in any R^d.
+
+    Returns
+    -------
+    callable
+        Called as ``wave(sources, reach)`` with one or several vertices and the largest distance
+        that is needed, in length. Returns the distance of each vertex to the nearest source, (n,),
+        infinite beyond the reach.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the mesh does not have dimension 2.
+
+    See Also
+    --------
+    geodesic_distance_to_set : Distance to the nearest of several vertices, once.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> wave = es.geometry.geodesic_waves(es.shapes.grid(2, 2, width=2, height=2))
+    >>> wave(0, 1.0).tolist()
+    [0.0, 1.0, inf, 1.0, inf, inf, inf, inf, inf]
+    """
+    mesh = as_simplicial(mesh)
+    _require_surface(mesh)
+    corners, scale = scaled_corners(mesh)
+    fans, n = _fans(mesh, corners), mesh.n_points
+
+    def wave(source: ArrayLike, reach: float = np.inf) -> Float[np.ndarray, " n"]:
+        sources = np.atleast_1d(np.asarray(source, dtype=np.int64))
+        reached, distances = np.empty(n, dtype=np.int64), np.empty(n)
+        scratch = _scratch(fans, len(sources))
+        count = spread_wave(fans, reach / scale, sources, scratch, reached, distances)
+        found = np.full(n, np.inf)
+        found[reached[:count]] = in_length(distances[:count], scale, 1)
+        return found
+
+    return wave
+
+
+def farthest_points(
+    mesh: MeshLike, count: Integer, *, reach: float = np.inf
+) -> tuple[Int[np.ndarray, " c"], Float[np.ndarray, "c n"], Int[np.ndarray, " n"]]:
+    """Choose vertices of a surface, each as far as possible from those chosen before.
+
+    The first is the vertex farthest from vertex 0 (Eldar and others 1997). A component without a
+    chosen vertex is farther than everything else.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        A surface, in any R^d.
+    count : int
+        Number c of vertices to choose, at most n.
+    reach : float
+        Largest distance that is needed in `distances`, in length. A smaller reach takes less time.
+
+    Returns
+    -------
+    chosen : (c,) int
+        Vertices, in the order in which they were chosen.
+    distances : (c, n) float
+        Geodesic distance from each of them to all vertices, in length; infinite between
+        components, and possibly beyond `reach`.
+    nearest : (n,) int
+        For each vertex, the position in `chosen` of the nearest chosen vertex.
+
+    Raises
+    ------
+    InvalidParameterError
+        If count is not in 1..n.
+    InvalidShapeError
+        If the mesh does not have dimension 2.
+
+    See Also
+    --------
+    geodesic_distances : Distances from given vertices.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> strip = es.shapes.grid(4, 1, width=4, height=0.1)
+    >>> chosen, _, nearest = es.geometry.farthest_points(strip, 2)
+    >>> strip.vertices[chosen, 0].tolist()
+    [4.0, 0.0]
+    """
+    mesh = as_simplicial(mesh)
+    wave, n = geodesic_waves(mesh), mesh.n_points
+    count = whole_number(count, "count", 1, n)
+    chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
+    least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
+    first = int(wave(0).argmax())
+    for number, (vertex, row) in enumerate(
+        islice(farthest_first(wave, n, first, reach=reach), count)
+    ):
+        chosen[number], rows[number] = vertex, row
+        nearer = row < least
+        least[nearer], nearest[nearer] = row[nearer], number
+    return chosen, rows, nearest
+
+
+def farthest_first(
+    wave: Callable[..., Float[np.ndarray, " n"]], n: int, first: int, *, reach: float = 0.0
+) -> Iterator[tuple[int, Float[np.ndarray, " n"]]]:
+    """Yield vertices without end, each as far as possible from those before, and their distances.
+
+    Distances are computed up to `reach`, and always as far as they are smaller than those from all
+    vertices before.
+    """
+    least, vertex = np.full(n, np.inf), first
+    while True:
+        row = wave(vertex, max(reach, least.max()))
+        yield vertex, row
+        np.minimum(least, row, out=least)
+        vertex = int(least.argmax())
+
+
+def _require_surface(mesh: Mesh) -> None:
+    if mesh.dim != 2:
+        raise InvalidShapeError(
+            f"Geodesic distances need a mesh of dimension 2; this one has dimension {mesh.dim}."
+        )
+
+
+def _scratch(fans: Fans, n_sources: int) -> tuple[np.ndarray, ...]:
+    """Return the memory that `spread_wave` needs while it runs."""
+    n, n_waves = len(fans[0]) - 1, len(fans[1]) + n_sources
+    vertices, settled = np.empty((2, n), dtype=np.int64), np.zeros(n, dtype=np.bool_)
+    heap = np.empty(n_waves), np.empty(n_waves, dtype=np.int64)
+    return np.full(n, np.inf), settled, *vertices, *heap
+
+
+def _fans(mesh: Mesh, corners: Float[np.ndarray, "f 3 d"]) -> Fans:
+    """List the triangles at each vertex: where they start, their other two corners, seven lengths.
+
+    The lengths of a triangle are those from the vertex to each other corner and between these two,
+    and the places of both corners (`_place`), which every wave would compute anew.
+    """
+    turns = [np.roll(np.arange(3), -turn) for turn in range(3)]
+    triples = np.concatenate([mesh.simplices[:, turn] for turn in turns])
+    a, b, c = corners.transpose(1, 0, 2)
+    ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
+    sides = (ab, ca, bc), (bc, ab, ca), (ca, bc, ab)  # as seen from a, b and c
+    lengths = [
+        np.column_stack([one, two, across, *_place(two, one, across), *_place(one, two, across)])
+        for one, two, across in sides
+    ]
+    order = np.argsort(triples[:, 0], kind="stable")
+    starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
+    one, two = (np.ascontiguousarray(triples[order, place]) for place in (1, 2))
+    return starts, one, two, np.concatenate(lengths)[order]
+
+
+def _place(
+    edge: Float[np.ndarray, " f"], left: Float[np.ndarray, " f"], right: Float[np.ndarray, " f"]
+) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, " f"]]:
+    """Return where the third corners of triangles are, along an edge and away from it.
+
+    `left` and `right` are the distances of the corner from the first and the other end of the edge.
+    Where an edge has no length, no wave passes through it, and the place is not used.
+    """
+    length = np.where(edge > 0, edge, 1)
+    along = (left * left - right * right + edge * edge) / (2 * length)
+    return along, np.sqrt(np.maximum(left * left - along * along, 0))

@@ -1,0 +1,1 @@
+"""Repairs of meshes and clouds, each by its name."""

@@ -1,0 +1,104 @@
+"""Pieces with one side only, such as a Möbius strip, cut open so that they have two."""
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Bool, Int
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.face_turns import double_cover, face_neighbors, face_turns, turn_faces
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
+from eigenshape.geometry.topology import edge_table
+
+
+def cut_one_sided(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
+    """Cut pieces with one side only, such as Möbius strips, so that their faces can be oriented.
+
+    In each such piece, faces are turned alike outward from the first face, and edges where they
+    meet turned against each other are cut. Vertices on a cut occur once for each side of it.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+
+    Returns
+    -------
+    RepairedMesh
+
+    See Also
+    --------
+    orient : Turn the faces of pieces with two sides.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> strip = [[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 0, 4], [4, 0, 1]]
+    >>> points = [[0, 0, 0], [1, 0, 1], [2, 0, 0], [2, 1, 1], [0, 1, 0]]
+    >>> es.geometry.cut_one_sided((points, strip)).report
+    ('cut_one_sided cut 1 piece with one side only along 1 edge, and added 2 vertices',)
+    """
+    mesh = as_mesh(mesh)
+    turns = face_turns(mesh)
+    patches, roots = np.unique(turns.patches[~turns.orientable], return_index=True)
+    roots = np.flatnonzero(~turns.orientable)[roots]
+    turned = np.zeros(mesh.n_faces, dtype=bool)
+    cut = np.zeros(len(edge_table(mesh).edges), dtype=bool)
+    if len(roots):
+        # Each face shows the side that fewer steps join with the front of the first face.
+        cover = double_cover(mesh).tocsr()
+        steps = dijkstra(cover, directed=False, indices=roots, unweighted=True, min_only=True)
+        front, back = steps[: mesh.n_faces], steps[mesh.n_faces :]
+        turned = ~turns.orientable & (back < front)
+        pairs = face_neighbors(mesh)
+        against = (turned[pairs.one] == turned[pairs.two]) != pairs.agree
+        cut[pairs.edges[against & ~turns.orientable[pairs.one]]] = True
+    opened = cut_edges(mesh, cut)
+    n_new = opened.mesh.n_vertices - mesh.n_vertices
+    report = (
+        f"cut_one_sided cut {count_nouns(len(patches), 'piece')} with one side only along "
+        f"{count_nouns(int(cut.sum()), 'edge')}, and added {count_nouns(n_new, 'vertex')}"
+    )
+    return RepairedMesh(turn_faces(opened.mesh, turned), (report,), opened.source_vertices)
+
+
+def cut_edges(
+    mesh: TriangleMesh, cut: Bool[np.ndarray, " e"], apart: Int[np.ndarray, " k"] | None = None
+) -> RepairedMesh[TriangleMesh]:
+    """Cut a mesh open along some of its edges, and at vertices `apart` where only corners touch.
+
+    Corners of faces stay one vertex if edges that are not cut join them around it. The first such
+    group of a vertex keeps its number, and the others follow after the last vertex.
+    """
+    table, n = edge_table(mesh), mesh.n_vertices
+    vertices = mesh.faces.ravel()
+    # Side k of a face, opposite to its corner k, ends at its corners k + 1 and k + 2.
+    face, side = np.divmod(np.arange(len(vertices)), 3)
+    ends = 3 * face[:, None] + (side[:, None] + np.array([1, 2])) % 3
+    at_edge = table.face_edges.ravel()
+    # Corners are linked through a node for each end of each edge, of which one lies at the vertex.
+    is_second = vertices[ends] == table.edges[at_edge, 1][:, None]
+    nodes = len(vertices) + 2 * at_edge[:, None] + is_second
+    kept = ~cut[at_edge]
+    # Other vertices stay one, also where only corners touch.
+    whole = np.ones(n, dtype=bool)
+    whole[table.edges[cut]] = False
+    if apart is not None:
+        whole[apart] = False
+    corners = np.flatnonzero(whole[vertices])
+    first = len(vertices) + 2 * len(cut)
+    rows = np.concatenate([ends[kept].ravel(), corners])
+    columns = np.concatenate([nodes[kept].ravel(), first + vertices[corners]])
+    size = first + n
+    links = sp.coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
+    group = connected_components(links, directed=False)[1][: len(vertices)]
+    _, first_corner, group = np.unique(group, return_index=True, return_inverse=True)
+    # Groups are numbered by their first corner; all but the first of a vertex become new ones.
+    owner = vertices[first_corner]
+    number = owner.copy()
+    order = np.lexsort((first_corner, owner))
+    further = np.sort(order[1:][owner[order][1:] == owner[order][:-1]])
+    number[further] = n + np.arange(len(further))
+    source = np.concatenate([np.arange(n), owner[further]])
+    opened = TriangleMesh(mesh.vertices[source], number[group].reshape(-1, 3))
+    return RepairedMesh(opened, (), source)

@@ -1,0 +1,1 @@
+"""The same shape by fewer simplices, or by more."""

@@ -1,0 +1,1 @@
+"""Points on a shape, and how much of it each stands for."""

@@ -1,0 +1,1 @@
+"""Operators that take a shape as weighted points, and those of points without triangles."""

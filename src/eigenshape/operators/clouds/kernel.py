@@ -1,0 +1,266 @@
+"""The matrix of a Gaussian kernel on weighted points, its scale, and the Laplacian that it makes.
+
+W_ij = -w_i w_j G(x_i, x_j) / t with G(x, y) = exp(-|x - y|²/4t) / (4πt)^{m/2}: one formula,
+whatever the weights are.
+"""
+
+import warnings
+from dataclasses import dataclass
+from math import gamma, pi
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+
+from eigenshape._arrays import positive_values
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._memory import require_memory
+from eigenshape.geometry.distances.geodesic import geodesic_balls
+from eigenshape.geometry.samples.quadrature import Quadrature
+from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
+from eigenshape.geometry.simplicial import Mesh
+from eigenshape.operators.choices import Correction, Form
+from eigenshape.operators.clouds.cells import CellGrid, cell_grid, count_partners, gaussian_rows
+from eigenshape.operators.clouds.csr_loops import component_labels
+from eigenshape.operators.laplacian import GaussianKernel, Laplacian
+
+# Width of a kernel by default, h / e; t = e².
+EDGE_FACTOR = 2.0
+# Narrowest kernel, h / e: at half of it eigenvalues are half as large even on the most regular
+# points.
+NARROWEST = 1.0
+# h / e below which eigenvalues of irregular points are 5 % too low or worse.
+NARROW = 1.5
+# Eigenvalues that can be distinguished at least, without a warning.
+FEWEST_PAIRS = 10
+# t λ up to which the correction distinguishes one eigenvalue from the next.
+LAST = 2.9
+# Rows from which the number of entries of the matrix is estimated.
+SAMPLED_ROWS = 512
+# Bytes per entry while the matrix is built and checked.
+PEAK = 30
+# It joins each point with its nearest ones, whatever the spacing.
+OR_ROBUST = "On a surface in R^3 robust_laplacian(shape) fits any spacing; on the command line, --operator robust."
+
+
+class UnevenSpacingError(InvalidShapeError):
+    """A kernel of one width does not reach the neighbors of all points."""
+
+
+@dataclass(frozen=True)
+class KernelOptions:
+    """Options of a kernel, as in `mesh_laplacian`."""
+
+    t: float | None = None
+    h: float | None = None
+    edge_factor: float | None = None
+    correct: Correction | None = None
+    form: Form = "literal"
+    cutoff: float = 4.0
+
+
+def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
+    """Return the kernel of a heat time t, a width h = 2√t, or a width in mean edge lengths e (default 2e).
+
+    Raises
+    ------
+    InvalidParameterError
+        If more than one is given, one is not positive, another option is unknown, or the kernel is
+        narrower than the points lie.
+    """
+    _require_options(options)
+    width = options.h or (options.edge_factor or EDGE_FACTOR) * edge
+    t = options.t or width**2 / 4
+    factor = 2 * t**0.5 / edge
+    if factor < NARROWEST:
+        raise InvalidParameterError(
+            f"A kernel must reach the neighbors, h ≥ e; h = 2√t is {factor:.3g} of the mean edge length "
+            f"e = {edge:.4g}, t = {t:.4g}. Choose t ≥ {edge**2 / 4:.4g}; t = e² is the default."
+        )
+    return GaussianKernel(
+        t, factor, corrected=options.correct == "log", form=options.form, cutoff=options.cutoff
+    )
+
+
+def _require_options(options: KernelOptions) -> None:
+    given = {
+        name: value
+        for name in ("t", "h", "edge_factor")
+        if (value := getattr(options, name)) is not None
+    }
+    if len(given) > 1:
+        raise InvalidParameterError(
+            f"At most one of t, h and edge_factor must be given; given are {given}."
+        )
+    for name, value in {**given, "cutoff": options.cutoff}.items():
+        positive_values(value, name)
+    if options.correct not in (None, "log"):
+        raise InvalidParameterError(f"correct must be None or 'log'; it is {options.correct!r}.")
+    if options.form not in ("literal", "random-walk"):
+        raise InvalidParameterError(
+            f"form must be 'literal' or 'random-walk'; it is {options.form!r}."
+        )
+
+
+def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
+    """Return the mean distance to the m(m+1) nearest points: as many as touch a point of the lattice A_m.
+
+    Raises
+    ------
+    InvalidShapeError
+        If there are not so many points, or all are equal.
+    """
+    near = dim * (dim + 1)
+    if len(points) <= near:
+        raise InvalidShapeError(
+            f"A sample of dimension {dim} must have over {near} points; it has {len(points)}."
+        )
+    scaled, scale = size_one(points)
+    distance = float(cKDTree(scaled).query(scaled, near + 1)[0][:, 1:].mean() * scale)
+    if not distance > 0:
+        raise InvalidShapeError(
+            f"The points of a sample must differ; all {len(points)} are {points[0].tolist()}."
+        )
+    return distance
+
+
+def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
+    """Build the Laplacian of the kernel on weighted points.
+
+    Raises
+    ------
+    InvalidShapeError
+        If the matrix would not fit into memory or its entries into floats, or a point has no
+        partner.
+    """
+    points, scale = size_one(measure.points)
+    weights, unit = size_one(measure.weights)
+    t = kernel.t / scale / scale
+    grid = cell_grid(points, kernel.cutoff * 2 * t**0.5)
+    _require_matrix_fits(grid)
+    counts = count_partners(grid)
+    _require_partners(measure, counts - 1, kernel)
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    columns, values = gaussian_rows(grid, weights, t, starts)
+    matrix = sp.csr_array((values, columns, starts), shape=(measure.n_points,) * 2)
+    return _assemble(measure, kernel, matrix, (unit, scale))
+
+
+def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
+    """Build the Laplacian of the kernel with distances along the surface.
+
+    Raises
+    ------
+    InvalidShapeError
+        As `kernel_laplacian`, and if the mesh is no surface.
+    """
+    points, scale = size_one(measure.points)
+    weights, unit = size_one(measure.weights)
+    radius = kernel.cutoff * kernel.width
+    _require_matrix_fits(
+        cell_grid(points, radius / scale)
+    )  # no ball along the surface holds more than one through space
+    matrix = geodesic_balls(mesh, radius)
+    _require_partners(measure, np.diff(matrix.indptr), kernel)
+    rows = np.repeat(np.arange(measure.n_points), np.diff(matrix.indptr))
+    matrix.data = (
+        weights[rows] * weights[matrix.indices] * np.exp(-((matrix.data / kernel.width) ** 2))
+    )
+    return _assemble(measure, kernel, (matrix + sp.diags_array(weights**2)).tocsr(), (unit, scale))
+
+
+def _assemble(
+    measure: Quadrature, kernel: GaussianKernel, matrix: sp.csr_array, units: tuple[float, float]
+) -> Laplacian:
+    """Make W and B of the matrix w_i w_j exp(-d_ij²/4t), in whose place W is written.
+
+    `units` are the powers of two that weights and coordinates were divided by.
+    """
+    of_weight, of_length = (int(np.frexp(unit)[1]) - 1 for unit in units)
+    t = float(np.ldexp(kernel.t, -2 * of_length))
+    matrix.data /= (4 * pi * t) ** (measure.dim / 2)
+    exponent = 2 * of_weight - measure.dim * of_length
+    mass = (
+        _scale_by_power(matrix.sum(axis=1), exponent)
+        if kernel.form == "random-walk"
+        else measure.weights
+    )
+    matrix.setdiag(0)
+    matrix.data /= -t
+    matrix.setdiag(-matrix.sum(axis=1))
+    matrix.data = _scale_by_power(matrix.data, exponent - 2 * of_length)
+    return Laplacian(matrix, sp.diags_array(mass).tocsr(), kernel)
+
+
+def _scale_by_power(values: Float[np.ndarray, " z"], exponent: int) -> Float[np.ndarray, " z"]:
+    if abs(exponent) > LARGEST_EXPONENT:
+        raise InvalidShapeError(
+            f"Entries of a kernel matrix must be floats; theirs are about 2^{exponent}. Choose another unit."
+        )
+    if exponent:
+        values *= 2.0**exponent
+    return values
+
+
+def _require_partners(measure: Quadrature, n_partners: np.ndarray, kernel: GaussianKernel) -> None:
+    alone = np.flatnonzero(n_partners == 0)
+    if alone.size:
+        raise UnevenSpacingError(
+            f"Every point must have another one within the cutoff of the kernel; point {alone[0]} at "
+            f"{measure.points[alone[0]].tolist()} has none within {kernel.cutoff * kernel.width:.4g} ({alone.size} "
+            f"such). Choose a larger t than {kernel.t:.4g}, or remove such points. {OR_ROBUST}"
+        )
+
+
+def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKernel) -> None:
+    """Raise an error if the kernel graph of a component is not connected; `labels` number the components."""
+    parts = component_labels(laplacian.stiffness.indptr, laplacian.stiffness.indices)
+    pairs = np.unique(np.column_stack([labels, parts]), axis=0)
+    torn = np.flatnonzero(np.bincount(pairs[:, 0]) > 1)
+    if torn.size:
+        raise UnevenSpacingError(
+            f"The kernel must connect each component of the shape; at t = {kernel.t:.4g} "
+            f"component {torn[0]} falls into "
+            f"{np.count_nonzero(pairs[:, 0] == torn[0])} parts ({parts.max() + 1} in all). Choose a larger t. "
+            f"{OR_ROBUST}"
+        )
+
+
+def warn_of_narrow(kernel: GaussianKernel) -> None:
+    """Warn if the kernel hardly reaches the neighbors."""
+    if kernel.edge_factor < NARROW:
+        warnings.warn(
+            f"A kernel of width h = {kernel.edge_factor:.3g} e suits regular points only; on irregular points "
+            "eigenvalues are 5 to 20 % too low. The default is h = 2e.",
+            stacklevel=3,
+        )
+
+
+def warn_of_few(measure: Quadrature, kernel: GaussianKernel) -> None:
+    """Warn if fewer than ten eigenvalues can be distinguished at this t, by Weyl's law."""
+    ball = pi ** (measure.dim / 2) / gamma(measure.dim / 2 + 1)
+    length = (measure.weights / kernel.t ** (measure.dim / 2)).sum()
+    n_pairs = int(length * ball * (LAST / (4 * pi**2)) ** (measure.dim / 2))
+    if n_pairs < FEWEST_PAIRS:
+        warnings.warn(
+            f"With the heat time t = {kernel.t:.4g} about {n_pairs} eigenvalues can be distinguished "
+            f"(t λ < {LAST}); k eigenvalues of a surface need n > 5 k t/e² points, and 21 k t/e² without "
+            f"correction. Choose a smaller t.",
+            stacklevel=3,
+        )
+
+
+def _require_matrix_fits(grid: CellGrid) -> None:
+    """Estimate the size of the matrix from some of its rows, and raise an error if it is too large."""
+    n = len(grid.order)
+    sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLED_ROWS)).astype(np.int64))
+    entries = count_partners(grid, sample)[sample].mean() * n
+    require_memory(
+        "A kernel matrix",
+        f"{entries:.2g} entries, {entries / n:.0f} a row,",
+        {"values and columns": entries * PEAK},
+        "Choose a smaller t, or functional_laplacian, which stores none.",
+        share=0.5,
+        error=InvalidShapeError,
+    )

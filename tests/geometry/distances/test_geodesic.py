@@ -1,0 +1,188 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import Delaunay
+
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape.geometry.distances.geodesic import (
+    geodesic_balls,
+    geodesic_distance_to_set,
+    geodesic_distances,
+)
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.geometry.union import disjoint_union
+from eigenshape.shapes.surfaces import grid, icosphere
+
+
+def test_on_a_flat_grid_the_way_is_straight():
+    mesh = grid(12, 12)
+    found = geodesic_balls(mesh, 0.45)
+    rows, columns = found.nonzero()
+    straight = np.linalg.norm(mesh.vertices[rows] - mesh.vertices[columns], axis=1)
+    np.testing.assert_allclose(found[rows, columns], straight, rtol=1e-12)
+    all_near = np.linalg.norm(mesh.vertices[:, None] - mesh.vertices, axis=2) <= 0.45 - 1e-9
+    assert found.nnz == all_near.sum() - mesh.n_vertices
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 2**31))
+def test_on_flat_irregular_triangles_it_is_straight_up_to_few_per_cent(seed):
+    rng = np.random.default_rng(seed)
+    flat = rng.random((300, 2))
+    mesh = TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), Delaunay(flat).simplices)
+    found = geodesic_balls(mesh, 0.3)
+    rows, columns = found.nonzero()
+    ratio = found[rows, columns] / np.linalg.norm(flat[rows] - flat[columns], axis=1)
+    assert ratio.min() > 1 - 1e-9
+    assert np.quantile(ratio, 0.99) < 1.03
+
+
+def test_on_the_sphere_it_is_the_great_circle():
+    mesh = icosphere(4)
+    found = geodesic_balls(mesh, 0.6)
+    rows, columns = found.nonzero()
+    exact = 2 * np.arcsin(np.linalg.norm(mesh.vertices[rows] - mesh.vertices[columns], axis=1) / 2)
+    assert np.abs(found[rows, columns] / exact - 1).max() < 0.002
+
+
+def test_two_sheets_that_nearly_touch_stay_far_apart():
+    sheet = grid(8, 8)
+    folded = np.array([[x, y, 0.0] if x <= 0.5 else [1 - x, y, 0.01] for x, y, _ in sheet.vertices])
+    found = geodesic_balls(TriangleMesh(folded, sheet.faces), 0.4).toarray()
+    below, above = 1 * 9 + 4, 7 * 9 + 4  # opposite each other, .01 apart, .75 along the sheet
+    assert np.linalg.norm(folded[below] - folded[above]) < 0.011
+    assert found[below, above] == 0
+
+
+def test_never_longer_than_along_the_edges():
+    mesh = icosphere(2)
+    edges = geodesic_balls(mesh, 10.0)
+    ways = dijkstra(_edge_lengths(mesh))
+    assert (edges.toarray() <= ways + 1e-12).all()
+    assert edges.nnz == mesh.n_vertices * (mesh.n_vertices - 1)
+
+
+def _edge_lengths(mesh):
+    lengths = np.full((mesh.n_vertices,) * 2, np.inf)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        ends = mesh.faces[:, a], mesh.faces[:, b]
+        lengths[ends] = lengths[ends[::-1]] = np.linalg.norm(
+            mesh.vertices[ends[0]] - mesh.vertices[ends[1]], axis=1
+        )
+    return lengths
+
+
+@pytest.mark.parametrize("size", [1e-100, 1e100])
+def test_units_change_nothing(size):
+    mesh = icosphere(2)
+    one = geodesic_balls(mesh, 0.7)
+    other = geodesic_balls(TriangleMesh(size * mesh.vertices, mesh.faces), 0.7 * size)
+    np.testing.assert_array_equal(one.indices, other.indices)
+    np.testing.assert_allclose(other.data / size, one.data, rtol=1e-12)
+
+
+def test_it_is_symmetric_and_the_same_in_five_dimensions():
+    mesh = icosphere(2)
+    turned = np.linalg.qr(np.random.default_rng(0).normal(size=(5, 5)))[0][:3]
+    one = geodesic_balls(mesh, 0.7)
+    other = geodesic_balls(SimplicialMesh(mesh.vertices @ turned, mesh.faces), 0.7)
+    assert (one != one.T).nnz == 0
+    np.testing.assert_allclose(other.toarray(), one.toarray(), atol=1e-12)
+
+
+def test_curves_and_bad_radii_are_refused():
+    with pytest.raises(
+        InvalidShapeError, match="need a mesh of dimension 2; this one has dimension 1"
+    ):
+        geodesic_balls(SimplicialMesh([[0.0], [1.0]], [[0, 1]]), 1.0)
+    with pytest.raises(InvalidParameterError, match="radius must be positive and finite"):
+        geodesic_balls(icosphere(1), 0.0)
+
+
+@pytest.mark.parametrize("place", [0, 5, 10])
+def test_from_a_line_on_a_grid_the_way_is_straight(place):
+    mesh = grid(10, 10)
+    away = np.abs(mesh.vertices[:, 0] - place / 10)
+    line = np.flatnonzero(away < 1e-9)
+    np.testing.assert_allclose(geodesic_distance_to_set(mesh, line), away, atol=1e-15)
+
+
+def test_from_a_line_through_irregular_triangles_it_is_straight_up_to_few_per_cent():
+    rng = np.random.default_rng(0)
+    flat = np.vstack(
+        [rng.random((2000, 2)), np.column_stack([np.full(60, 0.5), np.linspace(0, 1, 60)])]
+    )
+    mesh = TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), Delaunay(flat).simplices)
+    away = np.abs(flat[:2000, 0] - 0.5)
+    ratio = geodesic_distance_to_set(mesh, np.arange(2000, 2060))[:2000] / away
+    assert ratio.min() > 1 - 1e-9
+    assert np.median(ratio) < 1.002
+    assert ratio[away > 0.02].max() < 1.07
+
+
+def test_one_source_is_a_set():
+    mesh = icosphere(3)
+    np.testing.assert_array_equal(
+        geodesic_distance_to_set(mesh, [7]), geodesic_distances(mesh, [7])[0]
+    )
+
+
+def test_from_far_sources_it_is_the_least_of_their_distances():
+    mesh = icosphere(3)
+    sources = [0, 1, 2, 3]  # corners of the icosahedron
+    found, least = (
+        geodesic_distance_to_set(mesh, sources),
+        geodesic_distances(mesh, sources).min(axis=0),
+    )
+    assert (found[sources] == 0).all()
+    np.testing.assert_allclose(
+        found, least, rtol=0.03
+    )  # half-way between two the front counts as straight
+    np.testing.assert_array_equal(found, geodesic_distance_to_set(mesh, [3, 2, 2, 1, 0]))
+
+
+def test_beyond_the_reach_it_is_infinite():
+    mesh = icosphere(3)
+    whole, near = (
+        geodesic_distance_to_set(mesh, [0, 9]),
+        geodesic_distance_to_set(mesh, [0, 9], reach=0.5),
+    )
+    np.testing.assert_array_equal(near, np.where(whole <= 0.5, whole, np.inf))
+    assert 2 < np.isfinite(near).sum() < mesh.n_vertices
+
+
+def test_another_component_is_infinitely_far_and_so_is_nothing():
+    mesh = disjoint_union(icosphere(1), icosphere(1))
+    assert np.isinf(geodesic_distance_to_set(mesh, [0, 1])).tolist() == [False] * 42 + [True] * 42
+    assert np.isinf(geodesic_distance_to_set(mesh, [])).all()
+
+
+@pytest.mark.parametrize("size", [1e-100, 1e100])
+def test_units_change_no_distance_from_a_set(size):
+    mesh = icosphere(2)
+    one = geodesic_distance_to_set(mesh, [0, 5, 9])
+    other = geodesic_distance_to_set(TriangleMesh(size * mesh.vertices, mesh.faces), [0, 5, 9])
+    np.testing.assert_allclose(other / size, one, rtol=1e-12)
+
+
+def test_sources_must_be_vertices_of_a_surface():
+    with pytest.raises(InvalidParameterError, match=r"A source must lie in 0\.\.41; it is 42"):
+        geodesic_distance_to_set(icosphere(1), [3, 42])
+    with pytest.raises(
+        InvalidShapeError, match="need a mesh of dimension 2; this one has dimension 1"
+    ):
+        geodesic_distance_to_set(SimplicialMesh([[0.0], [1.0]], [[0, 1]]), [0])
+
+
+def test_edges_without_length_change_no_distance():
+    flat = grid(9, 9)
+    vertices, faces = flat.vertices.copy(), flat.faces
+    ends = faces[40, :2]
+    vertices[ends[0]] = vertices[ends[1]]
+    found = geodesic_distances(TriangleMesh(vertices, faces), [0])[0]
+    straight = np.linalg.norm(vertices - vertices[0], axis=1)
+    assert found[ends[0]] == pytest.approx(found[ends[1]], rel=1e-12)
+    np.testing.assert_allclose(found, straight, rtol=0.05)
