@@ -1,6 +1,8 @@
 """The figures of the pages: measure them, write their tables, check them, and name those older than the code.
 
     python benchmarks/figures.py                      check all pages; the house tests do the same
+    python benchmarks/figures.py --tables EXPECTED RUN
+                                                      print a README's tables with the figures of another run
     python benchmarks/figures.py --run [NAME ...]     measure, all or some, the most important first, and write
     python benchmarks/figures.py --run --minutes 35   the same, and begin nothing further after 35 minutes
     python benchmarks/figures.py --write              write all tables from their files
@@ -9,6 +11,9 @@
 A benchmark writes `figures/NAME.json`: the command, the day, the commit, the machine, the versions, all rows, and the
 texts of the table. A page shows it between `<!-- figures: NAME -->` and `<!-- end -->`. One file is one run on one
 machine, and so is a table. A run that fails leaves the file of the run before.
+
+An experiment writes its figures with `--out`. The tables of its README name the file and the place of each number in a
+comment above them, and sentences that repeat a number do so in a comment of the page, `<!-- sentences: FILE>PATH`.
 """
 
 import argparse
@@ -33,6 +38,8 @@ PAGES = [
 MEASURED = re.compile(r"<!-- figures: (\w+) -->\n(.*?)<!-- end -->\n", re.DOTALL)
 # A table of an experiment: the file and a path in it, the key of each row, and the cells with paths below it.
 FILLED = re.compile(r"( *<!-- figures: (\S+\.json.*)\n *(.*)\n *(.*) -->\n)((?: *\|.*\n)+)")
+# Sentences with figures of an experiment: the file and a path in it, and a line for each with paths below it.
+SENTENCES = re.compile(r"<!-- sentences: (\S+\.json.*)\n((?:.*\n)*?)-->\n")
 PLACE = re.compile(r"\{(.*?)(?::([z+,]*(?:\.\d[efg%])?))?\}")
 # Why a table with numbers may have no file of figures: its comment, `<!-- no figures: WHY -->`, says one of these.
 NO_FIGURES = {
@@ -150,8 +157,17 @@ def written(text: str, folder: Path) -> str:
 
 def filled(folder: Path, root: str, keys: str, cells: str, rows: str) -> str:
     """Return a table of an experiment with the numbers of its file."""
+    return fill_rows(figures_at(folder, root), keys, cells, rows)
+
+
+def figures_at(folder: Path, root: str) -> Any:
+    """Return what stands in a file beside a page at a path: `expected.json>full`."""
     file, *path = root.split(">")
-    results = look_up(json.loads((folder / file).read_text(encoding="utf-8")), path)
+    return look_up(json.loads((folder / file).read_text(encoding="utf-8")), path)
+
+
+def fill_rows(results: Any, keys: str, cells: str, rows: str) -> str:
+    """Return a table with the numbers of results."""
     head, line, *old = rows.splitlines()
     lines, margin = [head, line], line[: line.index("|")]
     for key, row in zip(keys.split(" | "), old, strict=True):
@@ -162,6 +178,34 @@ def filled(folder: Path, root: str, keys: str, cells: str, rows: str) -> str:
         ]
         lines.append(f"{margin}| {' | '.join(fresh)} |")
     return "\n".join(lines) + "\n"
+
+
+def tables_of_run(expected: Path, run: Path) -> str:
+    """Return the tables that a README fills from its file of expected figures, with those of a run instead."""
+    page = expected.with_name("README.md").read_text(encoding="utf-8")
+    found = json.loads(run.read_text(encoding="utf-8"))
+    tables = []
+    for _, root, keys, cells, rows in FILLED.findall(page):
+        file, _, *path = root.split(">")  # a run's figures stand in its file without "full"
+        if file != expected.name:
+            continue
+        try:
+            table = fill_rows(look_up(found, path), keys, cells, rows)
+        except LookupError:  # the run measured nothing of this table
+            continue
+        head, line, *filled_rows = table.splitlines()
+        measured = [
+            row
+            for row in filled_rows
+            if any(
+                cell
+                for cell, template in zip(split_row(row), cells.split(" | "), strict=True)
+                if "{" in template and template != "{#}"
+            )
+        ]
+        if measured:
+            tables.append("\n".join([head, line, *measured, ""]))
+    return "\n".join(tables)
 
 
 def split_row(row: str) -> list[str]:
@@ -183,15 +227,34 @@ def fill(template: str, key: str, results: Any, cell: str) -> str:
             path = path.replace("*", "{}").format(*names)
         else:
             path = path.replace("*", key)
-        value = look_up(results, path.split(">"))
-        if value is None:
-            raise KeyError(path)
-        return value if isinstance(value, str) else format(value, form or "").removesuffix("%")
+        return number_text(results, path, form)
 
     try:
         return PLACE.sub(number, template)
     except LookupError:
         return "" if NUMBER.search(cell) else cell
+
+
+def number_text(results: Any, path: str, form: str | None) -> str:
+    """Return the number at a path as text."""
+    value = look_up(results, path.split(">"))
+    if value is None:
+        raise KeyError(path)
+    return value if isinstance(value, str) else format(value, form or "").removesuffix("%")
+
+
+def sentences(text: str, folder: Path) -> list[str]:
+    """Return the sentences that a page must hold, with the figures of their files."""
+    return [
+        fill_sentence(template, figures_at(folder, root))
+        for root, templates in SENTENCES.findall(text)
+        for template in templates.splitlines()
+    ]
+
+
+def fill_sentence(template: str, results: Any) -> str:
+    """Return a sentence with the numbers of results."""
+    return PLACE.sub(lambda place: number_text(results, *place.groups()), template)
 
 
 def look_up(results: Any, path: list[str]) -> Any:
@@ -210,6 +273,12 @@ def complaints(page: Path) -> list[str]:
         for number, (line, fresh) in enumerate(zip(text.splitlines(), anew, strict=False), 1)
         if line != fresh
     ][:3]
+    plain = " ".join(SENTENCES.sub("", text).split())
+    found += [
+        f"{name}: it must say, as its file does: {sentence}"
+        for sentence in sentences(text, page.parent)
+        if sentence not in plain
+    ]
     for _, _, _, cells, rows in FILLED.findall(text):
         heads, _, *table_rows = map(split_row, rows.splitlines())
         for place, (head, template) in enumerate(zip(heads, cells.split(" | "), strict=True)):
@@ -286,6 +355,13 @@ def main() -> None:
     )
     parser.add_argument("--write", action="store_true", help="write all tables from their files")
     parser.add_argument("--stale", action="store_true", help="name figures older than their code")
+    parser.add_argument(
+        "--tables",
+        nargs=2,
+        type=Path,
+        metavar=("EXPECTED", "RUN"),
+        help="print the tables of a README that name this file, with the figures of a run's --out",
+    )
     options = parser.parse_args()
     failed = []
     if options.run is not None:
@@ -299,6 +375,8 @@ def main() -> None:
             except subprocess.CalledProcessError:
                 failed.append(f"{name} failed; its figures are those of the run before")
             write()
+    elif options.tables:
+        print(tables_of_run(*options.tables))
     elif options.write:
         write()
     elif options.stale:

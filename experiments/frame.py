@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from outputs import give_out, output_file, output_folder
+from outputs import give_out, options_of, output_folder
 
 import eigenshape as es
 
@@ -16,9 +16,7 @@ COLORS = ("#1f77b4", "#d9541e", "#2ca02c", "#9467bd", "#8c564b", "#e377c2", "#7f
 
 def parse_arguments(doc: str, folder: Path) -> argparse.Namespace:
     """Read --quick, --out and --figures; pictures go to the experiment's folder unless it is run quickly."""
-    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a smaller form, in seconds")
-    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser = options_of(doc)
     parser.add_argument(
         "--figures",
         type=output_folder,

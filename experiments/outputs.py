@@ -1,4 +1,4 @@
-"""Where experiments write, checked before their work begins, and figures as JSON, with where they come from."""
+"""The options of experiments, where they write, checked before their work begins, and figures as JSON with a source."""
 
 import argparse
 import datetime
@@ -12,6 +12,17 @@ from typing import Any
 sys.path.append(str(Path(__file__).resolve().parents[1] / "benchmarks"))
 
 from machine import command, commit, describe
+
+
+def options_of(
+    text: str | None, *, quick: str | None = "a smaller form, in seconds", out: str | None = None
+) -> argparse.ArgumentParser:
+    """Return a parser with --out, and with --quick if there is a quick form; the text's first line is its help."""
+    parser = argparse.ArgumentParser(description=(text or "").splitlines()[0])
+    if quick is not None:
+        parser.add_argument("--quick", action="store_true", help=quick)
+    parser.add_argument("--out", type=output_file, default=out, help="write the figures as JSON")
+    return parser
 
 
 def output_folder(text: str) -> Path:

@@ -5,7 +5,6 @@ eigenvalues above zero, the order fitted to the medians (error ~ n^(-order/m)), 
 the finest.
 """
 
-import argparse
 import sys
 import time
 import warnings
@@ -21,7 +20,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import output_file, save_figures
+from outputs import options_of, output_file, save_figures
 
 SIZES = {"full": (1000, 2500, 6250), "quick": (300, 480, 750)}
 QUICK = (  # each dimension, each kind of boundary, and each operator at least once
@@ -255,9 +254,7 @@ def draw(path: Path, n: int) -> None:
 
 def main() -> None:
     """Measure, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="smaller meshes")
-    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser = options_of(__doc__, quick="smaller meshes")
     parser.add_argument("--picture", type=output_file, help="draw errors on the sphere (PNG)")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")

@@ -4,7 +4,6 @@ A hundred eigenvalues of ten shapes, by Neumann's condition and by Dirichlet's w
 known by formula, or by cubic elements on finer and finer pieces of the same flat simplices.
 """
 
-import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import output_file, save_figures
+from outputs import options_of, save_figures
 from real_shapes import DATA
 
 K = 100
@@ -166,10 +165,8 @@ def measured(case: Case, condition: str, *, with_order: bool) -> dict[str, objec
 
 def main() -> None:
     """Measure, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = options_of(__doc__, quick=f"{', '.join(QUICK)}, without orders")
     parser.add_argument("--only", nargs="*", help="names of shapes")
-    parser.add_argument("--quick", action="store_true", help=f"{', '.join(QUICK)}, without orders")
-    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
     arguments = parser.parse_args()
     chosen = arguments.only or (QUICK if arguments.quick else None)
     cases = {name: case for name, case in (made() | real()).items() if not chosen or name in chosen}

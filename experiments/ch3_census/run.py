@@ -4,7 +4,6 @@ Thousands of solves on shapes with multiple eigenvalues, each beside a dense sol
 where one of its k eigenvalues is off by more than 1e-8 of the largest of them, or where it ends in an exception.
 """
 
-import argparse
 import sys
 import time
 import warnings
@@ -17,7 +16,7 @@ from rich.progress import track
 from threadpoolctl import threadpool_limits
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from outputs import output_file, save_figures
+from outputs import options_of, save_figures
 
 WRONG = 1e-8  # relative to the largest of the k
 ABSENT = 1e-5  # an error so large is an eigenvalue left out, not one that is inexact
@@ -101,11 +100,7 @@ def census(*, quick: bool) -> dict[str, object]:
 
 def main() -> None:
     """Count, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "--quick", action="store_true", help="two shapes a family, fewer k; about a minute"
-    )
-    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser = options_of(__doc__, quick="two shapes a family, fewer k; about a minute")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     always_sparse()

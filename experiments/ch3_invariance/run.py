@@ -4,7 +4,6 @@ Fifty eigenvalues of four shapes by four operators: scaled by 1e-100 to 1e100, s
 with vertices and faces in another order, and with one thread and two.
 """
 
-import argparse
 import sys
 import warnings
 from collections.abc import Callable, Iterator
@@ -19,7 +18,7 @@ from threadpoolctl import threadpool_limits
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from outputs import output_file, save_figures
+from outputs import options_of, save_figures
 from real_shapes import DATA
 
 K = 50
@@ -112,9 +111,7 @@ def measured(
 
 def main() -> None:
     """Measure, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="small made-up shapes")
-    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser = options_of(__doc__, quick="small made-up shapes")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     tasks = [

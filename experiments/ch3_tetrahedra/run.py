@@ -4,7 +4,6 @@ Twenty eigenvalues above zero by lumped, consistent and averaged mass and by qua
 whose eigenvalues are known, and on real meshes, where quadratic elements stand for them.
 """
 
-import argparse
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +15,7 @@ from scipy.spatial import Delaunay
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from outputs import output_file, save_figures
+from outputs import give_out, options_of
 from real_shapes import DATA
 
 K = 20
@@ -27,7 +26,6 @@ REAL = {
     "octopus": "octopus-low.mesh",
     "bunny": "bunny.mesh",
 }
-COLUMNS = ("points", *MASSES, "P2")
 
 
 def irregular_box(n: int) -> es.SimplicialMesh:
@@ -74,31 +72,13 @@ def measure(mesh: es.SimplicialMesh, exact: np.ndarray | None) -> dict[str, obje
     }
 
 
-def markdown(table: dict[str, dict]) -> str:
-    """Return the table of the README: median error, and in brackets that of the first eigenvalue."""
-    head = f"| shape | {' | '.join(COLUMNS)} |\n|{'---|' * (len(COLUMNS) + 1)}\n"
-    rows = []
-    for name, row in table.items():
-        cells = [
-            f"{100 * row['median'][key]:.1f} % ({100 * row['first'][key]:+.1f} %)"
-            if key in row["median"]
-            else "–"
-            for key in COLUMNS[1:]
-        ]
-        rows.append(f"| {name} | {row['points']:,} | {' | '.join(cells)} |")
-    return head + "\n".join(rows) + "\n"
-
-
 def main() -> None:
     """Measure, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="coarse boxes and balls")
-    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser = options_of(__doc__, quick="coarse boxes and balls")
     arguments = parser.parse_args()
     tasks = list(shapes(quick=arguments.quick))
     table = {name: measure(mesh, exact) for name, mesh, exact in track(tasks, "tetrahedra")}
-    print(markdown(table))
-    save_figures(table, arguments.out)
+    give_out(table, arguments.out)
 
 
 if __name__ == "__main__":

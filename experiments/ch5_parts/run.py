@@ -3,7 +3,6 @@
 What is done is kept in a folder, so that a stopped run goes on where it was.
 """
 
-import argparse
 import json
 import sys
 from collections.abc import Callable
@@ -19,7 +18,7 @@ from sklearn.manifold import spectral_embedding
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from outputs import give_out, output_file, output_folder
+from outputs import give_out, options_of, output_folder
 from real_shapes import DATA, first_members, labeled_shapes, require_data
 
 QUICK = ("ant", "armadillo", "human", "table", "teddy")
@@ -211,14 +210,12 @@ def summary(rows: dict[str, dict[str, dict[str, float]]], tuning: set[str]) -> d
 
 def main() -> None:
     """Measure every shape, print and save the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help=f"two members of the classes {', '.join(QUICK)}"
+    parser = options_of(
+        __doc__, quick=f"two members of the classes {', '.join(QUICK)}", out="ch5-parts.json"
     )
     parser.add_argument(
         "--db", type=output_folder, default="ch5-parts", help="folder of what is done, kept"
     )
-    parser.add_argument("--out", type=output_file, default="ch5-parts.json")
     arguments = parser.parse_args()
     require_data()
     wanted = shapes(arguments.quick)

@@ -4,7 +4,6 @@ Made creatures have exact maps between poses, parts have them to their wholes; b
 itself, functional maps stand in.
 """
 
-import argparse
 import sys
 from collections import defaultdict
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from rich.progress import track
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from outputs import give_out, output_file, output_folder
+from outputs import give_out, options_of, output_folder
 from real_shapes import DATA, inner_curvature, require_data
 
 NEAR, N_FEATURES = 0.05, 15
@@ -236,9 +235,7 @@ def panel(
 
 def main() -> None:
     """Measure, print and save the tables, and draw."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="two poses of two small creatures")
-    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser = options_of(__doc__, quick="two poses of two small creatures")
     parser.add_argument(
         "--pictures", type=output_folder, help="folder for pictures after figure 5.2"
     )

@@ -4,7 +4,6 @@ Each query of `run.py` asks the mixed database, and once more the same without i
 `run.py` keeps, by the codebook that comes with the library.
 """
 
-import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,13 +13,12 @@ from typing import Any, cast
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
+from asking import draw_options, setting
 from describing import Failure, Store, describe_all
-from draws import HALVES, Draw, Version, draw, half_of, shapes
+from draws import Draw, Version
 from methods import METHODS, Trainable
-from outputs import give_out, output_file, output_folder
-from real_shapes import require_data
+from outputs import give_out
 from rich.progress import track
-from run import QUICK_CLASSES, QUICK_QUERIES, SEEDS
 from scores import FOUR_LEGGED, interval
 
 import eigenshape as es
@@ -106,39 +104,17 @@ def warned(some: Sequence[Answer]) -> list[float]:
     return interval(np.array([each.nothing_alike for each in some], float)) if some else []
 
 
-def arguments() -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw"
-    )
-    parser.add_argument("--half", choices=HALVES, default="reporting")
-    parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument(
-        "--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept"
-    )
-    parser.add_argument("--out", type=output_file, default="ch5-answers.json")
-    return parser.parse_args()
-
-
 def main() -> None:
     """Draw, describe, ask, print and save."""
-    chosen = arguments()
-    require_data()
-    everything = [shape for shape in shapes() if not chosen.quick or shape.label in QUICK_CLASSES]
-    some = half_of(everything, chosen.half)
-    seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
-    draws = [draw(some, seed, *numbers) for seed in seeds]
-    store, untrained = Store(chosen.cache), cast(Trainable, METHODS[METHOD])
-    method = untrained.train([])
-    versions = [version for each in draws for version in (*each.queries, *each.mixed)]
-    describe_all(store, [method], list(dict.fromkeys(versions)), chosen.workers)
-    found = [one for each in track(draws, "asking") for one in answers(store, method, each)]
-    results = {"queries": len(found) // 2, **measure(found)}
-    for name, row in results.items():
-        print(f"{name}: {row}")
-    give_out(results, chosen.out)
+    chosen = draw_options(__doc__, "ch5-answers.json").parse_args()
+    have = setting(chosen)
+    method = cast(Trainable, METHODS[METHOD]).train([])
+    versions = [version for each in have.draws for version in (*each.queries, *each.mixed)]
+    describe_all(have.store, [method], list(dict.fromkeys(versions)), chosen.workers)
+    found = [
+        one for each in track(have.draws, "asking") for one in answers(have.store, method, each)
+    ]
+    give_out({"queries": len(found) // 2, **measure(found)}, chosen.out)
 
 
 if __name__ == "__main__":

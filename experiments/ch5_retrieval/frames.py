@@ -3,7 +3,6 @@
 Descriptors are kept in the folder that `run.py` uses.
 """
 
-import argparse
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -15,13 +14,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
+from asking import draw_options, setting
 from describing import Failure, Store
-from draws import HALVES, KINDS, Draw, Version, draw, half_of, make, shapes
-from outputs import give_out, output_file, output_folder
+from draws import KINDS, Draw, Version, make
+from outputs import give_out
 from perturbing import CLEAN
-from real_shapes import DATA, require_data
+from real_shapes import DATA
 from rich.progress import track
-from run import QUICK_CLASSES, QUICK_QUERIES, SEEDS
 from scores import Outcome, differences, rates
 from threadpoolctl import threadpool_limits
 
@@ -140,67 +139,28 @@ def asked(each: Draw, change: str) -> list[Version]:
     return [replace(query, change=change) for query in each.queries if query.kind == "partial"]
 
 
-def table(results: dict[str, Any]) -> str:
-    """Return Top-1 / Top-3 / Top-5, and how far Top-3 is from that of clean parts among shapes as today."""
-    lines = [
-        "| database | query | Top-1 / 3 / 5 | Top-3 less that of clean parts |",
-        "|---|---|---|---|",
-    ]
-    for name, row in results.items():
-        protocol, kind, change = name.split(", ", 2)
-        hits = " / ".join(f"{row[top][0]:.1f}" for top in ("top1", "top3", "top5"))
-        mean, low, high = row["difference"]
-        lines.append(
-            f"| {protocol}, {kind} | {change} | {hits} | {mean:+.1f} [{low:+.0f}, {high:+.0f}] |"
-        )
-    return "\n".join(lines)
-
-
-def arguments() -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw"
-    )
-    parser.add_argument("--half", choices=HALVES, default="reporting")
-    parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument(
-        "--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept"
-    )
-    parser.add_argument("--out", type=output_file, default="ch5-frames.json")
-    return parser.parse_args()
-
-
 def main() -> None:
     """Draw, describe, ask, print and save."""
-    chosen = arguments()
-    require_data()
-    everything = [shape for shape in shapes() if not chosen.quick or shape.label in QUICK_CLASSES]
-    some = half_of(everything, chosen.half)
-    seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
-    draws = [draw(some, seed, *numbers) for seed in seeds]
-    store = Store(chosen.cache)
-    queries = [query for each in draws for change in QUERIES for query in asked(each, change)]
-    database = [version for each in draws for version in (*each.mixed, *each.complete)]
-    describe_all(store, list(dict.fromkeys([*queries, *database])), chosen.workers)
-    fused = [store.load(Method(), query) for query in queries if query.change == FUSED]
-    results = measure(store, draws)
+    chosen = draw_options(__doc__, "ch5-frames.json").parse_args()
+    have = setting(chosen)
+    queries = [query for each in have.draws for change in QUERIES for query in asked(each, change)]
+    database = [version for each in have.draws for version in (*each.mixed, *each.complete)]
+    describe_all(have.store, list(dict.fromkeys([*queries, *database])), chosen.workers)
+    fused = [have.store.load(Method(), query) for query in queries if query.change == FUSED]
+    n_fused = [0 if isinstance(one, Failure) else one[1] for one in fused]
     counts = {
-        "shapes": len(some),
+        "shapes": len(have.some),
         "queries": len(queries) // len(QUERIES),
-        "draws": len(draws),
-        "fused frames": float(
-            np.mean([0 if isinstance(one, Failure) else one[1] for one in fused])
-        ),
+        "draws": len(have.draws),
+        "fused frames": float(np.mean(n_fused)),
     }
     failed = {
         version.name: entry.reason
         for version in (*queries, *database)
-        if isinstance(entry := store.load(Method(), version), Failure)
+        if isinstance(entry := have.store.load(Method(), version), Failure)
     }
-    print(f"{counts}\n\n{table(results)}")
-    give_out({"counts": counts, "without descriptor": failed, "rates": results}, chosen.out)
+    rates = measure(have.store, have.draws)
+    give_out({"counts": counts, "without descriptor": failed, "rates": rates}, chosen.out)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 Descriptors are kept in a folder, so that a second run only measures distances.
 """
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,18 +11,16 @@ from pathlib import Path
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
+from asking import draw_options, setting
 from describing import Failure, Store, describe_all
-from draws import HALVES, Draw, Shape, Version, complete, draw, half_of, make, own_choice, shapes
+from draws import Draw, Shape, Version, complete, make, own_choice
 from methods import METHODS, SLOW, Method, Trainable
-from outputs import give_out, output_file, output_folder
-from real_shapes import require_data
+from outputs import give_out
 from rich.progress import track
 from rich.status import Status
 from scores import Outcome, differences, four_legged_as_one, rates
-from tables import PROTOCOLS, printed
 
-SEEDS = (0, 1, 2)
-QUICK_CLASSES, QUICK_QUERIES = ("glasses", "octopus", "teddy"), (2, 4)
+PROTOCOLS = ("mixed", "complete")
 QUICK_METHODS = ("patches, default codebook", "thesis, cotangent", "ShapeDNA")
 
 
@@ -111,22 +108,12 @@ def measure(found: dict[str, dict[str, list[Outcome]]], reference: str) -> dict[
     return results
 
 
-def arguments() -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help=f"classes {', '.join(QUICK_CLASSES)}, one draw"
-    )
-    parser.add_argument("--half", choices=HALVES, default="reporting")
-    parser.add_argument(
-        "--source",
-        default="",
-        help="how the names of files must begin: psb for shapes of one source",
-    )
+def main() -> None:
+    """Draw, describe, ask, print and save."""
+    parser = draw_options(__doc__, "ch5-results.json")
     parser.add_argument(
         "--among-all", action="store_true", help="leave the poses of other queries in the database"
     )
-    parser.add_argument("--draws", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
     parser.add_argument(
         "--methods", nargs="*", choices=sorted(METHODS), help="all but the slowest; quickly, three"
     )
@@ -136,36 +123,12 @@ def arguments() -> argparse.Namespace:
         default="thesis, cotangent",
         help="of paired differences",
     )
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument(
-        "--cache", type=output_folder, default="ch5-descriptors", help="folder of descriptors, kept"
-    )
-    parser.add_argument("--out", type=output_file, default="ch5-results.json")
     chosen = parser.parse_args()
-    if chosen.methods is None:
-        chosen.methods = (
-            QUICK_METHODS if chosen.quick else [name for name in METHODS if name not in SLOW]
-        )
-    return chosen
-
-
-def main() -> None:
-    """Draw, describe, ask, print and save."""
-    chosen = arguments()
-    require_data()
-    everything = [shape for shape in shapes() if not chosen.quick or shape.label in QUICK_CLASSES]
-    some = [
-        shape
-        for shape in half_of(everything, chosen.half)
-        if Path(shape.path).stem.startswith(chosen.source)
-    ]
-    rest = half_of(everything, HALVES[1 - HALVES.index(chosen.half)])
-    seeds, numbers = (chosen.draws[:1], QUICK_QUERIES) if chosen.quick else (chosen.draws, (18, 32))
-    draws = [draw(some, seed, *numbers) for seed in seeds]
-    if chosen.among_all:
-        draws = [among_all(one, some) for one in draws]
-    store = Store(chosen.cache)
-    methods = {name: ready(METHODS[name], rest, store) for name in chosen.methods}
+    every_method = [name for name in METHODS if name not in SLOW]
+    names = chosen.methods or (QUICK_METHODS if chosen.quick else every_method)
+    have = setting(chosen)
+    draws = [among_all(one, have.some) for one in have.draws] if chosen.among_all else have.draws
+    methods = {name: ready(METHODS[name], have.others, have.store) for name in names}
     versions = [
         version
         for each in draws
@@ -173,17 +136,18 @@ def main() -> None:
         for version in part
     ]
     failed = describe_all(
-        store, list(methods.values()), list(dict.fromkeys(versions)), chosen.workers
+        have.store, list(methods.values()), list(dict.fromkeys(versions)), chosen.workers
     )
-    found = {name: asked(method, store, draws) for name, method in track(methods.items(), "asking")}
-    results = measure(found, chosen.against)
+    found = {
+        name: asked(method, have.store, draws) for name, method in track(methods.items(), "asking")
+    }
     counts = {
-        "shapes": len(some),
+        "shapes": len(have.some),
         "queries": sum(len(each.queries) for each in draws),
         "draws": len(draws),
     }
-    print(printed(results, counts))
-    give_out({"counts": counts, "without descriptor": failed, **results}, chosen.out)
+    results = {"counts": counts, "without descriptor": failed, **measure(found, chosen.against)}
+    give_out(results, chosen.out)
 
 
 if __name__ == "__main__":

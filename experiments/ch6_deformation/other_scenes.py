@@ -5,7 +5,6 @@ is given those of the default binding, and those of a binding whose fixed vertic
 far from the region, so that nearly everything may move.
 """
 
-import argparse
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from scenes import about_rim, around, box_surface
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import give_out, output_file
+from outputs import give_out, options_of
 from real_shapes import DATA, require_data
 from rich.progress import track
 
@@ -160,24 +159,14 @@ def compared(scene: OtherScene) -> dict[str, float]:
     return dict(zip(COLUMNS, values, strict=True))
 
 
-def cells(row: dict[str, float]) -> list[str]:
-    """Return the texts of one row: ratios with two digits, errors with four."""
-    return [f"{row[key]:.{2 if 'over' in key else 4}f}" for key in COLUMNS]
-
-
 def main() -> None:
     """Measure, print and save."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help=", ".join(QUICK))
-    parser.add_argument("--out", type=output_file, default="ch6-other.json")
+    parser = options_of(__doc__, quick=", ".join(QUICK), out="ch6-other.json")
     chosen = parser.parse_args()
     if not chosen.quick:
         require_data()
     scenes = QUICK if chosen.quick else SCENES
     results = {name: compared(make()) for name, make in track(scenes.items(), "bending")}
-    print("| scene | " + " | ".join(COLUMNS) + " |\n|---|" + "---|" * len(COLUMNS))
-    for name, row in results.items():
-        print(f"| {name} | " + " | ".join(cells(row)) + " |")
     give_out(rounded(results), chosen.out)
 
 

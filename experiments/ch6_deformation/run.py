@@ -1,6 +1,5 @@
 """What bending does to edges and faces, by several methods at equal handles: table 6.2 of the thesis, and more."""
 
-import argparse
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,18 +10,11 @@ from scenes import QUICK, SCENES, Scene
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import give_out, output_file
+from outputs import give_out, options_of
 from real_shapes import require_data
 from rich.progress import track
 
 import eigenshape as es
-
-THESIS = {
-    "arm stretched": (0.0023, 0.0022),
-    "knee 60°": (0.001, 0.0007),
-    "combined": (0.0052, 0.0021),
-}
-THESIS["plane 90°"] = (0.0028, 0.0022)  # ARAP, the thesis' own; of the box, as printed in table 6.2
 
 
 def bound(scene: Scene) -> tuple[es.deformation.Binding, list[es.Rotation | es.Translation]]:
@@ -68,58 +60,15 @@ def compared(scene: Scene) -> dict[str, Any]:
     return rows
 
 
-def printed(results: dict[str, Any]) -> str:
-    """Return the tables in Markdown."""
-    lines = [
-        "| edges, RMS of relative changes | " + " | ".join(METHODS) + " |",
-        "|---|" + "---|" * len(METHODS),
-    ]
-    lines += [
-        f"| {name} | " + " | ".join(f"{row[m]['edges']:.4f}" for m in METHODS) + " |"
-        for name, row in results.items()
-    ]
-    lines += [
-        "",
-        "| of the box's diagonal | "
-        + " | ".join(METHODS)
-        + " | thesis' ARAP, printed | thesis, printed |",
-    ]
-    lines += ["|---|" + "---|" * (len(METHODS) + 2)]
-    for name, row in results.items():
-        theirs = [f"{value}" for value in THESIS.get(name, ("", ""))]
-        lines.append(
-            f"| {name} | "
-            + " | ".join([f"{row[m]['of the box']:.5f}" for m in METHODS] + theirs)
-            + " |"
-        )
-    lines += [
-        "",
-        "| least area, after over before; flipped faces; pairs that cross | "
-        + " | ".join(METHODS)
-        + " |",
-    ]
-    lines += ["|---|" + "---|" * len(METHODS)]
-    for name, row in results.items():
-        cells = [
-            f"{row[m]['least area']:.2f}; {row[m]['flipped']}; {row[m]['crossing']:,}"
-            for m in METHODS
-        ]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
-
-
 def main() -> None:
     """Measure, print and save."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help=", ".join(QUICK))
+    parser = options_of(__doc__, quick=", ".join(QUICK), out="ch6-results.json")
     parser.add_argument("--only", nargs="*", choices=list(SCENES), help="scenes")
-    parser.add_argument("--out", type=output_file, default="ch6-results.json")
     chosen = parser.parse_args()
     scenes = QUICK if chosen.quick else {name: SCENES[name] for name in chosen.only or SCENES}
     if not chosen.quick:
         require_data()
     results = {name: compared(make()) for name, make in track(scenes.items(), "bending")}
-    print(printed(results))
     give_out(rounded(results), chosen.out)
 
 

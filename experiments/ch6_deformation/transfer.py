@@ -1,6 +1,5 @@
 """Poses of one animal given to another by six landmarks and a functional map: horse to camel, cat to lion."""
 
-import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from outputs import give_out, output_file, output_folder
+from outputs import give_out, options_of, output_folder
 from real_shapes import DATA, require_data
 
 import eigenshape as es
@@ -44,9 +43,8 @@ PAIRS = {
 
 def main() -> None:
     """Map, transfer, measure and draw."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = options_of(__doc__, quick=None, out="ch6-transfer.json")
     parser.add_argument("--folder", type=output_folder, default="ch6-pictures")
-    parser.add_argument("--out", type=output_file, default="ch6-transfer.json")
     chosen = parser.parse_args()
     require_data()
     give_out(

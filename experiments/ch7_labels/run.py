@@ -3,7 +3,6 @@
 What is done is kept in a folder, so that a stopped run goes on where it was.
 """
 
-import argparse
 import json
 import sys
 from functools import lru_cache
@@ -15,7 +14,7 @@ from rich.progress import track
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from outputs import give_out, output_file, output_folder
+from outputs import give_out, options_of, output_folder
 from real_shapes import DATA, first_members, labeled_shapes, require_data
 
 N_TUNED = 5  # first members of each class: constants were chosen on them, and they are the sources
@@ -163,15 +162,13 @@ def pairs(half: str, quick: bool) -> list[tuple[tuple, list[tuple]]]:
 
 def main() -> None:
     """Measure every target, print and save the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help=f"one target of the classes {', '.join(QUICK)}"
+    parser = options_of(
+        __doc__, quick=f"one target of the classes {', '.join(QUICK)}", out="ch7-labels.json"
     )
     parser.add_argument("--half", choices=("tuning", "reporting"), default="reporting")
     parser.add_argument(
         "--db", type=output_folder, default="ch7-labels", help="folder of what is done, kept"
     )
-    parser.add_argument("--out", type=output_file, default="ch7-labels.json")
     arguments = parser.parse_args()
     require_data()
     wanted = pairs(arguments.half, arguments.quick)

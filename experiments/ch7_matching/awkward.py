@@ -1,6 +1,5 @@
 """Raw files to dense correspondences: skulls as they were published, and small awkward files."""
 
-import argparse
 import json
 import re
 import sys
@@ -17,7 +16,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import give_out, output_file
+from outputs import give_out, options_of
 from real_shapes import DATA, require_data
 
 # A turn, so that awkward files are not matched to themselves in place
@@ -169,12 +168,10 @@ def torn(names: list[str], folder: Path) -> dict[str, dict[str, object]]:
 
 def main() -> None:
     """Match all, print and save the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help="three awkward files and one torn part"
+    parser = options_of(
+        __doc__, quick="three awkward files and one torn part", out="ch7-awkward.json"
     )
     parser.add_argument("--skulls", action="store_true", help="the skulls instead of the files")
-    parser.add_argument("--out", type=output_file, default="ch7-awkward.json")
     arguments = parser.parse_args()
     require_data()
     files = sorted(path for path in (DATA / "nasty").glob("*/*") if path.is_file())

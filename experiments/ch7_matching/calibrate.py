@@ -3,7 +3,6 @@
 Tuning animals only: stretched parts, plain pairs, and parts matched to shapes of other kinds.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -18,7 +17,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import give_out, output_file, output_folder
+from outputs import give_out, options_of, output_folder
 from real_shapes import DATA, require_data
 
 STRETCHED = "stretched"
@@ -178,12 +177,10 @@ def compare(rows: list[dict[str, object]]) -> dict[str, dict[str, object]]:
 
 def main() -> None:
     """Match, fit, and print constants, errors and scores."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="three parts")
+    parser = options_of(__doc__, quick="three parts", out="ch7-calibrate.json")
     parser.add_argument(
         "--lions", type=output_folder, help="folder --db of run.py: compare on lions, too"
     )
-    parser.add_argument("--out", type=output_file, default="ch7-calibrate.json")
     arguments = parser.parse_args()
     require_data()
     rows = collect(quick=arguments.quick)

@@ -1,6 +1,5 @@
 """Harder questions to dense correspondences: unknown scale, several pieces, bridges, other individuals."""
 
-import argparse
 import json
 import sys
 from itertools import chain, pairwise
@@ -15,7 +14,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import give_out, output_file, save_figures
+from outputs import give_out, options_of, save_figures
 from real_shapes import DATA, labeled_shapes, require_data
 
 N_PAIRS, FIRST_SEED = 4, 800  # of each set
@@ -118,9 +117,7 @@ def read_named(
 
 def main() -> None:
     """Measure each set, print and save the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="two hands")
-    parser.add_argument("--out", type=output_file, default="ch7-further.json")
+    parser = options_of(__doc__, quick="two hands", out="ch7-further.json")
     arguments = parser.parse_args()
     require_data()
     if arguments.quick:

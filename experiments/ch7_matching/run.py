@@ -3,7 +3,6 @@
 What is done is kept in a folder, so that a stopped run goes on where it was.
 """
 
-import argparse
 import sys
 import time
 from itertools import chain
@@ -18,7 +17,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import chart, label, rounded
-from outputs import give_out, output_file, output_folder
+from outputs import give_out, options_of, output_folder
 from real_shapes import require_data
 
 HERE = Path(__file__).parent
@@ -157,12 +156,10 @@ def draw_examples(found: dict[str, list], wanted: list[tuple], folder: Path) -> 
 
 def main() -> None:
     """Measure every pair, print and save the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="two parts of lions")
+    parser = options_of(__doc__, quick="two parts of lions", out="ch7-matching.json")
     parser.add_argument(
         "--db", type=output_folder, default="ch7-matching", help="folder of what is done, kept"
     )
-    parser.add_argument("--out", type=output_file, default="ch7-matching.json")
     parser.add_argument("--figures", type=output_folder, help="draw pictures into this folder")
     arguments = parser.parse_args()
     require_data()

@@ -1,6 +1,5 @@
 """Errors that the docs print: curvature, distances, heat traces, geometry from eigenvalues, clusters, bends."""
 
-import argparse
 import sys
 import warnings
 from collections.abc import Callable
@@ -20,7 +19,7 @@ import eigenshape as es
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 from frame import rounded
-from outputs import give_out, output_file
+from outputs import give_out, options_of
 from real_shapes import DATA, require_data
 
 SPHERE_TRACE = sum(
@@ -291,9 +290,7 @@ PARTS: dict[str, Callable[..., dict[str, Any]]] = {
 
 def main() -> None:
     """Measure all, print it, and write it where it was asked for."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a smaller form, in seconds")
-    parser.add_argument("--out", type=output_file, help="write the figures as JSON")
+    parser = options_of(__doc__)
     options = parser.parse_args()
     results = {name: part(quick=options.quick) for name, part in PARTS.items()}
     if not options.quick:

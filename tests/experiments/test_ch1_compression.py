@@ -1,4 +1,4 @@
-"""Compressed meshes beside gzip and Draco: what the README shows and claims."""
+"""Compressed meshes beside gzip and Draco: what the README claims."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,6 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch1_compression"
 FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
-README = (FOLDER / "README.md").read_text()
 
 
 def test_at_equal_error_coordinates_are_smaller_than_gzip_s_on_three_classics():

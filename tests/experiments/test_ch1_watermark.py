@@ -1,4 +1,4 @@
-"""Watermarks after attacks, and false alarms: what the README shows and claims."""
+"""Watermarks after attacks, and false alarms: what the README claims."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,6 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch1_watermark"
 FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
-README = (FOLDER / "README.md").read_text()
 SURVIVED = (
     "none",
     "turned, scaled, moved",
@@ -27,12 +26,6 @@ def test_wrong_keys_are_not_found():
     wrong = FULL["wrong keys"]
     assert wrong["tries"] == 10_000
     assert wrong["found"] == 0
-
-
-def test_the_text_says_what_wrong_keys_find():
-    wrong = FULL["wrong keys"]
-    assert f"{wrong['below 1e-3']} have a probability below 0.001" in README
-    assert f"highest score is {wrong['highest score']:.2f}" in README
 
 
 @pytest.mark.long

@@ -1,4 +1,4 @@
-"""Pointwise convergence: what the README shows and claims."""
+"""Pointwise convergence: what the README claims."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,6 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch2_pointwise"
 FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
-README = (FOLDER / "README.md").read_text()
 
 
 def test_only_the_pointwise_rule_and_the_theorem_converge():

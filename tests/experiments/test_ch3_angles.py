@@ -1,4 +1,4 @@
-"""Angles of eigenspaces: what the README shows and claims."""
+"""Angles of eigenspaces: what the README claims."""
 
 import json
 from pathlib import Path
@@ -7,15 +7,6 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_angles"
 FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
-README = (FOLDER / "README.md").read_text()
-SHOWN = (
-    "median",
-    "first ten",
-    "largest",
-    "median, wide gaps",
-    "median, narrow gaps",
-    "rank correlation with the gap",
-)
 
 
 def test_angles_grow_with_the_change_and_shrink_with_the_gap():

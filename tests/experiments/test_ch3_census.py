@@ -27,12 +27,6 @@ def total(result, solver, what):
     return result["table"][solver]["all"][what]
 
 
-def test_the_readme_says_how_many_solves_there_are():
-    text = (FOLDER / "README.md").read_text()
-    solves = total(FULL, "eigenshape", "solves")
-    assert f"{solves:,} solves of {FULL['operators']} operators" in " ".join(text.split())
-
-
 @pytest.mark.long
 @pytest.mark.data
 def test_ours_is_never_wrong_and_peers_are(quick_form):

@@ -1,11 +1,10 @@
-"""Figure 3.4 by the operator of the thesis: what the README shows and claims."""
+"""Figure 3.4 by the operator of the thesis: what the README claims."""
 
 import json
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_poses"
 FULL = json.loads((FOLDER / "expected_figure_3_4.json").read_text())["full"]
-README = (FOLDER / "README.md").read_text()
 
 
 def test_by_the_printed_operator_a_crouching_man_is_farther_from_himself_than_a_horse_is():

@@ -1,6 +1,5 @@
-"""Meshes of one genus 3 surface: what the README shows and claims."""
+"""Meshes of one genus 3 surface: what the README claims."""
 
-import json
 import runpy
 from pathlib import Path
 
@@ -10,8 +9,6 @@ import pytest
 import eigenshape as es
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_genus3"
-FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
-README = (FOLDER / "README.md").read_text()
 OTHER = runpy.run_path(str(FOLDER / "meshes.py"))
 
 

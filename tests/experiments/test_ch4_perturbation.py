@@ -1,15 +1,8 @@
-"""Points moved by noise: what the README shows and claims."""
-
-import json
-from pathlib import Path
+"""Points moved by noise: what the README claims."""
 
 import numpy as np
 import pytest
 from quick_forms import largest
-
-FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch4_perturbation"
-FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
-SAMPLES = FULL["samples"]
 
 
 @pytest.mark.long

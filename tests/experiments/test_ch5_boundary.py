@@ -1,4 +1,4 @@
-"""Boundary conditions in matching: what the README shows and claims."""
+"""Boundary conditions in matching: what the README claims."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,6 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch5_boundary"
 FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
-README = (FOLDER / "README.md").read_text()
 
 
 def test_without_reflections_heat_changes_least_and_finds_most():

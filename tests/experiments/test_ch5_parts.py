@@ -1,12 +1,6 @@
-"""The experiment on parts: what the README shows and claims."""
-
-import json
-from pathlib import Path
+"""The experiment on parts: what the README claims."""
 
 import pytest
-
-FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch5_parts"
-FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
 
 
 @pytest.mark.long

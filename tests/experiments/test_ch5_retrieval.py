@@ -1,6 +1,5 @@
 """The retrieval experiment: draws, scores and the store are what they say, and so is the README."""
 
-import json
 import sys
 from collections import Counter
 from pathlib import Path
@@ -11,7 +10,6 @@ import pytest
 import eigenshape as es
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch5_retrieval"
-FULL = json.loads((FOLDER / "expected.json").read_text())["full"]
 sys.path[:0] = [str(FOLDER), str(FOLDER.parent)]
 import describing  # noqa: E402
 import draws  # noqa: E402

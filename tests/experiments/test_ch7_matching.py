@@ -1,13 +1,6 @@
-"""The experiment on dense correspondences: what its README shows."""
-
-import json
-from pathlib import Path
+"""The experiment on dense correspondences: what its README claims."""
 
 import pytest
-
-FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch7_matching"
-EXPECTED = json.loads((FOLDER / "expected.json").read_text())
-FULL, FURTHER, CALIBRATED = EXPECTED["full"], EXPECTED["further"], EXPECTED["calibrate"]
 
 
 @pytest.mark.long

@@ -112,6 +112,27 @@ def test_numbers_of_an_experiment_are_those_at_their_paths(a_page, tmp_path):
     assert refused == "page.md: numbers without a source in the column points"
 
 
+def test_sentences_say_the_figures_of_their_files(a_page, tmp_path):
+    (tmp_path / "found.json").write_text(json.dumps({"full": {"cats: 2": [0.127, 1234]}}))
+    page = "The share is 12.7 % of\n1,234 cats.\n\n<!-- sentences: found.json>full\n"
+    page += "share is {cats: 2>0:.1%} % of {cats: 2>1:,} cats\n-->\n"
+    assert a_page(page) == []
+    assert a_page(page.replace("12.7", "12.8")) == [
+        "page.md: it must say, as its file does: share is 12.7 % of 1,234 cats"
+    ]
+
+
+def test_a_readme_s_tables_are_read_with_the_figures_of_a_run(tmp_path):
+    head = "| part | share |\n|---|---|\n"
+    comment = "<!-- figures: expected.json>full>parts\ncat | dog\n= | {share:.0%} % -->\n"
+    (tmp_path / "README.md").write_text(comment + head + "| a cat | 1 % |\n| a dog | 2 % |\n")
+    (tmp_path / "run.json").write_text(json.dumps({"parts": {"dog": {"share": 0.07}}}))
+    tables = FIGURES["tables_of_run"](tmp_path / "expected.json", tmp_path / "run.json")
+    assert tables == head + "| a dog | 7 % |\n"
+    (tmp_path / "run.json").write_text("{}")
+    assert FIGURES["tables_of_run"](tmp_path / "expected.json", tmp_path / "run.json") == ""
+
+
 def test_every_benchmark_that_is_listed_is_shown():
     shown = {
         name
