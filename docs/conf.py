@@ -79,7 +79,9 @@ def write_api_pages() -> None:
         ]
         for kind, names in kinds.items():
             if names and kind == "Values":
-                lines += [kind, "-" * len(kind), "", *[f"- ``{each}``" for each in names], ""]
+                lines += [kind, "-" * len(kind), ""]
+                lines += [f"- ``{each}``{meaning(things[each])}" for each in names]
+                lines += [""]
             elif names:
                 lines += [kind, "-" * len(kind), "", ".. autosummary::"]
                 lines += [] if room is es else ["   :toctree: generated"]
@@ -92,6 +94,14 @@ def write_api_pages() -> None:
         "# API\n\nNames of the short door are there as `es.name`; all others stand in their room, as "
         f"`es.geometry.weld`.\n\n```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n",
     )
+
+
+def meaning(thing: object) -> str:
+    """Return what a value says of itself, if it has a docstring of its own, not that of its class."""
+    doc = getattr(thing, "__doc__", None)
+    if not isinstance(doc, str) or doc == type(thing).__doc__:
+        return ""
+    return f": {doc.splitlines()[0]}"
 
 
 def write_if_changed(path: Path, text: str) -> None:

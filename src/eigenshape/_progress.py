@@ -6,6 +6,8 @@ from typing_extensions import TypeAliasType
 
 # Called with the fraction done, in 0..1, and a short message. `help` shows the name.
 Progress = TypeAliasType("Progress", Callable[[float, str], None])
+# Called after each file of a batch: how many are done, of how many, the name, and the error if any.
+Callback = TypeAliasType("Callback", Callable[[int, int, str, str | None], None])
 
 
 def silent(fraction: float, message: str) -> None:

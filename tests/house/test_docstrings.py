@@ -2,6 +2,7 @@
 
 import doctest
 import inspect
+import pydoc
 
 import pytest
 from public_names import public_things
@@ -56,3 +57,34 @@ def test_every_public_function_and_class_has_a_docstring_of_one_sentence_first()
     for name, thing in THINGS.items():
         first = inspect.getdoc(thing).split("\n\n")[0]
         assert first.rstrip().endswith("."), name
+
+
+# Five lines of a terminal. A signature is the first thing that `help` shows; what makes one longer,
+# a union or a list of names, has a name of its own (TypeAliasType), which its docstring explains.
+LONGEST_SIGNATURE = 450
+
+
+def test_signatures_can_be_read():
+    functions = {name: thing for name, thing in THINGS.items() if inspect.isroutine(thing)}
+    methods = {
+        f"{name}.{each}": getattr(thing, each)
+        for name, thing in THINGS.items()
+        if inspect.isclass(thing)
+        for each in vars(thing)
+        if not each.startswith("_")
+    }
+    lengths = {
+        name: len(str(inspect.signature(thing)))
+        for name, thing in (functions | methods).items()
+        if inspect.isfunction(inspect.unwrap(thing)) or inspect.ismethod(thing)
+    }
+    assert {"solve_spectrum", "ShapeIndex.add", "ShapeIndex.create"} <= lengths.keys()
+    assert not {name: n for name, n in lengths.items() if n > LONGEST_SIGNATURE}
+
+
+@pytest.mark.parametrize("name", es.types.__all__)
+def test_help_says_what_a_type_stands_for(name):
+    text = pydoc.plain(pydoc.render_doc(getattr(es.types, name)))
+    first = text.splitlines()[3].strip()
+    assert first.endswith("."), text
+    assert "alias" not in text.split("\n", 1)[1]

@@ -1,10 +1,10 @@
 """Point clouds: points that sample a manifold of known dimension."""
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float
+from typing_extensions import TypeAliasType
 
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
@@ -64,4 +64,4 @@ class PointCloud(ReadOnly):
         return f"PointCloud({self.n_points} points in R^{self.points.shape[1]}, dim={self.dim})"
 
 
-Shape: TypeAlias = Mesh | PointCloud
+Shape = TypeAliasType("Shape", Mesh | PointCloud)

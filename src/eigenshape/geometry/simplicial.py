@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Int
+from typing_extensions import TypeAliasType
 
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
@@ -100,4 +100,4 @@ class SimplicialMesh(ReadOnly):
         return f"SimplicialMesh({where}, {self.n_simplices} simplices of dimension {self.dim})"
 
 
-Mesh: TypeAlias = TriangleMesh | SimplicialMesh
+Mesh = TypeAliasType("Mesh", TriangleMesh | SimplicialMesh)

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
+from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, real_numbers, whole_number
@@ -18,8 +19,9 @@ from eigenshape.geometry.measure import area_vectors, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 
-Up = Literal["auto", "x", "y", "z", "-x", "-y", "-z"] | ArrayLike
-View = (
+Up = TypeAliasType("Up", Literal["auto", "x", "y", "z", "-x", "-y", "-z"] | ArrayLike)
+View = TypeAliasType(
+    "View",
     Literal[
         "auto",
         "front",
@@ -33,7 +35,7 @@ View = (
         "back-left",
         "back-right",
     ]
-    | ArrayLike
+    | ArrayLike,
 )
 UP_NAMES = ("auto", "x", "y", "z", "-x", "-y", "-z")
 # The parts of front, left and up in the direction to the viewer, for each name of a view. Views of

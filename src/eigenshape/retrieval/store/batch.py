@@ -12,6 +12,8 @@ from pathlib import Path
 from time import monotonic, time
 from typing import SupportsIndex
 
+from typing_extensions import TypeAliasType
+
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
@@ -36,9 +38,10 @@ from eigenshape.retrieval.store.upkeep import find_damaged
 from eigenshape.retrieval.store.writing import DescribedShape, describe_to_store
 from eigenshape.scans.partial import view_number
 
-Read = Callable[[Path], MeshLike | RepairedMesh[TriangleMesh]]
+Recipes = TypeAliasType("Recipes", Sequence[AnyRecipe])
+Read = TypeAliasType("Read", Callable[[Path], MeshLike | RepairedMesh[TriangleMesh]])
 ReadRepaired = Callable[[Path], tuple[TriangleMesh, tuple[str, ...]]]
-Callback = Callable[[int, int, str, str | None], None]
+Callback = TypeAliasType("Callback", Callable[[int, int, str, str | None], None])
 # Shapes that a codebook is learned from. A hundred closed ones have 45,000 patches for its 32
 # Gaussians, and take some minutes; fewer than 40 leave it to the codebook of the library.
 FEWEST_TO_TRAIN, MOST_TO_TRAIN = 40, 100
@@ -107,7 +110,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     items: Sequence[Item],
     read: Read,
     *,
-    recipes: Sequence[AnyRecipe] | None = None,
+    recipes: Recipes | None = None,
     learn: bool = False,
     repairs: Sequence[str] = (),
     n_views: SupportsIndex | None = None,

@@ -4,21 +4,26 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias, get_args
 
+from typing_extensions import TypeAliasType
+
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 
-Promise = Literal[
-    "constants",  # W annihilates the constants of each component, and nothing else
-    "components",  # nothing joins components of the shape
-    "definite",  # nothing is annihilated, as where every component has a fixed point
-    "volume",  # B adds up to the volume of the shape
-    "nonnegative_weights",  # w_ij ≥ 0: the maximum principle
-    "rigid_motion",
-    "reflection",
-    "orientation",
-    "scaling",
-    "union",
-]
+Promise = TypeAliasType(
+    "Promise",
+    Literal[
+        "constants",  # W annihilates the constants of each component, and nothing else
+        "components",  # nothing joins components of the shape
+        "definite",  # nothing is annihilated, as where every component has a fixed point
+        "volume",  # B adds up to the volume of the shape
+        "nonnegative_weights",  # w_ij ≥ 0: the maximum principle
+        "rigid_motion",
+        "reflection",
+        "orientation",
+        "scaling",
+        "union",
+    ],
+)
 
 # What every Laplace operator of a shape is expected to keep, whatever it was made from.
 DEFAULT_PROMISES: frozenset[Promise] = frozenset(
@@ -151,10 +156,11 @@ def make_report(found: Iterable[Law | SkippedLaw]) -> OperatorReport:
 def check_promises(promises: Iterable[Promise]) -> frozenset[Promise]:
     """Return the promises as a set, refusing one that is unknown."""
     given = frozenset(promises)
-    unknown = sorted(given - frozenset(get_args(Promise)), key=str)
+    names = get_args(Promise.__value__)
+    unknown = sorted(given - frozenset(names), key=str)
     if unknown:
         raise InvalidParameterError(
-            f"promises must be among {', '.join(get_args(Promise))}; {unknown[0]!r} is not."
+            f"promises must be among {', '.join(names)}; {unknown[0]!r} is not."
         )
     return given
 

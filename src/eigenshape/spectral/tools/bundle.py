@@ -24,7 +24,7 @@ from eigenshape._errors import (
     MissingExtraError,
 )
 from eigenshape._files import as_path
-from eigenshape._progress import Progress
+from eigenshape._progress import Callback, Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers, run_in_workers
@@ -48,7 +48,6 @@ from eigenshape.spectral.tools.vertex_gradient import (
 Form = Literal["scipy", "numpy", "torch"]
 Precision = Literal["single", "double"]
 Read = Callable[[Path], ShapeLike]
-Callback = Callable[[int, int, str, str | None], None]
 
 
 @dataclass(frozen=True, eq=False)
