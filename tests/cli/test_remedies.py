@@ -24,7 +24,7 @@ from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.io.shape_files import write_points
 from eigenshape.io.surfaces import read_surface
-from eigenshape.operators.choices import OPERATOR_NAMES
+from eigenshape.operators.catalog import OPERATORS
 from eigenshape.shapes.surfaces import icosphere
 
 MOST_REMEDIES = 3
@@ -32,7 +32,7 @@ LARGEST = 300_000  # bytes of a file; larger ones are slow, and other tests read
 NAMES = "|".join(MESH_REPAIRS)
 REMEDIES = {
     "--repair": rf"--repair ((?:{NAMES})(?:,(?:{NAMES}))*)",
-    "--operator": rf"--operator ({'|'.join(OPERATOR_NAMES)})",
+    "--operator": rf"--operator ({'|'.join(OPERATORS)})",
     "--scale": "--scale (unknown)",
 }
 # What cannot be answered, and why.

@@ -13,6 +13,7 @@ from broken_meshes import (
     with_flat_simplices,
     with_loose_points,
 )
+from registered_operators import of_surfaces
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.features.parts import find_parts
@@ -26,13 +27,10 @@ from eigenshape.geometry.samples.cloud_measure import cloud_quadrature
 from eigenshape.geometry.samples.quadrature import mesh_quadrature
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import curvature_tensors
-from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
-from eigenshape.operators.fem import fem_laplacian
 from eigenshape.operators.graph import graph_laplacian
-from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.smoothing import noise_level
 from eigenshape.retrieval.baselines.affinity import affinity_eigenvalues
 from eigenshape.retrieval.baselines.shape_dna import shape_dna
@@ -52,11 +50,8 @@ from eigenshape.spectral.solve import solve_spectrum
 
 BALL = icosphere(2)
 OPERATORS = {
-    "cotangent": cotangent_laplacian,
-    "p2": fem_laplacian,
+    **of_surfaces(),
     "crouzeix_raviart": crouzeix_raviart_laplacian,
-    "mesh": mesh_laplacian,
-    "robust": robust_laplacian,
     "connection": connection_laplacian,
     "brackets": lambda mesh: bracket_eigenvalues(mesh, 4),
     "quadrature": mesh_quadrature,

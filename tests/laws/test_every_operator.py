@@ -1,6 +1,6 @@
 """Every operator on every kind of shape, under every boundary condition, against every law that it promises.
 
-One line of `TABLE` adds an operator.
+A registered operator promises `DEFAULT_PROMISES`. One with other promises, or several forms, has rows in `TABLE`.
 """
 
 from collections.abc import Callable
@@ -13,6 +13,7 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from registered_operators import function_of
 
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
@@ -22,6 +23,7 @@ from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.boundary import dirichlet_laplacian
+from eigenshape.operators.catalog import OPERATORS
 from eigenshape.operators.clouds.cloud_kernel import point_cloud_laplacian
 from eigenshape.operators.clouds.gaussian import gaussian_laplacian, mesh_laplacian
 from eigenshape.operators.clouds.kernel import neighbor_distance
@@ -277,6 +279,20 @@ TABLE = [
         for kind in ("combinatorial", "weighted", "normalized")
     ],
 ]
+DRAWN = {TriangleMesh: surface, SimplicialMesh: solid, PointCloud: cloud, sp.sparray: graph}
+
+
+def rows_of_registry(table: list[Row]) -> list[Row]:
+    """Return a row for each registered operator that a table lacks."""
+    there = {function_of(row.build) for row in table}
+    return [
+        Row(name, entry.build, tuple(DRAWN[kind] for kind in entry.shapes), DEFAULT_PROMISES)
+        for name, entry in OPERATORS.items()
+        if function_of(entry.build) not in there
+    ]
+
+
+TABLE += rows_of_registry(TABLE)
 BOUNDED = {
     surface: sheet,
     SMALL[0]: sheet,

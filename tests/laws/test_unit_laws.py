@@ -13,6 +13,7 @@ import pytest
 import scipy.sparse as sp
 from laws.natural_slips import kinds
 from public_names import public_things
+from registered_operators import builders
 
 import eigenshape as es
 from eigenshape import calculus, deformation, geometry, operators, spectral, stability
@@ -152,7 +153,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "find_parts": (0, lambda s: es.find_parts(s.mesh).parts.labels),
     "partial_scan": (1, lambda s: es.partial_scan(s.mesh, [0, 0, 1], resolution=60).mesh),
     "persistence_diagram": (0, lambda s: es.features.persistence_diagram(s.mesh, s.f).maxima),
-    "point_cloud_laplacian": (2, lambda s: es.point_cloud_laplacian(s.cloud).mass),
     "pointwise_time": (2, lambda s: operators.pointwise_time(s.mesh)),
     "poisson_solver": (0, lambda s: calculus.poisson_solver(s.laplacian, [0]).solve(s.f)),
     "polyharmonic_matrix": (-4, lambda s: calculus.polyharmonic_matrix(s.laplacian, 3)),
@@ -175,7 +175,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
             deformation.replay(s.rig, [deformation.Edit((deformation.Move(s.region, TURN),))]).mesh
         ),
     ),
-    "robust_laplacian": (2, lambda s: es.robust_laplacian(s.mesh).mass),
     "sample_surface": (
         1,
         lambda s: geometry.sample_surface(s.mesh, 50, rng=np.random.default_rng(0)).points,
@@ -278,6 +277,20 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         lambda s: stability.weyl_bound(s.laplacian, es.cotangent_laplacian(s.other)).norm,
     ),
 }
+
+
+def law_of_operator(entry: es.operators.Operator) -> tuple[int, Callable[[Shapes], Any]]:
+    """Return the law of a registered operator: its eigenvalues are in 1/length²."""
+
+    def eigenvalues(s: Shapes) -> np.ndarray:
+        shape = next(each for each in (s.mesh, s.solid, s.cloud) if isinstance(each, entry.shapes))
+        return es.solve_spectrum(entry.build(shape), 5).eigenvalues[1:]
+
+    return -2, eigenvalues
+
+
+for _name, _entry in builders().items():
+    LAWS.setdefault(_name, law_of_operator(_entry))
 
 # Functions of a shape whose answer has no number with a unit: relations of points and faces, lists
 # of vertices, pictures, files, proofs, and estimates that are compared with a model of the unit.

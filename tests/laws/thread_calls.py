@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from qdrant_client import QdrantClient
+from registered_operators import builders
 from search_cases import RECIPE, make_source, mixtures
 
 import eigenshape as es
@@ -645,7 +646,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "patch_scores": lambda v: es.retrieval.patch_scores(v.by_patches[0], v.by_patches),
     "persistence_diagram": lambda v: es.features.persistence_diagram(v.solid, v.solid.points[:, 0]),
     "measure_perturbation": lambda v: es.stability.measure_perturbation(v.ball, v.ball),
-    "point_cloud_laplacian": lambda v: es.point_cloud_laplacian(v.cloud),
     "point_map": lambda v: es.spectral.point_map(v.map),
     "cloud_width": lambda v: es.operators.cloud_width(v.cloud),
     "pointwise_time": lambda v: es.operators.pointwise_time(v.many),
@@ -684,7 +684,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "repair": lambda v: es.repair(v.animal, ["weld", "drop_unreferenced"]),
     "replay": lambda v: es.deformation.replay(v.rig, [v.edit]).mesh,
     "rig_shape": lambda v: es.rig_shape(v.many, v.many_spectrum).factor,
-    "robust_laplacian": lambda v: es.robust_laplacian(v.animal),
     "rotation_from_drag": lambda v: es.deformation.rotation_from_drag(
         [0, 0, 0], [1, 0, 0], [0, 1, 0]
     ),
@@ -820,6 +819,19 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.folder, ".ply", lambda path: es.io.write_points(v.cloud, path)
     ),
 }
+
+
+def call_of_operator(entry: es.operators.Operator) -> Callable[[Shared], object]:
+    """Return a call that builds a registered operator on each shape that it takes."""
+    return lambda v: [
+        entry.build(shape)
+        for shape in (v.animal, v.solid, v.cloud)
+        if isinstance(shape, entry.shapes)
+    ]
+
+
+for _name, _entry in builders().items():
+    CALLS.setdefault(_name, call_of_operator(_entry))
 
 LEFT_OUT = {
     "cache_operator_bundles": "It starts processes, which take seconds to import.",

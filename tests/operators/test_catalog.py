@@ -5,7 +5,6 @@ import scipy.sparse as sp
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.operators.catalog import OPERATORS, build_laplacian
-from eigenshape.operators.choices import OPERATOR_NAMES
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.domains import box, interval
@@ -21,8 +20,10 @@ SHAPES = {
 }
 
 
-def test_the_names_that_help_lists_are_those_of_the_operators():
-    assert tuple(OPERATORS) == OPERATOR_NAMES
+def test_options_are_the_arguments_after_the_shape_that_an_entry_does_not_fix():
+    assert OPERATORS["mesh"].options[:3] == ("t", "h", "edge_factor")
+    assert OPERATORS["robust"].options == ("mollify", "n_neighbors")
+    assert OPERATORS["p3"].options == ()
 
 
 @pytest.mark.parametrize("shape", SHAPES)

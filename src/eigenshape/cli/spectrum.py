@@ -18,7 +18,7 @@ from eigenshape.cli.inputs import (
     UpOption,
     ViewOption,
 )
-from eigenshape.operators.choices import OPERATOR_NAMES, Condition, Distance, Form, Mass
+from eigenshape.operators.choices import Condition, Distance, Form, Mass
 
 USUAL = 20  # pairs
 ORDERS = {"p2": 2, "p3": 3}
@@ -48,8 +48,8 @@ def spectrum(
         typer.Option(
             "--operator",
             help=(
-                f"{', '.join(OPERATOR_NAMES)} (see `eigenshape operators`). By default cotangent for "
-                "meshes, point-cloud for points."
+                "One of those that `eigenshape operators` lists. By default cotangent for meshes, "
+                "point-cloud for points."
             ),
         ),
     ] = None,

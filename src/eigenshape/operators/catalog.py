@@ -1,5 +1,6 @@
 """Operators by name, with what each takes."""
 
+import inspect
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,7 +26,6 @@ from eigenshape.operators.robust import robust_laplacian
 
 MESHES = (TriangleMesh, SimplicialMesh)
 GRAPHS = (*MESHES, sp.sparray)
-KERNEL = ("t", "h", "edge_factor", "correct", "form", "cutoff")
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,6 @@ class Operator:
         Maps a shape and options to a `Laplacian`.
     shapes : tuple of types
         Types of shapes on which the operator is defined.
-    options : tuple of str
-        Names of its options.
     description : str
         One line that says what the operator is.
 
@@ -48,52 +46,53 @@ class Operator:
     >>> import eigenshape as es
     >>> es.operators.OPERATORS["cotangent"].description
     'linear finite elements'
+    >>> es.operators.OPERATORS["cotangent"].options
+    ('mass',)
     """
 
     build: Callable[..., Laplacian]
     shapes: tuple[type, ...]
-    options: tuple[str, ...]
     description: str
 
     __repr__ = short_repr
     _repr_html_ = html_repr
 
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Names of the options, which are the arguments of `build` after the shape."""
+        given = self.build.keywords if isinstance(self.build, partial) else {}
+        _, *names = inspect.signature(self.build).parameters
+        return tuple(name for name in names if name not in given)
 
-# The operator of each name in `OPERATOR_NAMES`.
+
+# The operator of each name. Whatever lists operators reads this table.
 OPERATORS: dict[str, Operator] = {
-    "cotangent": Operator(cotangent_laplacian, MESHES, ("mass",), "linear finite elements"),
+    "cotangent": Operator(cotangent_laplacian, MESHES, "linear finite elements"),
     "p2": Operator(
-        partial(fem_laplacian, order=2), MESHES, (), "quadratic finite elements, nodes on edges too"
+        partial(fem_laplacian, order=2), MESHES, "quadratic finite elements, nodes on edges too"
     ),
     "p3": Operator(
         partial(fem_laplacian, order=3),
         MESHES,
-        (),
         "cubic finite elements, nodes inside triangles too",
     ),
     "robust": Operator(
-        robust_laplacian,
-        (TriangleMesh, PointCloud),
-        ("mollify", "n_neighbors"),
-        "linear elements on intrinsic triangles",
+        robust_laplacian, (TriangleMesh, PointCloud), "linear elements on intrinsic triangles"
     ),
-    "mesh": Operator(
-        mesh_laplacian, MESHES, (*KERNEL, "distance"), "Gaussian kernel, weighted by volumes"
-    ),
+    "mesh": Operator(mesh_laplacian, MESHES, "Gaussian kernel, weighted by volumes"),
     "point-cloud": Operator(
-        point_cloud_laplacian, (PointCloud,), KERNEL, "Gaussian kernel, weights from tangent planes"
+        point_cloud_laplacian, (PointCloud,), "Gaussian kernel, weights from tangent planes"
     ),
     "combinatorial": Operator(
-        partial(graph_laplacian, kind="combinatorial"), GRAPHS, (), "edges of weight 1"
+        partial(graph_laplacian, kind="combinatorial"), GRAPHS, "edges of weight 1"
     ),
     "weighted": Operator(
         partial(graph_laplacian, kind="weighted"),
         GRAPHS,
-        (),
         "weights of the graph, or 1/length on a mesh",
     ),
     "normalized": Operator(
-        partial(graph_laplacian, kind="normalized"), GRAPHS, (), "eigenvalues in 0..2"
+        partial(graph_laplacian, kind="normalized"), GRAPHS, "eigenvalues in 0..2"
     ),
 }
 
