@@ -12,16 +12,32 @@ import eigenshape as es
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
     ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "docs" / "coming_from").glob("*.md")),
     *sorted((ROOT / "experiments").rglob("*.md")),
 ]
+# What stands for the names of files.
+PATTERNS = {"number/recipe/view/", "run.py"}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_names_in_docs_are_there(page):
     for name in set(re.findall(r"\bes\.((?:\w+\.)*\w+)", page.read_text())):
         attrgetter(name)(es)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_in_docs_are_there(page):
+    source = ROOT / "src" / "eigenshape"
+    files = re.findall(r"`(?:python )?([\w./]+\.py|[a-z_]+(?:/[a-z_]+)*/)`", page.read_text())
+    missing = {
+        name
+        for name in files
+        if not any((folder / name).exists() for folder in (ROOT, ROOT / "studio", page.parent))
+        and not list(source.rglob(name))
+    }
+    assert not missing - PATTERNS
 
 
 def test_every_public_name_is_mentioned_beside_the_api_pages():
