@@ -13,7 +13,6 @@ from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.choices import Condition
-from eigenshape.plot.camera import Up, View
 from eigenshape.spectral.laws.report import Promise
 
 __all__ = [
@@ -26,8 +25,6 @@ __all__ = [
     "Region",
     "Shape",
     "ShapeLike",
-    "Up",
-    "View",
 ]
 
 _TEXTS = {
@@ -60,15 +57,6 @@ _TEXTS = {
     """,
     "Shape": """A mesh or a point cloud: an `es.types.Mesh` or an `es.PointCloud`.""",
     "ShapeLike": """A mesh, an object from which `es.as_mesh` makes one, or an `es.PointCloud`.""",
-    "Up": """The direction that is up in a picture.
-
-    "auto", "x", "y", "z", "-x", "-y", "-z", or a vector (3,).
-    """,
-    "View": """The side from which a picture is seen.
-
-    "auto", "front", "back", "left", "right", "top", "bottom", "front-left", "front-right",
-    "back-left", "back-right", or a vector (3,) from the shape to the viewer.
-    """,
 }
 for _name, _text in _TEXTS.items():
     # An alias is no class with a docstring of its own, and refuses to set an attribute; `help`
