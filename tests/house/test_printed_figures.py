@@ -26,7 +26,9 @@ def test_each_run_says_how_it_was_measured(path):
     assert {"command", "date", "commit", "machine", "times", "rows"} <= figures.keys()
     assert {"cpu", "cores", "threads", "load", "versions", "python"} <= figures["machine"].keys()
     assert all((ROOT / place).exists() for place in figures["times"])
-    labels = [tuple(row[:2]) for row in figures["table"]]
+    # what a row is of: its first two cells, and a third where the same points are solved for several k
+    n_labels = 3 if figures["columns"][2] == "pairs" else 2
+    labels = [tuple(row[:n_labels]) for row in figures["table"]]
     assert len(set(labels)) == len(labels) == len(figures["rows"]), "rows of two runs"
 
 
