@@ -346,7 +346,7 @@ SLIPS: dict[str, Callable[[], Any]] = {
     "cloud": lambda: es.PointCloud(body().vertices),
     "tetrahedra": lambda: es.shapes.box(2, 2, 2),
     "points": lambda: body().vertices,
-    "repaired": lambda: es.geometry.weld(body()),
+    "repaired": lambda: es.repair(body(), ["weld"]),
     "laplacian": lambda: es.cotangent_laplacian(body()),
     "matrix": lambda: sp.eye_array(3, format="csr"),
     "spectrum": spectrum,

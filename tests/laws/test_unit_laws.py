@@ -16,6 +16,7 @@ from public_names import public_things
 
 import eigenshape as es
 from eigenshape import calculus, deformation, geometry, operators, spectral, stability
+from eigenshape.geometry.repair_names import MESH_REPAIRS
 
 UNITS = (2.0**-20, 2.0**20)
 TURN = es.Rotation([0, 0, 0], [1, 0, 0], 0.4)
@@ -104,7 +105,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "farthest_points": (0, lambda s: geometry.farthest_points(s.mesh, 9)[0]),
     "fem_laplacian": (3, lambda s: operators.fem_laplacian(s.solid, 2).mass),
     "fem_nodes": (1, lambda s: operators.fem_nodes(s.solid, 2)),
-    "fill_holes": (1, lambda s: geometry.fill_holes(s.sheet).mesh),
     "flatten_conformally": (1, lambda s: calculus.flatten_conformally(s.sheet)),
     "functional_map": (
         0,
@@ -228,7 +228,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         ),
     ),
     "vertex_normals": (0, lambda s: geometry.vertex_normals(s.mesh)),
-    "weld": (1, lambda s: geometry.weld(s.mesh).mesh),
     "compare_spectra": (0, lambda s: spectral.compare_spectra(s.spectrum, s.spectrum).relative),
     "winding_numbers": (0, lambda s: geometry.winding_numbers(s.mesh, s.other.vertices)),
     "affinity_eigenvalues": (0, lambda s: es.retrieval.baselines.affinity_eigenvalues(s.mesh)),
@@ -241,11 +240,9 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "build_laplacian": (2, lambda s: es.build_laplacian(s.mesh, "cotangent").mass),
     "cheeger_estimate": (-1, lambda s: stability.cheeger_estimate(s.mesh, s.spectrum).upper),
     "cloud_quadrature": (2, lambda s: geometry.cloud_quadrature(s.cloud).weights),
-    "collapse_needles": (1, lambda s: geometry.collapse_needles(s.mesh).mesh),
     "curl_matrix": (1, lambda s: calculus.curl_matrix(s.mesh)),
     "dirichlet_laplacian": (2, lambda s: operators.dirichlet_laplacian(s.laplacian, [0])[0].mass),
     "divergence_matrix": (1, lambda s: calculus.divergence_matrix(s.mesh)),
-    "drop_degenerate": (1, lambda s: geometry.drop_degenerate(s.mesh).mesh),
     "embed_watermark": (1, lambda s: spectral.embed_watermark(s.mesh, "a key", k=30)),
     "extract_patches": (
         0,
@@ -254,17 +251,20 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "find_heat_features": (0, lambda s: es.retrieval.find_heat_features(s.mesh).parts.labels),
     "geodesic_balls": (1, lambda s: geometry.geodesic_balls(s.mesh, 0.4 * s.u)),
     "geodesic_waves": (1, lambda s: geometry.geodesic_waves(s.mesh)(0, s.u)[1]),
-    "largest_component": (1, lambda s: geometry.largest_component(s.mesh).mesh),
-    "orient": (1, lambda s: geometry.orient(s.mesh).mesh),
     "orient_outward": (1, lambda s: geometry.orient_outward(s.mesh)),
     "part_spectrum": (-2, lambda s: es.features.part_spectrum(s.mesh).eigenvalues[1:]),
     "random_planes": (
         1,
         lambda s: es.scans.random_planes(s.mesh, np.random.default_rng(0))[:, 3],
     ),
-    "cut_one_sided": (1, lambda s: es.geometry.cut_one_sided(s.mesh).mesh),
     "decimate": (1, lambda s: es.geometry.decimate(s.mesh, ratio=0.5).mesh),
-    "repair": (1, lambda s: es.repair(s.mesh, ["auto"]).mesh),
+    "repair": (
+        1,
+        lambda s: np.concatenate(
+            [es.repair(s.mesh, [name]).mesh.vertices for name in MESH_REPAIRS]
+            + [es.repair(s.sheet, ["fill_holes"]).mesh.vertices]
+        ),
+    ),
     "rig_shape": (1, lambda s: es.deform(s.rig, s.region, TURN)),
     "transport_vectors": (
         0,
@@ -272,7 +272,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
             calculus.prepare_vector_heat(s.mesh), [0, 9], np.eye(2)
         ),
     ),
-    "weld_seams": (1, lambda s: geometry.weld_seams(s.mesh).mesh),
     "weyl_bound": (
         -2,
         lambda s: stability.weyl_bound(s.laplacian, es.cotangent_laplacian(s.other)).norm,
@@ -344,9 +343,6 @@ WITHOUT = {
 # Others that are the same code as a row above, or have laws of the unit of their own.
 ELSEWHERE = {
     "compress_mesh",
-    "drop_duplicate_faces",
-    "drop_duplicate_points",
-    "drop_unreferenced",
     "fuse_scans",
     "prepare_target",
     "carry_attributes",

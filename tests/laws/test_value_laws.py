@@ -43,12 +43,10 @@ CALLED = [
     "check_laplacian",
     "cheeger_estimate",
     "cloud_quadrature",
-    "collapse_needles",
     "cut_by_planes",
     "decompose_field",
     "detect_watermark",
     "draw",
-    "drop_duplicate_points",
     "edge_table",
     "enclosing_ball",
     "facet_table",
@@ -62,6 +60,7 @@ CALLED = [
     "nodal_domains",
     "part_tree",
     "principal_curvatures",
+    "repair",
     "weyl_bound",
 ]
 MADE: dict[str, Callable[[Shared], Any]] = {

@@ -12,6 +12,7 @@ from qdrant_client import QdrantClient
 from search_cases import RECIPE, make_source, mixtures
 
 import eigenshape as es
+from eigenshape.geometry.repair_names import MESH_REPAIRS
 from eigenshape.retrieval.search.coarse import coarse_rows
 
 
@@ -310,7 +311,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "IndexReader": asked,
     "Matches.classify": classes,
     "carry_attributes": lambda v: es.io.carry_attributes(v.attributes, es.icosphere(1)).mesh,
-    "cut_one_sided": lambda v: es.geometry.cut_one_sided(v.animal),
     "decimate": decimated,
     "find_duplicates": lambda v: es.retrieval.find_duplicates(es.ShapeIndex.open(v.index.folder)),
     "read_fields": lambda v: es.io.read_fields(v.folder / "fields.vtu"),
@@ -440,15 +440,10 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "disc": lambda v: es.shapes.disc(4),
     "disc_eigenvalues": lambda v: es.shapes.disc_eigenvalues(9),
     "disjoint_union": lambda v: es.geometry.disjoint_union(v.ball, v.torus),
-    "drop_duplicate_points": lambda v: es.geometry.drop_duplicate_points(v.cloud),
-    "collapse_needles": lambda v: es.geometry.collapse_needles(v.animal),
     "divergence": lambda v: es.calculus.divergence(v.many, v.field),
     "divergence_matrix": lambda v: es.calculus.divergence_matrix(v.many),
     "draw": lambda v: es.plot.draw(v.ball, v.camera),
     "draw_thumbnail": lambda v: es.retrieval.draw_thumbnail(v.ball),
-    "drop_degenerate": lambda v: es.geometry.drop_degenerate(v.animal),
-    "drop_duplicate_faces": lambda v: es.geometry.drop_duplicate_faces(v.animal),
-    "drop_unreferenced": lambda v: es.geometry.drop_unreferenced(v.animal),
     "dual_volumes": lambda v: es.geometry.dual_volumes(v.many),
     "edge_graph": lambda v: es.operators.edge_graph(v.animal),
     "edge_lengths": lambda v: es.geometry.edge_lengths(v.many),
@@ -576,7 +571,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "irregular_grid": lambda v: es.shapes.irregular_grid(4, 5, rng=rng()),
     "is_closed": lambda v: es.geometry.is_closed(v.animal),
     "is_manifold": lambda v: es.geometry.is_manifold(v.animal),
-    "largest_component": lambda v: es.geometry.largest_component(v.animal),
     "level_set": lambda v: es.calculus.level_set(v.solid, v.solid.points[:, 0], 0.4),
     "light_field": lambda v: es.retrieval.baselines.light_field(v.ball, n_fields=1, size=32),
     "light_field_distance": lambda v: es.retrieval.baselines.light_field_distance(*v.light),
@@ -632,7 +626,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "operator_bundle": lambda v: [
         es.spectral.operator_bundle(shape, 6) for shape in (v.ball, v.cloud)
     ],
-    "orient": lambda v: es.geometry.orient(v.animal),
     "orient_outward": lambda v: es.geometry.orient_outward(v.many),
     "part_colors": lambda v: es.plot.part_colors(v.animal, v.labels),
     "part_spectrum": lambda v: es.features.part_spectrum(v.animal),
@@ -681,7 +674,10 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.animal, es.deformation.BoxRegion([-1, 0, -1], [1, 1, 1])
     ),
     "remove_means": lambda v: es.calculus.remove_means(v.many_laplacian, v.many.vertices**2),
-    "repair": lambda v: es.repair(v.animal, ["weld", "drop_unreferenced"]),
+    "repair": lambda v: (
+        [es.repair(v.animal, [name]) for name in MESH_REPAIRS]
+        + [es.repair(v.grid, ["fill_holes"]), es.repair(v.cloud, ["drop_duplicate_points"])]
+    ),
     "replay": lambda v: es.deformation.replay(v.rig, [v.edit]).mesh,
     "rig_shape": lambda v: es.rig_shape(v.many, v.many_spectrum).factor,
     "robust_laplacian": lambda v: es.robust_laplacian(v.animal),
@@ -695,7 +691,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         len(saved(v, ".svg")),
     ],  # random names in SVG
     "scale_invariant_signature": lambda v: es.spectral.scale_invariant_signature(v.many_spectrum),
-    "fill_holes": lambda v: es.geometry.fill_holes(v.grid),
     "segment": lambda v: es.segment(v.tree, n_regions=4),
     "self_intersections": lambda v: es.geometry.self_intersections(v.animal),
     "separated_groups": lambda v: es.spectral.separated_groups(v.spectrum.eigenvalues),
@@ -804,8 +799,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "wave_kernel_signature": lambda v: es.wave_kernel_signature(
         v.many_spectrum, es.spectral.default_energies(v.many_spectrum, 4)[0]
     ),
-    "weld": lambda v: es.geometry.weld(v.animal),
-    "weld_seams": lambda v: es.geometry.weld_seams(v.animal),
     "weyl_bound": lambda v: es.stability.weyl_bound(v.laplacian, v.other),
     "winding_numbers": lambda v: es.geometry.winding_numbers(v.animal, v.ball.vertices),
     "witness_region": lambda v: es.stability.witness_region(
