@@ -4,11 +4,8 @@ from .conformal import angle_distortion as angle_distortion
 from .conformal import flatten_conformally as flatten_conformally
 from .conformal import map_to_sphere as map_to_sphere
 from .derivatives import curl as curl
-from .derivatives import curl_matrix as curl_matrix
 from .derivatives import divergence as divergence
-from .derivatives import divergence_matrix as divergence_matrix
 from .derivatives import gradient as gradient
-from .derivatives import gradient_matrix as gradient_matrix
 from .energies import minimize_quadratic as minimize_quadratic
 from .energies import polyharmonic_matrix as polyharmonic_matrix
 from .energies import solve_harmonic as solve_harmonic
