@@ -29,7 +29,7 @@ MAKERS = {
     "LabelTransfer": "es.transfer_labels(labeled, target)",
     "LabeledShape": "es.retrieval.LabeledShape(mesh, labels)",
     "Laplacian": "es.cotangent_laplacian(mesh)",
-    "LinearSolver": "es.calculus.poisson_solver(laplacian)",
+    "LinearSolver": "es.calculus.factor_equations(matrix)",
     "Mapping": "{title: value}",
     "MergeTree": "es.merge_tree(mesh, values)",
     "Move": "es.deformation.Move(region, handle)",

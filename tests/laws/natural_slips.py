@@ -207,7 +207,9 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.spectral.SpectrumComparison: lambda: es.spectral.compare_spectra(spectrum(), spectrum()),
     es.ShapeIndex: shelf,
     es.retrieval.IndexReader: lambda: shelf().reader(),
-    es.calculus.LinearSolver: lambda: es.calculus.heat_solver(es.cotangent_laplacian(body()), 0.1),
+    es.calculus.LinearSolver: lambda: es.calculus.factor_equations(
+        es.cotangent_laplacian(body()).stiffness
+    ),
     es.calculus.HeatGeodesics: lambda: es.calculus.prepare_heat_geodesics(body()),
     es.calculus.VectorHeat: lambda: es.calculus.prepare_vector_heat(body()),
     es.spectral.OperatorBundle: lambda: es.spectral.operator_bundle(body(), 10),

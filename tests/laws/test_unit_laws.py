@@ -125,14 +125,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "harmonic_fields": (0, lambda s: len(calculus.harmonic_fields(s.mesh).T)),
     "heat_distance_to_set": (1, lambda s: calculus.heat_distance_to_set(s.mesh, [0, 9])),
     "heat_distances": (1, lambda s: calculus.heat_distances(s.mesh, [0, 9])),
-    "heat_solver": (
-        -2,
-        lambda s: calculus.heat_solver(s.laplacian, s.times[0]).solve(s.f),
-    ),
-    "helmholtz_solver": (
-        0,
-        lambda s: calculus.helmholtz_solver(s.laplacian, -1 / s.u**2).solve(s.f),
-    ),
     "level_set": (1, lambda s: calculus.level_set(s.mesh, s.f, 0.1).points),
     "logarithmic_map": (1, lambda s: calculus.logarithmic_map(s.mesh, 0)),
     "map_to_sphere": (0, lambda s: calculus.map_to_sphere(s.mesh)),
@@ -156,7 +148,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "persistence_diagram": (0, lambda s: es.features.persistence_diagram(s.mesh, s.f).maxima),
     "point_cloud_laplacian": (2, lambda s: es.point_cloud_laplacian(s.cloud).mass),
     "pointwise_time": (2, lambda s: operators.pointwise_time(s.mesh)),
-    "poisson_solver": (0, lambda s: calculus.poisson_solver(s.laplacian, [0]).solve(s.f)),
     "polyharmonic_matrix": (-4, lambda s: calculus.polyharmonic_matrix(s.laplacian, 3)),
     "prepare_heat_geodesics": (
         1,

@@ -143,7 +143,7 @@ class Shared:
     def _make_solvers(self) -> None:
         self.height = self.many.vertices[:, 2]
         self.field = self.many.vertices[self.many.faces].mean(axis=1)
-        self.poisson = es.calculus.poisson_solver(self.many_laplacian)
+        self.poisson = es.calculus.factor_equations(self.many_laplacian.stiffness)
         self.bound = es.calculus.factor_equations(
             self.laplacian.stiffness,
             fixed=[0, 9],
@@ -566,9 +566,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ],
     "heat_kernel": lambda v: es.spectral.heat_kernel(v.many_spectrum, [0, 9], None, 0.2),
     "heat_kernel_signature": lambda v: es.heat_kernel_signature(v.many_spectrum, [0.3]),
-    "heat_solver": lambda v: es.calculus.heat_solver(v.laplacian, 0.01),
     "heat_trace": lambda v: es.spectral.heat_trace(v.many_spectrum, [0.5, 1.0]),
-    "helmholtz_solver": lambda v: es.calculus.helmholtz_solver(v.laplacian, 1.0),
     "icosphere": lambda v: es.icosphere(2),
     "interval": lambda v: es.shapes.interval(9),
     "irregular_grid": lambda v: es.shapes.irregular_grid(4, 5, rng=rng()),
@@ -611,9 +609,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.mesh_laplacian(v.torus, distance=d) for d in ("euclidean", "geodesic")
     ],
     "mesh_quadrature": lambda v: es.geometry.mesh_quadrature(v.many),
-    "minimize_quadratic": lambda v: es.calculus.minimize_quadratic(
-        v.laplacian.stiffness, fixed=[0, 9], values=[1.0, 2.0]
-    ),
     "move_skeleton": lambda v: es.deformation.move_skeleton(v.response, [v.handle]),
     "neighbor_graph": lambda v: es.operators.neighbor_graph(v.cloud.points, 6),
     "nodal_domains": lambda v: es.spectral.nodal_domains(v.many, v.height),
@@ -645,7 +640,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "point_map": lambda v: es.spectral.point_map(v.map),
     "cloud_width": lambda v: es.operators.cloud_width(v.cloud),
     "pointwise_time": lambda v: es.operators.pointwise_time(v.many),
-    "poisson_solver": lambda v: es.calculus.poisson_solver(v.laplacian, fixed=[0, 9]),
     "polyharmonic_matrix": lambda v: es.calculus.polyharmonic_matrix(v.laplacian, 3),
     "prepare_heat_geodesics": lambda v: es.calculus.prepare_heat_geodesics(v.ball),
     "prepare_vector_heat": lambda v: es.calculus.prepare_vector_heat(v.ball),

@@ -6,13 +6,9 @@ from .conformal import map_to_sphere as map_to_sphere
 from .derivatives import curl as curl
 from .derivatives import divergence as divergence
 from .derivatives import gradient as gradient
-from .energies import minimize_quadratic as minimize_quadratic
 from .energies import polyharmonic_matrix as polyharmonic_matrix
 from .energies import solve_harmonic as solve_harmonic
 from .equations import boundary_load as boundary_load
-from .equations import heat_solver as heat_solver
-from .equations import helmholtz_solver as helmholtz_solver
-from .equations import poisson_solver as poisson_solver
 from .equations import remove_means as remove_means
 from .equations import solve_heat as solve_heat
 from .equations import solve_helmholtz as solve_helmholtz

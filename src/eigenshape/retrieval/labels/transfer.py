@@ -17,7 +17,7 @@ from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.equations import heat_solver
+from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -318,7 +318,8 @@ def _spread_votes(
     mesh = normalize_box(orient_closed_outward(target))
     laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
     area = float(face_areas(mesh).sum())
-    spread = heat_solver(laplacian, SPREAD_TIME * area).solve(votes / votes.sum())
+    step = laplacian.mass + SPREAD_TIME * area * laplacian.stiffness
+    spread = factor_definite(step).solve(votes / votes.sum())
     spread = np.maximum(spread, 0)
     total = spread.sum(axis=1)
 
