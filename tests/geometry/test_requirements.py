@@ -34,8 +34,6 @@ from eigenshape.operators.fem import fem_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.smoothing import noise_level
-from eigenshape.retrieval.baselines.affinity import affinity_eigenvalues
-from eigenshape.retrieval.baselines.shape_dna import shape_dna
 from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.heat.recipe import SCALE_FREE
@@ -48,6 +46,7 @@ from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
+from eigenshape.spectral.comparison.shape_dna import shape_dna
 from eigenshape.spectral.solve import solve_spectrum
 
 BALL = icosphere(2)
@@ -76,7 +75,6 @@ DESCRIBERS = {
         LabeledShape(BALL, np.zeros(BALL.n_faces, dtype=np.int64)), mesh
     ),
     "shape_dna": shape_dna,
-    "affinity_eigenvalues": affinity_eigenvalues,
     "average_geodesic_distance": average_geodesic_distance,
 }
 

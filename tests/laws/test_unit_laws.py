@@ -173,7 +173,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         1,
         lambda s: geometry.sample_surface(s.mesh, 50, rng=np.random.default_rng(0)).points,
     ),
-    "shape_dna": (0, lambda s: es.retrieval.baselines.shape_dna(s.mesh, 9)),
+    "shape_dna": (0, lambda s: spectral.shape_dna(s.mesh, 9)),
     "signed_distance": (1, lambda s: geometry.signed_distance(s.mesh, s.other.vertices)),
     "signed_heat_distance": (
         1,
@@ -223,7 +223,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "vertex_normals": (0, lambda s: geometry.vertex_normals(s.mesh)),
     "compare_spectra": (0, lambda s: spectral.compare_spectra(s.spectrum, s.spectrum).relative),
     "winding_numbers": (0, lambda s: geometry.winding_numbers(s.mesh, s.other.vertices)),
-    "affinity_eigenvalues": (0, lambda s: es.retrieval.baselines.affinity_eigenvalues(s.mesh)),
     "anchor_nodes": (1, lambda s: stability.anchor_nodes(s.mesh, 0.5 * s.u).points),
     "approximate_heat_signature": (
         -2,
@@ -304,7 +303,6 @@ WITHOUT = {
     "is_closed",
     "is_manifold",
     "labels_from_votes",
-    "light_field",
     "local_triangles",
     "map_closeness",
     "measure_perturbation",

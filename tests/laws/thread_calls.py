@@ -108,10 +108,6 @@ class Shared:
             es.retrieval.heat_descriptor(spectrum, es.segment(self.tree, n_regions=6).features)
             for spectrum in (self.spectrum, self.spectrum2)
         )
-        self.light = tuple(
-            es.retrieval.baselines.light_field(mesh, n_fields=1, size=32)
-            for mesh in (self.ball, self.torus)
-        )
         self.meshes = self.folder / "meshes"
         self.meshes.mkdir()
         (self.meshes / "cat.ply").touch()
@@ -325,10 +321,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3).fit_transform(v.torus.vertices),
     "Spectrum.save": lambda v: written(v.folder, ".npz", v.spectrum.save),
     "Spectrum.load": lambda v: es.Spectrum.load(v.folder / "spectrum.npz"),
-    "affinity_distance": lambda v: es.retrieval.baselines.affinity_distance(
-        v.spectrum.eigenvalues, v.spectrum2.eigenvalues
-    ),
-    "affinity_eigenvalues": lambda v: es.retrieval.baselines.affinity_eigenvalues(v.animal),
     "aim_camera": lambda v: es.plot.aim_camera(v.many),
     "anchor_nodes": lambda v: es.stability.anchor_nodes(v.ball, 0.5),
     "anchor_region": lambda v: es.stability.anchor_region(v.on_one.points, v.nodes.points, 0.5),
@@ -573,8 +565,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "is_closed": lambda v: es.geometry.is_closed(v.animal),
     "is_manifold": lambda v: es.geometry.is_manifold(v.animal),
     "level_set": lambda v: es.calculus.level_set(v.solid, v.solid.points[:, 0], 0.4),
-    "light_field": lambda v: es.retrieval.baselines.light_field(v.ball, n_fields=1, size=32),
-    "light_field_distance": lambda v: es.retrieval.baselines.light_field_distance(*v.light),
     "local_triangles": lambda v: es.operators.local_triangles(v.cloud),
     "logarithmic_map": lambda v: [
         es.calculus.logarithmic_map(v.ball, 0, method=method)
@@ -691,10 +681,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "segment": lambda v: es.segment(v.tree, n_regions=4),
     "self_intersections": lambda v: es.geometry.self_intersections(v.animal),
     "separated_groups": lambda v: es.spectral.separated_groups(v.spectrum.eigenvalues),
-    "shape_dna": lambda v: es.retrieval.baselines.shape_dna(v.animal),
-    "shape_dna_distance": lambda v: es.retrieval.baselines.shape_dna_distance(
-        v.spectrum.eigenvalues, v.spectrum2.eigenvalues
-    ),
+    "shape_dna": lambda v: es.spectral.shape_dna(v.animal),
     "signed_distance": lambda v: es.geometry.signed_distance(v.ball, v.animal.vertices),
     "signed_heat_distance": lambda v: es.calculus.signed_heat_distance(
         v.by_vector_heat, [v.animal.faces[0, [0, 1, 2, 0]]]

@@ -5,6 +5,7 @@ from .comparison.angles import EigenspaceAngles as EigenspaceAngles
 from .comparison.angles import eigenspace_angles as eigenspace_angles
 from .comparison.eigenspaces import eigenspace_errors as eigenspace_errors
 from .comparison.eigenspaces import separated_groups as separated_groups
+from .comparison.shape_dna import shape_dna as shape_dna
 from .comparison.spectra import SpectrumComparison as SpectrumComparison
 from .comparison.spectra import compare_spectra as compare_spectra
 from .comparison.spectra import spectral_hausdorff_distance as spectral_hausdorff_distance
