@@ -338,9 +338,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "approximate_heat_signature": lambda v: es.spectral.approximate_heat_signature(
         v.many_laplacian, 8, [0.5, 1.0]
     ),
-    "as_rigid_as_possible": lambda v: es.deformation.as_rigid_as_possible(
-        v.binding, [v.handle], n_rounds=20
-    ),
     "as_mesh": lambda v: es.as_mesh((v.ball.vertices, v.ball.faces)),
     "as_shape": lambda v: es.geometry.as_shape((v.ball.vertices, v.ball.faces)),
     "average_geodesic_distance": lambda v: es.geometry.average_geodesic_distance(
@@ -355,7 +352,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         for mode in ("graded", "uncrossed", "thesis")
     ],
     "betti_numbers": lambda v: [es.geometry.betti_numbers(mesh) for mesh in (v.torus, v.solid)],
-    "biharmonic_blend": lambda v: es.deformation.biharmonic_blend(v.binding, [v.handle]),
     "biharmonic_distances": lambda v: es.spectral.biharmonic_distances(v.many_spectrum, [0, 9]),
     "bind": lambda v: es.deformation.bind(v.rig, [v.region], fixed=v.fixed).shares,
     "bottleneck_distance": lambda v: es.features.bottleneck_distance(v.diagram, v.diagram2),
@@ -716,9 +712,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "spectral_embedding": lambda v: es.spectral.spectral_embedding(v.many_spectrum, power=0.5),
     "spectral_hausdorff_distance": lambda v: es.spectral.spectral_hausdorff_distance(
         v.spectrum.eigenvalues, v.spectrum2.eigenvalues
-    ),
-    "spectral_rigid": lambda v: es.deformation.spectral_rigid(
-        v.binding, [v.handle], n_modes=20, n_rounds=5
     ),
     "sphere_eigenvalues": lambda v: es.shapes.sphere_eigenvalues(9),
     "sphere_functional_eigenvalues": lambda v: es.shapes.sphere_functional_eigenvalues(9, 0.01),
