@@ -20,7 +20,7 @@ def main() -> dict[str, float]:
 
     # The lowest vertex, and the point that is farthest from it along the surface.
     foot = int(mesh.vertices[:, 1].argmin())
-    distances = es.spectral.biharmonic_distances(spectrum, [foot])[:, 0]
+    distances = es.spectral.spectral_distances(spectrum, [foot])[:, 0]
     labels = es.spectral.spectral_clusters(spectrum, 6)
     return {
         "mean error of 25 modes, shares of the diagonal": error,

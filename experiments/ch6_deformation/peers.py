@@ -39,8 +39,8 @@ def as_rigid_as_possible(
 def biharmonic_blend(binding: es.deformation.Binding, handles: Handles) -> np.ndarray:
     """Blend the motions of the handles by biharmonic weights (Jacobson and others 2011, unbounded).
 
-    The weights w of a handle minimize |M^-½ W w|², with w = 0 or 1 at the vertices of share 0 or 1. Each vertex moves by
-    the sum of all motions, each times its weight.
+    The weights w of a handle minimize |M^-½ W w|², with w = 0 or 1 at the vertices of share 0 or 1. Each vertex moves
+    by the sum of all motions, each times its weight.
     """
     rig, free = binding.rig, binding.part.free
     laplacian = es.cotangent_laplacian(rig.mesh)

@@ -352,7 +352,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         for mode in ("graded", "uncrossed", "thesis")
     ],
     "betti_numbers": lambda v: [es.geometry.betti_numbers(mesh) for mesh in (v.torus, v.solid)],
-    "biharmonic_distances": lambda v: es.spectral.biharmonic_distances(v.many_spectrum, [0, 9]),
     "bind": lambda v: es.deformation.bind(v.rig, [v.region], fixed=v.fixed).shares,
     "bottleneck_distance": lambda v: es.features.bottleneck_distance(v.diagram, v.diagram2),
     "bottleneck_matching": lambda v: es.stability.bottleneck_matching(
@@ -380,7 +379,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "circle": lambda v: es.shapes.circle(9),
     "closest_points": lambda v: es.geometry.closest_points(v.animal, v.ball.vertices),
     "cloud_quadrature": lambda v: es.geometry.cloud_quadrature(v.cloud),
-    "commute_time_distances": lambda v: es.spectral.commute_time_distances(v.many_spectrum, [0, 9]),
     "compare_shapes": lambda v: es.compare_shapes(
         v.ball, v.torus, es.stability.StabilityPlan(k=3, n_samples=150, times=(0.05,))
     ),
@@ -419,8 +417,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "detect_watermarks": lambda v: es.spectral.detect_watermarks(
         v.animal, v.marked, ["a key", "another"], k=30
     ),
-    "diffusion_distances": lambda v: es.spectral.diffusion_distances(v.many_spectrum, 0.2, [0, 9]),
-    "diffusion_map": lambda v: es.spectral.diffusion_map(v.many_spectrum, 0.2),
     "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(
         v.laplacian, np.array([0, 5])
     ),
@@ -538,7 +534,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "uneven_sphere": lambda v: es.shapes.uneven_sphere(200),
     "geodesic_path": lambda v: es.calculus.geodesic_path(v.ball, 0, 99),
     "geodesic_waves": lambda v: es.geometry.geodesic_waves(v.ball)(0, 1.0),
-    "global_point_signature": lambda v: es.spectral.global_point_signature(v.many_spectrum),
     "gradient": lambda v: [
         es.calculus.gradient(v.many, v.many.vertices),
         es.calculus.gradient(v.many),
@@ -709,7 +704,13 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.spectral.spectral_clusters(v.graph_spectrum, 4, method=method)
         for method in ("k-means", "normalized-cut")
     ],
-    "spectral_embedding": lambda v: es.spectral.spectral_embedding(v.many_spectrum, power=0.5),
+    "spectral_distances": lambda v: [
+        es.spectral.spectral_distances(v.many_spectrum, [0, 9], method=method, t=t)
+        for method, t in (("biharmonic", None), ("commute-time", None), ("diffusion", 0.2))
+    ],
+    "spectral_embedding": lambda v: es.spectral.spectral_embedding(
+        v.many_spectrum, power=0.5, t=0.2
+    ),
     "spectral_hausdorff_distance": lambda v: es.spectral.spectral_hausdorff_distance(
         v.spectrum.eigenvalues, v.spectrum2.eigenvalues
     ),

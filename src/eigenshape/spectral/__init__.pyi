@@ -49,11 +49,7 @@ from .tools.clustering import spectral_clusters as spectral_clusters
 from .tools.compression import CompressedMesh as CompressedMesh
 from .tools.compression import compress_mesh as compress_mesh
 from .tools.compression import decompress_mesh as decompress_mesh
-from .tools.embedding import biharmonic_distances as biharmonic_distances
-from .tools.embedding import commute_time_distances as commute_time_distances
-from .tools.embedding import diffusion_distances as diffusion_distances
-from .tools.embedding import diffusion_map as diffusion_map
-from .tools.embedding import global_point_signature as global_point_signature
+from .tools.embedding import spectral_distances as spectral_distances
 from .tools.embedding import spectral_embedding as spectral_embedding
 from .tools.estimators import SpectralClusterer as SpectralClusterer
 from .tools.estimators import SpectralEmbedder as SpectralEmbedder
