@@ -59,7 +59,11 @@ def tools(*, small: bool) -> Iterator[Call]:
         "project and reconstruct",
         lambda: es.spectral.reconstruct(es.spectral.project(mesh.vertices, spectrum), spectrum),
     )
-    low = es.spectral.LowPass(spectrum.eigenvalues[50])
+    cutoff = spectrum.eigenvalues[50]
+
+    def low(eigenvalues: np.ndarray) -> np.ndarray:
+        return eigenvalues <= cutoff
+
     yield "filter_values", lambda: es.spectral.filter_values(mesh.vertices[:, 0], spectrum, low)
     yield "smooth_mesh", lambda: es.spectral.smooth_mesh(mesh, spectrum, low)
     sources = np.arange(10)

@@ -301,7 +301,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "read_edits.path": written_edits,
     "recover_geometry.eigenvalues": lambda: es.shapes.sphere_eigenvalues(60),
     "region": lambda: HEAD,
-    "response": lambda: es.spectral.HeatFilter(0.1),
+    "response": lambda: np.ones_like,
     "rho": lambda: 3.0,
     "save_figure.path": lambda: FOLDER / "written.png",
     "ShapeIndex.add.n_views": lambda: 0,

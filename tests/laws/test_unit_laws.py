@@ -184,7 +184,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "simplex_volumes": (3, lambda s: geometry.simplex_volumes(s.solid)),
     "smooth_mesh": (
         1,
-        lambda s: spectral.smooth_mesh(s.mesh, s.spectrum, spectral.HeatFilter(s.times[0])),
+        lambda s: spectral.smooth_mesh(s.mesh, s.spectrum, lambda each: np.exp(-s.times[0] * each)),
     ),
     "solve_harmonic": (
         0,

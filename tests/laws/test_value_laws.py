@@ -64,7 +64,6 @@ CALLED = [
     "weyl_bound",
 ]
 MADE: dict[str, Callable[[Shared], Any]] = {
-    "BandPass": lambda v: es.spectral.BandPass(1.0, 2.0),
     "DecimatedMesh": lambda v: es.geometry.decimate(v.ball, ratio=0.5),
     "Material": lambda v: es.io.Material("oak", image=b"grain", image_name="grain.png"),
     "MeshAttributes": lambda v: read_attributes(v.ball),
@@ -76,9 +75,7 @@ MADE: dict[str, Callable[[Shared], Any]] = {
     "DepthCamera": lambda v: es.scans.DepthCamera(resolution=40),
     "DescribedShape": lambda v: es.retrieval.DescribedShape("a", [v.by_heat[0]]),
     "FusedScan": lambda v: es.matching.fuse_scans([v.fish_scan]),
-    "HeatFilter": lambda v: es.spectral.HeatFilter(0.1),
     "IndexReport": lambda v: v.index.verify(),
-    "LowPass": lambda v: es.spectral.LowPass(2.0),
     "Operator": lambda v: es.operators.OPERATORS["cotangent"],
     "Panel": lambda v: es.plot.Panel(v.ball, "a", np.zeros(v.ball.n_faces, int), np.arange(3)),
     "PartDecomposition": lambda v: es.find_parts(v.animal),

@@ -493,9 +493,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "filter_values": lambda v: [
         es.spectral.filter_values(v.many.vertices, v.many_spectrum, response, keep_rest=True)
         for response in (
-            es.spectral.LowPass(3.0),
-            es.spectral.BandPass(1.0, 3.0),
-            es.spectral.HeatFilter(0.1),
+            lambda values: values <= 3.0,
+            lambda values: np.exp(-0.1 * values),
         )
     ],
     "find_heat_features": lambda v: [
@@ -683,7 +682,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "smooth_boundaries": lambda v: es.features.smooth_boundaries(v.animal, v.parts),
     "smooth_mesh": lambda v: es.spectral.smooth_mesh(
-        v.animal, v.spectrum, es.spectral.LowPass(9.0), keep_volume=True
+        v.animal, v.spectrum, lambda values: values <= 9.0, keep_volume=True
     ),
     "solve_harmonic": lambda v: [
         es.calculus.solve_harmonic(v.laplacian, [0, 9], [1.0, 2.0], order=order) for order in (1, 2)

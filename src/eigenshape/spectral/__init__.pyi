@@ -53,9 +53,6 @@ from .tools.embedding import spectral_distances as spectral_distances
 from .tools.embedding import spectral_embedding as spectral_embedding
 from .tools.estimators import SpectralClusterer as SpectralClusterer
 from .tools.estimators import SpectralEmbedder as SpectralEmbedder
-from .tools.filters import BandPass as BandPass
-from .tools.filters import HeatFilter as HeatFilter
-from .tools.filters import LowPass as LowPass
 from .tools.filters import filter_values as filter_values
 from .tools.filters import smooth_mesh as smooth_mesh
 from .tools.nodal import NodalDomains as NodalDomains
