@@ -528,7 +528,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "gaussian_curvature": lambda v: es.geometry.gaussian_curvature(v.animal),
     "gaussian_laplacian": lambda v: es.operators.gaussian_laplacian(v.cloud.points, 0.02, 2),
     "geodesic_balls": lambda v: es.geometry.geodesic_balls(v.ball, 0.5),
-    "geodesic_distance_to_set": lambda v: es.geometry.geodesic_distance_to_set(v.animal, [0, 9]),
     "geodesic_distances": lambda v: es.geometry.geodesic_distances(v.animal, [0, 9]),
     "uneven_sphere": lambda v: es.shapes.uneven_sphere(200),
     "geodesic_path": lambda v: es.calculus.geodesic_path(v.ball, 0, 99),
@@ -542,7 +541,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "harmonic_fields": lambda v: es.calculus.harmonic_fields(v.torus),
     "heat_descriptor": lambda v: es.retrieval.heat_descriptor(v.spectrum, v.parts.features),
     "skeleton_response": lambda v: es.deformation.skeleton_response(v.binding),
-    "heat_distance_to_set": lambda v: es.calculus.heat_distance_to_set(v.by_heat_flow, [0, 9]),
     "heat_distances": lambda v: [
         es.calculus.heat_distances(shape, [0, 9]) for shape in (v.ball, v.by_heat_flow)
     ],

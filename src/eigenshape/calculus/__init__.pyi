@@ -18,7 +18,6 @@ from .flows import taubin_smooth as taubin_smooth
 from .geodesic_paths import geodesic_path as geodesic_path
 from .geodesic_rays import trace_geodesic as trace_geodesic
 from .heat_distance import HeatGeodesics as HeatGeodesics
-from .heat_distance import heat_distance_to_set as heat_distance_to_set
 from .heat_distance import heat_distances as heat_distances
 from .heat_distance import prepare_heat_geodesics as prepare_heat_geodesics
 from .hodge import HodgeDecomposition as HodgeDecomposition
