@@ -22,8 +22,7 @@ from eigenshape.geometry.distances.average_distance import average_geodesic_dist
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import REPAIRS, repair
 from eigenshape.geometry.requirements import require_joined
-from eigenshape.geometry.samples.cloud_measure import cloud_quadrature
-from eigenshape.geometry.samples.quadrature import mesh_quadrature
+from eigenshape.geometry.samples.cloud_measure import shape_quadrature
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import curvature_tensors
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
@@ -58,7 +57,7 @@ OPERATORS = {
     "robust": robust_laplacian,
     "connection": connection_laplacian,
     "brackets": lambda mesh: bracket_eigenvalues(mesh, 4),
-    "quadrature": mesh_quadrature,
+    "quadrature": shape_quadrature,
     "gaussian_curvature": gaussian_curvature,
 }
 DESCRIBERS = {
@@ -188,8 +187,8 @@ def test_copies_of_points():
     with pytest.raises(
         InvalidShapeError, match=r"Points must differ; .* \(6 such\)\. Try repair\(cloud, "
     ):
-        cloud_quadrature(cloud)
-    assert cloud_quadrature(repair(cloud, ["auto"]).cloud).n_points == 100
+        shape_quadrature(cloud)
+    assert shape_quadrature(repair(cloud, ["auto"]).cloud).n_points == 100
 
 
 def test_pieces_that_touch_without_a_seam_are_no_soup():

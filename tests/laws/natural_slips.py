@@ -192,7 +192,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.geometry.SurfacePoints: lambda: es.geometry.sample_surface(
         body(), 60, rng=np.random.default_rng(0)
     ),
-    es.geometry.Quadrature: lambda: es.geometry.mesh_quadrature(body()),
+    es.geometry.Quadrature: lambda: es.geometry.shape_quadrature(body()),
     es.spectral.Brackets: lambda: es.bracket_eigenvalues(body(), 10),
     es.stability.Rate: lambda: es.stability.Rate(1.0, -1.0),
     es.plot.Camera: lambda: es.plot.three_quarter_view(body()),

@@ -16,7 +16,7 @@ from public_names import public_things
 
 import eigenshape as es
 from eigenshape import calculus, deformation, geometry, operators, spectral, stability
-from eigenshape.geometry.repair_names import MESH_REPAIRS
+from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 
 UNITS = (2.0**-20, 2.0**20)
 TURN = es.Rotation([0, 0, 0], [1, 0, 0], 0.4)
@@ -133,7 +133,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "measure_distortion": (0, lambda s: deformation.measure_distortion(s.mesh, s.other)),
     "merge_tree": (0, lambda s: es.merge_tree(s.mesh, s.f).values),
     "mesh_laplacian": (2, lambda s: es.mesh_laplacian(s.mesh).mass),
-    "mesh_quadrature": (2, lambda s: geometry.mesh_quadrature(s.mesh).weights),
+    "shape_quadrature": (2, lambda s: geometry.shape_quadrature(s.mesh).weights),
     "nodal_set": (1, lambda s: spectral.nodal_set(s.mesh, s.f).points),
     "noise_level": (0, lambda s: operators.noise_level(s.mesh)),
     "normalize_area": (0, lambda s: geometry.normalize_area(s.mesh)),
@@ -229,7 +229,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "boundary_surface": (1, lambda s: geometry.boundary_surface(s.solid)),
     "build_laplacian": (2, lambda s: es.build_laplacian(s.mesh, "cotangent").mass),
     "cheeger_estimate": (-1, lambda s: stability.cheeger_estimate(s.mesh, s.spectrum).upper),
-    "cloud_quadrature": (2, lambda s: geometry.cloud_quadrature(s.cloud).weights),
+    "shape_quadrature, cloud": (2, lambda s: geometry.shape_quadrature(s.cloud).weights),
     "dirichlet_laplacian": (2, lambda s: operators.dirichlet_laplacian(s.laplacian, [0])[0].mass),
     "embed_watermark": (1, lambda s: spectral.embed_watermark(s.mesh, "a key", k=30)),
     "extract_patches": (
@@ -281,7 +281,6 @@ WITHOUT = {
     "decompose_one_form",
     "describe",
     "detect_watermark",
-    "detect_watermarks",
     "draw",
     "draw_thumbnail",
     "edge_graph",

@@ -42,7 +42,7 @@ CALLED = [
     "build_laplacian",
     "check_laplacian",
     "cheeger_estimate",
-    "cloud_quadrature",
+    "shape_quadrature",
     "cut_by_planes",
     "decompose_field",
     "detect_watermark",

@@ -12,7 +12,7 @@ from qdrant_client import QdrantClient
 from search_cases import RECIPE, make_source, mixtures
 
 import eigenshape as es
-from eigenshape.geometry.repair_names import MESH_REPAIRS
+from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 from eigenshape.retrieval.search.coarse import coarse_rows
 
 
@@ -378,7 +378,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "cheeger_estimate": lambda v: es.stability.cheeger_estimate(v.animal, v.spectrum),
     "circle": lambda v: es.shapes.circle(9),
     "closest_points": lambda v: es.geometry.closest_points(v.animal, v.ball.vertices),
-    "cloud_quadrature": lambda v: es.geometry.cloud_quadrature(v.cloud),
     "compare_shapes": lambda v: es.compare_shapes(
         v.ball, v.torus, es.stability.StabilityPlan(k=3, n_samples=150, times=(0.05,))
     ),
@@ -413,8 +412,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "denoise": lambda v: es.operators.denoise(v.animal, reach=0.02),
     "describe": lambda v: [es.describe(v.animal), es.describe(v.animal, es.retrieval.SCALE_FREE)],
     "detailed_skeleton": lambda v: es.deformation.detailed_skeleton(v.binding).fine,
-    "detect_watermark": lambda v: es.spectral.detect_watermark(v.animal, v.marked, "a key", k=30),
-    "detect_watermarks": lambda v: es.spectral.detect_watermarks(
+    "detect_watermark": lambda v: es.spectral.detect_watermark(
         v.animal, v.marked, ["a key", "another"], k=30
     ),
     "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(
@@ -512,7 +510,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "from_pyvista": lambda v: es.io.from_pyvista(es.io.to_pyvista(v.ball)),
     "from_trimesh": lambda v: es.io.from_trimesh(es.io.to_trimesh(v.ball)),
     "functional_laplacian": lambda v: (
-        es.operators.functional_laplacian(es.geometry.mesh_quadrature(v.animal), 0.01)
+        es.operators.functional_laplacian(es.geometry.shape_quadrature(v.animal), 0.01)
         @ v.animal.vertices[:, 0]
     ),
     "functional_map": lambda v: [
@@ -586,7 +584,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "mesh_laplacian": lambda v: [
         es.mesh_laplacian(v.torus, distance=d) for d in ("euclidean", "geodesic")
     ],
-    "mesh_quadrature": lambda v: es.geometry.mesh_quadrature(v.many),
+    "shape_quadrature": lambda v: [
+        es.geometry.shape_quadrature(each) for each in (v.many, v.cloud)
+    ],
     "move_skeleton": lambda v: es.deformation.move_skeleton(v.response, [v.handle]),
     "neighbor_graph": lambda v: es.operators.neighbor_graph(v.cloud.points, 6),
     "nodal_domains": lambda v: es.spectral.nodal_domains(v.many, v.height),
@@ -626,7 +626,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "projective_plane": lambda v: es.shapes.projective_plane(1),
     "projective_plane_eigenvalues": lambda v: es.shapes.projective_plane_eigenvalues(9),
     "quadrature_laplacian": lambda v: es.operators.quadrature_laplacian(
-        es.geometry.mesh_quadrature(v.torus), 0.05
+        es.geometry.shape_quadrature(v.torus), 0.05
     ),
     "random_planes": lambda v: es.scans.random_planes(v.animal, rng()),
     "random_sphere": lambda v: es.shapes.random_sphere(90, rng=rng()),
@@ -715,7 +715,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "sphere_functional_eigenvalues": lambda v: es.shapes.sphere_functional_eigenvalues(9, 0.01),
     "sphere_harmonics": lambda v: es.shapes.sphere_harmonics(v.ball.vertices, 3),
     "sphere_hull": lambda v: es.shapes.sphere_hull(v.ball.vertices),
-    "sphere_quadrature": lambda v: es.geometry.sphere_quadrature(90),
     "subdivide": lambda v: [es.geometry.subdivide(v.solid), es.geometry.subdivide(v.ball)],
     "suggest_repairs": lambda v: es.suggest_repairs(v.animal),
     "surface_area": lambda v: es.geometry.surface_area(v.many),
@@ -728,7 +727,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "to_pyvista": lambda v: np.asarray(es.io.to_pyvista(v.ball).points),
     "to_trimesh": lambda v: np.asarray(es.io.to_trimesh(v.ball).vertices),
     "torus": lambda v: es.shapes.torus(9, 7),
-    "torus_quadrature": lambda v: es.geometry.torus_quadrature(9, 7),
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
     "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
@@ -766,7 +764,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "transport_vectors": lambda v: es.calculus.transport_vectors(
         v.by_vector_heat, [0, 9], [[1.0, 0.0], [0.0, 1.0]]
     ),
-    "uniform_quadrature": lambda v: es.geometry.uniform_quadrature(v.cloud.points, 2),
     "value_colors": lambda v: es.plot.value_colors(v.heat[:, 0]),
     "vertex_components": lambda v: es.geometry.vertex_components(v.animal),
     "vertex_normals": lambda v: es.geometry.vertex_normals(v.many),

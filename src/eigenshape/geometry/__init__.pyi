@@ -38,12 +38,8 @@ from .repairs.repair_report import RepairedMesh as RepairedMesh
 from .resolution.decimation import DecimatedMesh as DecimatedMesh
 from .resolution.decimation import decimate as decimate
 from .resolution.subdivision import subdivide as subdivide
-from .samples.cloud_measure import cloud_quadrature as cloud_quadrature
+from .samples.cloud_measure import shape_quadrature as shape_quadrature
 from .samples.quadrature import Quadrature as Quadrature
-from .samples.quadrature import mesh_quadrature as mesh_quadrature
-from .samples.quadrature import sphere_quadrature as sphere_quadrature
-from .samples.quadrature import torus_quadrature as torus_quadrature
-from .samples.quadrature import uniform_quadrature as uniform_quadrature
 from .samples.surface_points import SurfacePoints as SurfacePoints
 from .samples.surface_points import sample_surface as sample_surface
 from .simplices import dual_volumes as dual_volumes

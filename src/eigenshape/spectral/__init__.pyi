@@ -63,5 +63,4 @@ from .tools.projection import project as project
 from .tools.projection import reconstruct as reconstruct
 from .tools.watermark import WatermarkTest as WatermarkTest
 from .tools.watermark import detect_watermark as detect_watermark
-from .tools.watermark import detect_watermarks as detect_watermarks
 from .tools.watermark import embed_watermark as embed_watermark
