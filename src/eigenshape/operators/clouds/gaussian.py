@@ -332,8 +332,7 @@ def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) 
     ----------
     measure : Quadrature
         Of a surface whose weights you know, or of a mesh (`shape_quadrature`). On a mesh this is
-        the mesh Laplacian without its matrix, for kernels
-        that are too dense to store.
+        the mesh Laplacian without its matrix, for kernels that are too dense to store.
     t : float
         Heat time, in length².
     cutoff : float
