@@ -316,7 +316,6 @@ WITHOUT = {
     "smooth_boundaries",
     "suggest_repairs",
     "three_quarter_view",
-    "to_arrays",
     "to_pyvista",
     "to_trimesh",
     "transfer_labels",

@@ -37,7 +37,6 @@ CALLED = [
     "ShapeIndex",
     "approximate_heat_signature",
     "bottleneck_matching",
-    "bounding_rate",
     "bracket_eigenvalues",
     "build_laplacian",
     "check_laplacian",
@@ -61,6 +60,7 @@ CALLED = [
     "part_tree",
     "principal_curvatures",
     "repair",
+    "theorem_rate",
     "weyl_bound",
 ]
 MADE: dict[str, Callable[[Shared], Any]] = {

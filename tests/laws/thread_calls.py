@@ -330,7 +330,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "anisotropic_laplacian": lambda v: es.operators.anisotropic_laplacian(
         v.ball, es.operators.curvature_tensors(v.ball, 2.0)
     ),
-    "apply_edit": lambda v: es.deformation.apply_edit(v.rig, v.edit).mesh,
     "apply_heat": lambda v: [
         es.spectral.apply_heat(v.laplacian, v.animal.vertices, 0.01),
         es.spectral.apply_heat(v.many_spectrum, v.height, [0.1, 0.2]),
@@ -391,9 +390,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.change, v.on_one, v.on_two, nodes=v.nodes.points, delta=0.5, rho=3.0
     ),
     "cotangent_laplacian": lambda v: es.cotangent_laplacian(v.many),
-    "bounding_rate": lambda v: es.stability.bounding_rate(
-        es.stability.theorem_rate("lipschitz", 2), [0.1, 0.2], [0.01, 0.01], [1.0, 2.0]
-    ),
     "count_clusters": lambda v: es.spectral.count_clusters(v.graph_spectrum),
     "courant_bounds": lambda v: es.spectral.courant_bounds(v.spectrum),
     "crouzeix_raviart_laplacian": lambda v: es.operators.crouzeix_raviart_laplacian(v.ball),
@@ -501,9 +497,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ],
     "find_items": lambda v: es.io.find_items(v.meshes),
     "find_parts": lambda v: es.find_parts(v.animal).parts,
-    "fit_rate": lambda v: es.stability.fit_rate(
-        [0.1, 0.2, 0.4], [0.01, 0.02, 0.03], [1.0, 2.0, 5.0]
-    ),
     "flat_torus_eigenvalues": lambda v: es.shapes.flat_torus_eigenvalues(9, np.eye(2)),
     "flatten_conformally": lambda v: es.calculus.flatten_conformally(v.grid),
     "from_arrays": lambda v: es.geometry.from_arrays(v.ball.vertices, v.ball.faces),
@@ -708,13 +701,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "spectral_embedding": lambda v: es.spectral.spectral_embedding(
         v.many_spectrum, power=0.5, t=0.2
     ),
-    "spectral_hausdorff_distance": lambda v: es.spectral.spectral_hausdorff_distance(
-        v.spectrum.eigenvalues, v.spectrum2.eigenvalues
-    ),
     "sphere_eigenvalues": lambda v: es.shapes.sphere_eigenvalues(9),
     "sphere_functional_eigenvalues": lambda v: es.shapes.sphere_functional_eigenvalues(9, 0.01),
     "sphere_harmonics": lambda v: es.shapes.sphere_harmonics(v.ball.vertices, 3),
-    "sphere_hull": lambda v: es.shapes.sphere_hull(v.ball.vertices),
     "subdivide": lambda v: [es.geometry.subdivide(v.solid), es.geometry.subdivide(v.ball)],
     "suggest_repairs": lambda v: es.suggest_repairs(v.animal),
     "surface_area": lambda v: es.geometry.surface_area(v.many),
@@ -723,7 +712,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "theorem_rate": lambda v: es.stability.theorem_rate("lipschitz", 2),
     "three_quarter_view": lambda v: es.plot.three_quarter_view(v.many),
     "three_sphere": lambda v: es.shapes.three_sphere(60),
-    "to_arrays": lambda v: es.io.to_arrays(v.ball),
     "to_pyvista": lambda v: np.asarray(es.io.to_pyvista(v.ball).points),
     "to_trimesh": lambda v: np.asarray(es.io.to_trimesh(v.ball).vertices),
     "torus": lambda v: es.shapes.torus(9, 7),

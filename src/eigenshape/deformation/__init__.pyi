@@ -6,7 +6,6 @@ from .distortion import Distortion as Distortion
 from .distortion import measure_distortion as measure_distortion
 from .edits import Edit as Edit
 from .edits import Move as Move
-from .edits import apply_edit as apply_edit
 from .handles import Rotation as Rotation
 from .handles import Translation as Translation
 from .handles import rotation_from_drag as rotation_from_drag

@@ -8,7 +8,6 @@ from .comparison.eigenspaces import separated_groups as separated_groups
 from .comparison.shape_dna import shape_dna as shape_dna
 from .comparison.spectra import SpectrumComparison as SpectrumComparison
 from .comparison.spectra import compare_spectra as compare_spectra
-from .comparison.spectra import spectral_hausdorff_distance as spectral_hausdorff_distance
 from .diffusion.heat_flow import apply_heat as apply_heat
 from .diffusion.heat_kernel import HeatTrace as HeatTrace
 from .diffusion.heat_kernel import heat_kernel as heat_kernel

@@ -23,8 +23,6 @@ from .perturbation import vertex_pairs as vertex_pairs
 from .plan import StabilityPlan as StabilityPlan
 from .rates import THEOREMS as THEOREMS
 from .rates import Rate as Rate
-from .rates import bounding_rate as bounding_rate
-from .rates import fit_rate as fit_rate
 from .rates import theorem_rate as theorem_rate
 from .report import StabilityReport as StabilityReport
 from .report import compare_shapes as compare_shapes
