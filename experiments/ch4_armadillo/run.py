@@ -140,7 +140,7 @@ def main() -> None:
     arguments = parse_arguments(__doc__, FOLDER)
     require_data()
     surgeries = variants(
-        es.geometry.normalize_diameter(es.read_mesh(DATA / "classics" / "armadillo.obj"))
+        es.geometry.normalize_mesh(es.read_mesh(DATA / "classics" / "armadillo.obj"), "diameter")
     )
     runs = sample_all(
         surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300

@@ -54,7 +54,7 @@ OPERATORS = {
 
 def torus_of_area_one(n_around: int, n_across: int) -> es.TriangleMesh:
     """Return the torus on whose surface everything happens."""
-    return es.geometry.normalize_area(es.shapes.torus(n_around, n_across))
+    return es.geometry.normalize_mesh(es.shapes.torus(n_around, n_across), "area")
 
 
 def all_eigenvalues(laplacian: es.Laplacian) -> np.ndarray:

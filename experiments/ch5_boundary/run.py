@@ -114,7 +114,7 @@ def measure(classes: tuple[str, ...], each: int, k: int) -> dict[str, dict[str, 
         {name: [] for name in CONDITIONS},
     )
     for number, row in enumerate(track(chosen, description="shapes")):
-        whole = es.geometry.normalize_box(es.read_mesh(DATA / row["path"]))
+        whole = es.geometry.normalize_mesh(es.read_mesh(DATA / row["path"]), "box")
         piece, source = cut(whole, number)
         before, after = spectra(whole, k), spectra(piece, k)
         database.append(describe(whole, before, "Neumann"))

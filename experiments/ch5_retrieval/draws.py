@@ -143,7 +143,7 @@ def make(version: Version, *, turned: bool = True) -> es.TriangleMesh:
         mesh = es.partial_scan(mesh, rng).mesh
     elif version.kind == "incomplete":
         mesh = incomplete(mesh, rng)
-    boxed = es.geometry.normalize_box(changed_part(mesh, version.change, own))
+    boxed = es.geometry.normalize_mesh(changed_part(mesh, version.change, own), "box")
     if not turned:
         return boxed
     return es.TriangleMesh(boxed.vertices @ rotation(rng).T, boxed.faces)

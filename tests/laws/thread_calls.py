@@ -585,9 +585,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "nodal_domains": lambda v: es.spectral.nodal_domains(v.many, v.height),
     "nodal_set": lambda v: es.spectral.nodal_set(v.many, v.height),
     "noise_level": lambda v: es.operators.noise_level(v.animal),
-    "normalize_area": lambda v: es.geometry.normalize_area(v.animal),
-    "normalize_box": lambda v: es.geometry.normalize_box(v.animal),
-    "normalize_diameter": lambda v: es.geometry.normalize_diameter(v.ball),
+    "normalize_mesh": lambda v: [
+        es.geometry.normalize_mesh(v.animal, measure) for measure in ("box", "area", "diameter")
+    ],
     "normalized_cut": lambda v: es.spectral.normalized_cut(
         v.normalized, v.animal.vertices[:, 1] > 0
     ),

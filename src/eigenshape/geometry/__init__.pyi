@@ -27,9 +27,7 @@ from .measure import face_normals as face_normals
 from .measure import surface_area as surface_area
 from .measure import vertex_normals as vertex_normals
 from .mesh import TriangleMesh as TriangleMesh
-from .normalize import normalize_area as normalize_area
-from .normalize import normalize_box as normalize_box
-from .normalize import normalize_diameter as normalize_diameter
+from .normalize import normalize_mesh as normalize_mesh
 from .orientation import orient_outward as orient_outward
 from .repairs.repair import repair as repair
 from .repairs.repair import suggest_repairs as suggest_repairs
