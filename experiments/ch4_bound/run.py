@@ -132,7 +132,9 @@ def moved_surfaces(setup: dict) -> list[dict[str, object]]:
                 {
                     "operator": name,
                     "t": t,
-                    "delta": es.stability.map_closeness(mesh, there.vertices).delta,
+                    "delta": es.stability.measure_closeness(
+                        es.stability.measure_perturbation(mesh, there)
+                    ).delta,
                     "hausdorff": compared.hausdorff,
                     "change": compared.index_distance,
                     "relative": compared.median_relative,

@@ -301,7 +301,6 @@ WITHOUT = {
     "is_manifold",
     "labels_from_votes",
     "local_triangles",
-    "map_closeness",
     "measure_perturbation",
     "nodal_domains",
     "normalized_cut",

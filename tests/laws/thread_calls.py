@@ -550,7 +550,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         for method in ("affine", "adaptive", "radial")
     ],
     "make_creature": lambda v: es.make_creature("quadruped", 3, n_vertices=700),
-    "map_closeness": lambda v: es.stability.map_closeness(v.ball, 1.01 * v.ball.vertices),
     "map_from_points": lambda v: es.spectral.map_from_points(
         v.many_spectrum, v.many_spectrum, np.arange(v.many.n_vertices), n_modes=6
     ),

@@ -9,7 +9,6 @@ from .bounds import weyl_bound as weyl_bound
 from .cheeger import CheegerEstimate as CheegerEstimate
 from .cheeger import cheeger_estimate as cheeger_estimate
 from .closeness import Closeness as Closeness
-from .closeness import map_closeness as map_closeness
 from .closeness import measure_closeness as measure_closeness
 from .correspondence import BottleneckMatching as BottleneckMatching
 from .correspondence import MaximumMatching as MaximumMatching
