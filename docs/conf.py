@@ -90,7 +90,7 @@ def write_api_pages() -> None:
     write_if_changed(
         folder / "index.md",
         "# API\n\nNames of the short door are there as `es.name`; all others stand in their room, as "
-        f"`es.geometry.weld`.\n\n```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n",
+        f"`es.geometry.decimate`.\n\n```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n",
     )
 
 

@@ -42,7 +42,6 @@ class Closeness(ReadOnly):
 
     See Also
     --------
-    map_closeness : Closeness of a mesh and its image under a map.
     measure_closeness : Closeness of a shape and a changed shape.
 
     Examples
@@ -51,7 +50,8 @@ class Closeness(ReadOnly):
 
     >>> import eigenshape as es
     >>> mesh = es.icosphere(2)
-    >>> closeness = es.stability.map_closeness(mesh, 2 * mesh.vertices)
+    >>> larger = es.TriangleMesh(2 * mesh.vertices, mesh.faces)
+    >>> closeness = es.stability.measure_closeness(es.stability.measure_perturbation(mesh, larger))
     >>> closeness.limited_by, round(closeness.delta, 6)
     ('Jacobian', 3.0)
     """

@@ -30,7 +30,6 @@ class Rate:
     See Also
     --------
     theorem_rate : Rates that theorems prove.
-    fit_rate : Rate fitted to measurements.
 
     Examples
     --------
