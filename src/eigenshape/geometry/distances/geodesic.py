@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from itertools import chain, islice
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -161,7 +162,7 @@ def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]
     Raises an error if one is not a point.
     """
     try:
-        entries = list(sources)  # type: ignore[arg-type]
+        entries: list[Any] = list(sources)  # type: ignore[arg-type]
     except TypeError:  # one number
         entries = [sources]
     return [np.unique(whole_numbers(entry, "A source", 0, n_points - 1)) for entry in entries]

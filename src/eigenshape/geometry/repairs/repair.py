@@ -184,7 +184,7 @@ def repair(
             source = done.source_points[step.source_points]
             done = RepairedCloud(step.cloud, done.report + step.report, source)
         return done
-    steps = {
+    steps: dict[str, Callable[[Any], RepairedMesh[Any]]] = {
         **REPAIRS,
         "weld": partial(weld, tolerance=tolerance),
         "fill_holes": partial(fill_holes, most_edges=most_edges),

@@ -1,5 +1,7 @@
 """The repairs of meshes and clouds, one function each; each reports what it did."""
 
+from typing import Any
+
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
@@ -21,6 +23,7 @@ from eigenshape.geometry.repairs.repair_report import (
     simplex_noun,
 )
 from eigenshape.geometry.simplices import MEASURES, degenerate_simplices, scaled_corners, size_one
+from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     repeated_simplices,
     seams,
@@ -99,7 +102,7 @@ def _merge_vertices(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> R
     )
 
 
-def drop_degenerate(mesh: MeshT) -> RepairedMesh[MeshT]:
+def drop_degenerate(mesh: Mesh) -> RepairedMesh[Any]:
     """Remove faces without area, or simplices without volume; their vertices stay.
 
     If a vertex of such a face lies on its longest side, the face on the other side of that edge is

@@ -1,6 +1,5 @@
 """Watermarks in the low frequencies of a shape (after Ohbuchi, Mukaiyama and Takahashi 2002)."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import shake_256
 from pathlib import Path
@@ -160,7 +159,7 @@ def detect_watermark(
 def detect_watermark(
     original: MeshLike,
     suspect: MeshLike,
-    key: Sequence[Key],
+    key: list[Key] | tuple[Key, ...],
     *,
     k: Integer = ...,
     cache: str | Path | None = ...,
@@ -168,7 +167,7 @@ def detect_watermark(
 def detect_watermark(
     original: MeshLike,
     suspect: MeshLike,
-    key: Key | Sequence[Key],
+    key: Key | list[Key] | tuple[Key, ...],
     *,
     k: Integer = DEFAULT_MODES,
     cache: str | Path | None = None,
@@ -193,7 +192,7 @@ def detect_watermark(
         The mesh that was given to `embed_watermark`.
     suspect : MeshLike
         A mesh with the same vertices in the same order; its faces do not matter.
-    key : str or bytes, or a sequence of them
+    key : str or bytes, or a list of them
         With many keys, as to find who passed a copy on, multiply the false-alarm probability of the
         best by their number.
     k, cache
@@ -224,8 +223,8 @@ def detect_watermark(
     [False, False, True, False]
     """
     mesh, other = as_mesh(original, "original"), as_mesh(suspect, "suspect")
-    many = isinstance(key, Sequence) and not isinstance(key, str | bytes)
-    secrets = [_require_key(each) for each in (key if many else [key])]
+    keys = key if isinstance(key, list | tuple) else [key]
+    secrets = [_require_key(each) for each in keys]
     if other.n_vertices != mesh.n_vertices:
         raise InvalidParameterError(
             "The suspect must have the vertices of the original, in the same order; it has "
@@ -246,7 +245,7 @@ def detect_watermark(
             score = float((pattern * found).sum() / (np.linalg.norm(pattern) * length))
         chance = _exceedance(score, dimension) if length > 0 else 1.0
         tests.append(WatermarkTest(score, chance, dimension))
-    return tuple(tests) if many else tests[0]
+    return tuple(tests) if isinstance(key, list | tuple) else tests[0]
 
 
 def _require_key(key: object) -> bytes:
