@@ -55,8 +55,7 @@ def points(n: int, count: int) -> np.ndarray:
 def our_poisson(vertices: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
     """Solve with vertex 0 fixed."""
     laplacian = es.cotangent_laplacian((vertices, faces))
-    solver = calculus.poisson_solver(laplacian, [0])
-    return solver.solve(laplacian.mass @ sources(len(vertices), count))
+    return calculus.solve_poisson(laplacian, sources(len(vertices), count), fixed=[0])
 
 
 def lapy_poisson(vertices: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
@@ -83,9 +82,9 @@ def our_heat(vertices: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
     mesh = es.TriangleMesh(vertices, faces)
     laplacian = es.cotangent_laplacian(mesh)
     t = es.geometry.edge_lengths(mesh).mean() ** 2
-    start = np.zeros((len(vertices), count))
-    start[points(len(vertices), count), np.arange(count)] = 1.0
-    return calculus.heat_solver(laplacian, t).solve(start)
+    load = np.zeros((len(vertices), count))
+    load[points(len(vertices), count), np.arange(count)] = 1.0
+    return calculus.solve_heat(laplacian, np.zeros(len(vertices)), t, load=load / t)
 
 
 def lapy_heat(vertices: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
@@ -102,10 +101,10 @@ def our_distances(vertices: np.ndarray, faces: np.ndarray, count: int) -> np.nda
     load = np.zeros((len(vertices), count))
     load[starts, np.arange(count)] = 1.0
     t = es.geometry.edge_lengths(mesh).mean() ** 2
-    slopes = calculus.gradient(mesh, calculus.heat_solver(laplacian, t).solve(load))
+    heat = calculus.solve_heat(laplacian, np.zeros(len(vertices)), t, load=load / t)
+    slopes = calculus.gradient(mesh, heat)
     slopes /= -np.linalg.norm(slopes, axis=1, keepdims=True)
-    solver = calculus.poisson_solver(laplacian)
-    distances = solver.solve(-calculus.divergence(mesh, slopes))
+    distances = calculus.solve_poisson(laplacian, load=-calculus.divergence(mesh, slopes))
     return distances - distances[starts, np.arange(count)]
 
 

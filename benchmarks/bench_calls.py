@@ -59,11 +59,15 @@ def tools(*, small: bool) -> Iterator[Call]:
         "project and reconstruct",
         lambda: es.spectral.reconstruct(es.spectral.project(mesh.vertices, spectrum), spectrum),
     )
-    low = es.spectral.LowPass(spectrum.eigenvalues[50])
+    cutoff = spectrum.eigenvalues[50]
+
+    def low(eigenvalues: np.ndarray) -> np.ndarray:
+        return eigenvalues <= cutoff
+
     yield "filter_values", lambda: es.spectral.filter_values(mesh.vertices[:, 0], spectrum, low)
     yield "smooth_mesh", lambda: es.spectral.smooth_mesh(mesh, spectrum, low)
     sources = np.arange(10)
-    yield "biharmonic distances of 10", lambda: es.spectral.biharmonic_distances(spectrum, sources)
+    yield "biharmonic distances of 10", lambda: es.spectral.spectral_distances(spectrum, sources)
     yield "8 clusters", lambda: es.spectral.spectral_clusters(spectrum, 8)
     area = es.geometry.surface_area(mesh)
     heat = mesh.vertices[:, [0]]

@@ -9,6 +9,7 @@ rounds of ours, ten of libigl's after its preparation. Each size has a process o
 """
 
 import statistics
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -21,6 +22,9 @@ from machine import memory_now, peak_memory
 from report import Report, Row, in_process, options_of
 
 import eigenshape as es
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "experiments" / "ch6_deformation")]
+from peers import as_rigid_as_possible  # noqa: E402
 
 FULL = {  # vertices, splits, region: the thesis' modes, steps 1 and 2, and step 3, on a model of that size, in ms
     (7_000, 0, "half"): ("camel, 7k, 8 modes", 2, 49),
@@ -109,7 +113,7 @@ def bent(saved: str, region: str) -> Row:
     often("drag", lambda: es.deformation.move_skeleton(skeleton.response, handles))
     often("thesis", lambda: es.deformation.eigen_deformation(skeleton, handles))
     goal = often("graded", lambda: es.deformation.bend(binding, handles)).vertices
-    often("arap", lambda: es.deformation.as_rigid_as_possible(binding, handles, n_rounds=ROUNDS))
+    often("arap", lambda: as_rigid_as_possible(binding, handles, n_rounds=ROUNDS))
     by_libigl(binding, goal, timed)
     free = len(binding.part.free) / mesh.n_vertices
     return row | {"modes": int(binding.n_modes[0]), "free": free, "memory": peak_memory() - before}

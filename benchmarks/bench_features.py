@@ -59,7 +59,7 @@ def surface(base: int, splits: int) -> es.TriangleMesh:
         corners = [(a, z, y), (z, b, x), (y, x, c), (x, y, z)]
         points = np.concatenate([mesh.vertices, mesh.vertices[table.edges].mean(axis=1)])
         mesh = es.TriangleMesh(points, np.concatenate([np.column_stack(face) for face in corners]))
-    return es.geometry.normalize_box(mesh)
+    return es.geometry.normalize_mesh(mesh, "box")
 
 
 def times() -> np.ndarray:

@@ -3,13 +3,15 @@
     python benchmarks/bench_retrieval.py                       4,800 to a million vertices; some minutes
     python benchmarks/bench_retrieval.py --quick               2,500 vertices, 30 shapes
 
-Creatures stand for the thesis' models, with as many vertices, split for the large one. EVD and LFD are ours too.
+Creatures stand for the thesis' models, with as many vertices, split for the large one. EVD and LFD are those of
+experiments/ch5_retrieval.
 Each call has a process of its own, after a small one that loads and compiles. The last row of a method is one query
 by a described scan among 300 shapes: patches and heat ask an index, with six and four views of each shape; patches
 score all, verify thirty, and find correspondences with those that they return.
 """
 
 import statistics
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -23,6 +25,10 @@ from machine import memory_now, peak_memory
 from report import Report, Row, in_process, options_of
 
 import eigenshape as es
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "experiments" / "ch5_retrieval")]
+from affinity import affinity_distance, affinity_eigenvalues  # noqa: E402
+from light_fields import light_field, light_field_distance  # noqa: E402
 
 FULL = {  # vertices and how often faces are split, and the seconds that the thesis prints for its method, EVD and LFD
     (4_800, 0): (9.4, 7.9, 0.7),
@@ -54,8 +60,8 @@ def thesis(mesh: es.TriangleMesh) -> es.retrieval.HeatDescriptor:
 METHODS: dict[str, Callable[[es.TriangleMesh], Any]] = {
     "patches": patches,
     "thesis": thesis,
-    "EVD": es.retrieval.baselines.affinity_eigenvalues,
-    "LFD": es.retrieval.baselines.light_field,
+    "EVD": affinity_eigenvalues,
+    "LFD": light_field,
 }
 PRINTED = {"thesis": 0, "EVD": 1, "LFD": 2}
 
@@ -95,11 +101,7 @@ def asked(method: str, n_shapes: int) -> Row:
     ).mesh
     if method in {"EVD", "LFD"}:
         known = [METHODS[method](mesh) for mesh in poses]
-        distance = (
-            es.retrieval.baselines.affinity_distance
-            if method == "EVD"
-            else es.retrieval.baselines.light_field_distance
-        )
+        distance = affinity_distance if method == "EVD" else light_field_distance
         query = METHODS[method](scan)
         return measured(
             lambda: [distance(query, known[number % len(known)]) for number in range(n_shapes)]

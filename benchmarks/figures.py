@@ -64,7 +64,7 @@ class Figure:
 SOURCE = "src/eigenshape/"
 SOLVER = ("spectral/solver", "spectral/solve.py", "sparse")
 HEAT = ("spectral/multilevel", "spectral/signatures", "features")
-DESCRIBING = ("retrieval/patches", "retrieval/heat", "retrieval/baselines")
+DESCRIBING = ("retrieval/patches", "retrieval/heat")
 STORE = ("retrieval/store", "retrieval/search")
 # The most important first, so that what there is time for is measured: some forty minutes on two idle cores.
 FIGURES = {

@@ -53,7 +53,7 @@ def write_api_pages() -> None:
     rooms = [
         (name, getattr(es, name)) for name in es.__all__ if inspect.ismodule(getattr(es, name))
     ]
-    for name, room in [("eigenshape", es), *rooms, ("retrieval.baselines", es.retrieval.baselines)]:
+    for name, room in [("eigenshape", es), *rooms]:
         title = "The short door" if room is es else f"eigenshape.{name}"
         summary = (inspect.getdoc(room) or "").split("\n\n")
         things = {each: getattr(room, each) for each in room.__all__ if not each.startswith("__")}
@@ -92,7 +92,7 @@ def write_api_pages() -> None:
     write_if_changed(
         folder / "index.md",
         "# API\n\nNames of the short door are there as `es.name`; all others stand in their room, as "
-        f"`es.geometry.weld`.\n\n```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n",
+        f"`es.geometry.decimate`.\n\n```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n",
     )
 
 

@@ -15,12 +15,15 @@ def main() -> dict[str, float]:
     diagonal = np.linalg.norm(np.ptp(mesh.vertices, axis=0))
     error = np.linalg.norm(rough - mesh.vertices, axis=1).mean() / diagonal
 
-    heat = es.spectral.HeatFilter(0.001 * es.geometry.surface_area(mesh))
-    smooth = es.spectral.smooth_mesh(mesh, spectrum, heat, keep_volume=True)
+    # Heat that flows for a time t multiplies the mode of eigenvalue λ by exp(-tλ).
+    t = 0.001 * es.geometry.surface_area(mesh)
+    smooth = es.spectral.smooth_mesh(
+        mesh, spectrum, lambda values: np.exp(-t * values), keep_volume=True
+    )
 
     # The lowest vertex, and the point that is farthest from it along the surface.
     foot = int(mesh.vertices[:, 1].argmin())
-    distances = es.spectral.biharmonic_distances(spectrum, [foot])[:, 0]
+    distances = es.spectral.spectral_distances(spectrum, [foot])[:, 0]
     labels = es.spectral.spectral_clusters(spectrum, 6)
     return {
         "mean error of 25 modes, shares of the diagonal": error,

@@ -137,7 +137,7 @@ def run(quick: bool, cache: str) -> tuple[dict[str, object], dict[str, list[floa
             )
             if attack == NOISY:
                 keys = [f"{name}, wrong key {number}" for number in range(n_tries)]
-                wrong += es.spectral.detect_watermarks(mesh, suspect, keys, cache=cache)
+                wrong += es.spectral.detect_watermark(mesh, suspect, keys, cache=cache)
     chances = np.array([test.false_alarm for test in wrong])
     figures = {
         "shapes": len(marked_shapes),

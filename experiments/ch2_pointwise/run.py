@@ -54,7 +54,7 @@ def meshes(n: int) -> dict[str, tuple[es.TriangleMesh, np.ndarray]]:
 
 def largest_error(mesh: es.TriangleMesh, points: np.ndarray, t: float) -> float:
     """Return the largest error of L f, without storing the matrix of `es.mesh_laplacian`."""
-    operator = es.operators.functional_laplacian(es.geometry.mesh_quadrature(mesh), t, cutoff=4.0)
+    operator = es.operators.functional_laplacian(es.geometry.shape_quadrature(mesh), t, cutoff=4.0)
     return np.abs(operator @ values_of(points) - exact(points)).max()
 
 

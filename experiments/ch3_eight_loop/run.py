@@ -38,7 +38,7 @@ CLASSES = (
 
 def eight() -> es.TriangleMesh:
     """Return the loop with diameter 1, its middle at the origin, its rings along z."""
-    mesh = es.geometry.normalize_diameter(es.read_mesh(DATA / "classics" / "eight.off"))
+    mesh = es.geometry.normalize_mesh(es.read_mesh(DATA / "classics" / "eight.off"), "diameter")
     middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     return es.TriangleMesh(mesh.vertices - middle, mesh.faces)
 

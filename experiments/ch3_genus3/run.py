@@ -31,7 +31,7 @@ def meshes_of(n_first: int | None, n_coarse: int) -> dict[str, es.TriangleMesh]:
     raw = es.read_mesh(DATA / "classics" / "genus3.off")
     if n_first:
         raw = coarser(raw, n_first)
-    mesh = es.geometry.normalize_diameter(raw)
+    mesh = es.geometry.normalize_mesh(raw, "diameter")
     # made coarser as it was read: what the last digit of a diameter touches is not the same on every CPU
     coarse = coarser(raw, n_coarse)
     right = coarse.vertices[coarse.faces].mean(axis=1)[:, 0] > raw.vertices[:, 0].mean()

@@ -51,7 +51,7 @@ def sizes(names: tuple[str, ...]) -> dict[str, dict[str, float]]:
     found = {}
     for name in names:
         mesh = read(name)
-        unit = es.geometry.normalize_diameter(mesh)
+        unit = es.geometry.normalize_mesh(mesh, "diameter")
         area = es.geometry.surface_area(mesh)
         found[name] = {"area 1": area, "diameter 1": area / es.geometry.surface_area(unit)}
     return found

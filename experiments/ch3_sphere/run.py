@@ -98,7 +98,7 @@ def noise_errors(n: int, k: int) -> dict[str, np.ndarray]:
 
 def scatter(mesh: es.TriangleMesh) -> list[float]:
     """Return how far the weights A_j, and those of Voronoi cells, scatter: standard deviation over mean."""
-    cells = es.geometry.cloud_quadrature(es.PointCloud(mesh.vertices, 2)).weights
+    cells = es.geometry.shape_quadrature(es.PointCloud(mesh.vertices, 2)).weights
     return [
         float(weights.std() / weights.mean()) for weights in (es.geometry.dual_volumes(mesh), cells)
     ]

@@ -41,7 +41,7 @@ def nearest(mesh: es.TriangleMesh, place: tuple[float, ...]) -> int:
 
 def shares(mesh: es.TriangleMesh, tip: int, reach: float) -> np.ndarray:
     """Return by how much vertices follow a fingertip: smoothly from 1 there to 0 a reach away along the surface."""
-    rest = np.clip(1 - es.geometry.geodesic_distance_to_set(mesh, [tip]) / reach, 0, 1)
+    rest = np.clip(1 - es.geometry.geodesic_distances(mesh, [tip])[0] / reach, 0, 1)
     return rest**2 * (3 - 2 * rest)
 
 
@@ -65,7 +65,7 @@ def touching(mesh: es.TriangleMesh, tips: tuple[int, int]) -> np.ndarray:
 def facing(mesh: es.TriangleMesh, tips: tuple[int, int]) -> tuple[int, int]:
     """Return the vertices by which two fingers are nearest to each other, close to their tips."""
     one, two = (
-        np.flatnonzero(es.geometry.geodesic_distance_to_set(mesh, [tip]) < 0.4 * FINGER)
+        np.flatnonzero(es.geometry.geodesic_distances(mesh, [tip])[0] < 0.4 * FINGER)
         for tip in tips
     )
     away, place = cKDTree(mesh.vertices[two]).query(mesh.vertices[one])
@@ -140,7 +140,7 @@ def main() -> None:
     arguments = parse_arguments(__doc__, FOLDER)
     require_data()
     surgeries = variants(
-        es.geometry.normalize_diameter(es.read_mesh(DATA / "classics" / "armadillo.obj"))
+        es.geometry.normalize_mesh(es.read_mesh(DATA / "classics" / "armadillo.obj"), "diameter")
     )
     runs = sample_all(
         surgeries, QUICK if arguments.quick else RUNS, 100 if arguments.quick else 300

@@ -3,6 +3,7 @@
 from itertools import product
 
 import numpy as np
+from fitted_rates import bounding_rate
 from frame import COLORS, chart, label
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -39,7 +40,7 @@ def figure_law(points: list[dict], samples: list[dict], setup: dict) -> Figure:
         left.plot(deltas, dense.at(deltas, t), "--", lw=1, color=color)
         left.plot(
             deltas,
-            es.stability.bounding_rate(law, deltas[:1], [t], means[:1]).at(deltas, t),
+            bounding_rate(law, deltas[:1], [t], means[:1]).at(deltas, t),
             ":",
             lw=1,
             color=color,

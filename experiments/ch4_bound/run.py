@@ -16,6 +16,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from bound_pictures import DIM, columns, figure_forbidden, figure_law, figure_surfaces
+from fitted_rates import bounding_rate, fit_rate
 from frame import finish, parse_arguments, rounded
 
 HERE = Path(__file__).resolve().parent
@@ -53,7 +54,7 @@ OPERATORS = {
 
 def torus_of_area_one(n_around: int, n_across: int) -> es.TriangleMesh:
     """Return the torus on whose surface everything happens."""
-    return es.geometry.normalize_area(es.shapes.torus(n_around, n_across))
+    return es.geometry.normalize_mesh(es.shapes.torus(n_around, n_across), "area")
 
 
 def all_eigenvalues(laplacian: es.Laplacian) -> np.ndarray:
@@ -131,7 +132,9 @@ def moved_surfaces(setup: dict) -> list[dict[str, object]]:
                 {
                     "operator": name,
                     "t": t,
-                    "delta": es.stability.map_closeness(mesh, there.vertices).delta,
+                    "delta": es.stability.measure_closeness(
+                        es.stability.measure_perturbation(mesh, there)
+                    ).delta,
                     "hausdorff": compared.hausdorff,
                     "change": compared.index_distance,
                     "relative": compared.median_relative,
@@ -142,7 +145,7 @@ def moved_surfaces(setup: dict) -> list[dict[str, object]]:
 
 def exponents(rows: list[dict], measured: str = "change") -> dict[str, float]:
     """Fit powers of δ and t."""
-    law = es.stability.fit_rate(*columns(rows, "delta", "t", measured))
+    law = fit_rate(*columns(rows, "delta", "t", measured))
     return {"delta": law.delta, "t": law.t, "constant": law.constant}
 
 
@@ -160,7 +163,7 @@ def summarize(points: list[dict], samples: list[dict], surfaces: list[dict]) -> 
         "proven (4.3.1)": {"delta": law.delta, "t": law.t},
         "proven (ours)": {"delta": ours.delta, "t": ours.t},
         "expected (dense)": {"delta": dense.delta, "t": dense.t},
-        "constant that 4.3.1 needs": es.stability.bounding_rate(
+        "constant that 4.3.1 needs": bounding_rate(
             law, *columns(allowed, "delta", "t", "change")
         ).constant,
         "largest share of our bound": float((told[2] / ours.at(*told[:2])).max()),
@@ -192,7 +195,7 @@ def _sample_row(rows: list[dict]) -> dict[str, float]:
 def _surface_row(rows: list[dict]) -> dict[str, float]:
     by_number, as_sets = exponents(rows, "change"), exponents(rows, "hausdorff")
     theorem = "3.1.5" if rows[0]["operator"].startswith("cotangent") else "3.1.4"
-    covering = es.stability.bounding_rate(
+    covering = bounding_rate(
         es.stability.theorem_rate(theorem, DIM), *columns(rows, "delta", "t", "hausdorff")
     )
     return {
@@ -218,9 +221,9 @@ def functional_errors() -> dict[str, float]:
     ones = np.ones(len(times))
     proven = es.stability.theorem_rate("3.1.1", DIM)
     return {
-        "t": es.stability.fit_rate(ones, times, errors).t,
+        "t": fit_rate(ones, times, errors).t,
         "t, proven": proven.t,
-        "constant of 3.1.1": es.stability.bounding_rate(proven, ones, times, errors).constant,
+        "constant of 3.1.1": bounding_rate(proven, ones, times, errors).constant,
     }
 
 

@@ -36,7 +36,7 @@ def bridged_tori(radii: tuple[float, ...]) -> dict[str, Surgery]:
     """Return two tori side by side, diameter 1, joined by a bridge of each radius where they are nearest."""
     left = es.shapes.torus(AROUND, ACROSS)
     right = es.TriangleMesh(left.vertices + np.array([2.8 + GAP, 0, 0]), left.faces)
-    tori = es.geometry.normalize_diameter(es.geometry.disjoint_union(left, right))
+    tori = es.geometry.normalize_mesh(es.geometry.disjoint_union(left, right), "diameter")
     across = left.n_vertices + AROUND // 2 * ACROSS
     return {f"r = {radius:g}": bridge(tori, 0, across, radius) for radius in radii}
 

@@ -33,12 +33,14 @@ MESHED = ("s = 0.15", "s = 0.5", "s = 1")
 def attached_tori(sizes: tuple[float, ...], *, coarser: int = 1) -> dict[str, Surgery]:
     """Return a torus of diameter 1 with another of each size attached at its outer side."""
     n_around, n_across = AROUND // coarser, ACROSS // coarser
-    first = es.geometry.normalize_diameter(es.shapes.torus(n_around, n_across))
+    first = es.geometry.normalize_mesh(es.shapes.torus(n_around, n_across), "diameter")
     found = {}
     for size in sizes:
         finer = max(size, 0.4)
         around = 4 * round(n_around * finer / 4)
-        other = es.geometry.normalize_diameter(es.shapes.torus(around, round(n_across * finer)))
+        other = es.geometry.normalize_mesh(
+            es.shapes.torus(around, round(n_across * finer)), "diameter"
+        )
         shift = 0.5 + size * (0.5 + REACH)
         placed = es.TriangleMesh(size * other.vertices + [shift, 0, 0], other.faces)
         end = around // 2 * (other.n_vertices // around)

@@ -29,7 +29,7 @@ MESHED = ("ε = 0.0005", "ε = 0.002", "ε = 0.004")
 
 def giraffe() -> es.TriangleMesh:
     """Return the surface, its diameter 1."""
-    return es.geometry.normalize_diameter(es.make_creature("giraffe", n_vertices=6000))
+    return es.geometry.normalize_mesh(es.make_creature("giraffe", n_vertices=6000), "diameter")
 
 
 def shaken(mesh: es.TriangleMesh, noise: tuple[float, ...]) -> dict[str, es.TriangleMesh]:

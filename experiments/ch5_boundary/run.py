@@ -40,7 +40,7 @@ def cut(mesh: es.TriangleMesh, seed: int) -> tuple[es.TriangleMesh, np.ndarray]:
     while True:
         planes = es.scans.random_planes(mesh, rng, n_planes=1, share=rng.uniform(0.15, 0.5))
         cut_off = es.scans.cut_by_planes(mesh, planes)
-        piece = es.geometry.largest_component(cut_off.mesh)
+        piece = es.repair(cut_off.mesh, ["largest_component"])
         if KEPT[0] <= es.geometry.surface_area(piece.mesh) / area <= KEPT[1]:
             return piece.mesh, cut_off.source_vertices[piece.source_vertices]
 
@@ -114,7 +114,7 @@ def measure(classes: tuple[str, ...], each: int, k: int) -> dict[str, dict[str, 
         {name: [] for name in CONDITIONS},
     )
     for number, row in enumerate(track(chosen, description="shapes")):
-        whole = es.geometry.normalize_box(es.read_mesh(DATA / row["path"]))
+        whole = es.geometry.normalize_mesh(es.read_mesh(DATA / row["path"]), "box")
         piece, source = cut(whole, number)
         before, after = spectra(whole, k), spectra(piece, k)
         database.append(describe(whole, before, "Neumann"))

@@ -143,7 +143,7 @@ def make(version: Version, *, turned: bool = True) -> es.TriangleMesh:
         mesh = es.partial_scan(mesh, rng).mesh
     elif version.kind == "incomplete":
         mesh = incomplete(mesh, rng)
-    boxed = es.geometry.normalize_box(changed_part(mesh, version.change, own))
+    boxed = es.geometry.normalize_mesh(changed_part(mesh, version.change, own), "box")
     if not turned:
         return boxed
     return es.TriangleMesh(boxed.vertices @ rotation(rng).T, boxed.faces)
@@ -157,7 +157,9 @@ def incomplete(whole: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleM
             whole, rng, n_planes=int(rng.integers(1, 4)), share=rng.uniform(0.05, 0.4)
         )
         try:
-            piece = es.geometry.largest_component(es.scans.cut_by_planes(whole, planes).mesh).mesh
+            piece = es.repair(
+                es.scans.cut_by_planes(whole, planes).mesh, ["largest_component"]
+            ).mesh
         except es.InvalidShapeError:
             continue
         if KEPT[0] <= es.geometry.surface_area(piece) / area <= KEPT[1]:

@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
+from affinity import affinity_distance, affinity_eigenvalues
+from light_fields import light_field, light_field_distance
 from real_shapes import inner_curvature
 
 import eigenshape as es
@@ -113,9 +115,27 @@ class ScaleFree:
         return matching_scores(query, described)
 
 
+def shape_dna_distance(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the Euclidean distance."""
+    return float(np.linalg.norm(one - other))
+
+
+# By name, so that the `repr` of a method tells all that its descriptors depend on.
+DESCRIBERS: dict[str, Callable[..., np.ndarray]] = {
+    "shape_dna": es.spectral.shape_dna,
+    "affinity_eigenvalues": affinity_eigenvalues,
+    "light_field": light_field,
+}
+DISTANCES: dict[str, Callable[[np.ndarray, np.ndarray], float]] = {
+    "shape_dna_distance": shape_dna_distance,
+    "affinity_distance": affinity_distance,
+    "light_field_distance": light_field_distance,
+}
+
+
 @dataclass(frozen=True)
 class Global:
-    """A descriptor of the whole shape by a function of the library, and a distance of two of them."""
+    """A descriptor of the whole shape by one of `DESCRIBERS`, and a distance of two of them."""
 
     name: str
     describer: str
@@ -123,15 +143,12 @@ class Global:
     options: tuple[tuple[str, int], ...] = ()
 
     def describe(self, mesh: es.TriangleMesh) -> Any:
-        """Return what the library's function makes of it."""
-        return getattr(es.retrieval.baselines, self.describer)(mesh, **dict(self.options))
+        """Return what the function makes of it."""
+        return DESCRIBERS[self.describer](mesh, **dict(self.options))
 
     def distances(self, query: Any, described: Sequence[Any]) -> np.ndarray:
         """Return its distances."""
-        distance: Callable[[Any], float] = partial(
-            getattr(es.retrieval.baselines, self.measure), query
-        )
-        return np.array([distance(other) for other in described])
+        return np.array([DISTANCES[self.measure](query, other) for other in described])
 
 
 TEACHING_VIEWS = 2

@@ -49,4 +49,4 @@ def halved(mesh: es.TriangleMesh) -> es.TriangleMesh:
     points, faces = (
         found[:2] if isinstance(found[0], np.ndarray) else found[1:3]
     )  # older ones say first if it is done
-    return es.geometry.drop_unreferenced(es.TriangleMesh(points, faces)).mesh
+    return es.repair(es.TriangleMesh(points, faces), ["drop_unreferenced"]).mesh

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import igl  # of the test extra
 import numpy as np
+from peers import as_rigid_as_possible, biharmonic_blend, spectral_rigid
 
 import eigenshape as es
 
@@ -19,7 +20,7 @@ def libigl(
     free[binding.part.free] = True
     held, goal = (
         np.flatnonzero(~free),
-        es.deformation.as_rigid_as_possible(binding, handles, n_rounds=1),
+        as_rigid_as_possible(binding, handles, n_rounds=1),
     )
     data = igl.ARAPData()
     data.max_iter = PEER_ROUNDS
@@ -38,10 +39,8 @@ METHODS: dict[str, Method] = {
     "thesis": lambda binding, handles: (
         es.deformation.bend(binding, handles, mode="thesis").vertices
     ),
-    "ARAP": lambda binding, handles: es.deformation.as_rigid_as_possible(
-        binding, handles, n_rounds=PEER_ROUNDS
-    ),
+    "ARAP": lambda binding, handles: as_rigid_as_possible(binding, handles, n_rounds=PEER_ROUNDS),
     "ARAP (libigl)": libigl,
-    "biharmonic": es.deformation.biharmonic_blend,
-    "spectral": es.deformation.spectral_rigid,
+    "biharmonic": biharmonic_blend,
+    "spectral": spectral_rigid,
 }

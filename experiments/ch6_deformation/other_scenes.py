@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from peers import as_rigid_as_possible
 from scenes import about_rim, around, box_surface
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
@@ -146,7 +147,7 @@ def compared(scene: OtherScene) -> dict[str, float]:
 
     def errors(binding: es.deformation.Binding) -> tuple[float, float]:
         ours = es.deformation.bend(binding, [scene.move.handle]).vertices
-        peer = es.deformation.as_rigid_as_possible(binding, [scene.move.handle], n_rounds=ROUNDS)
+        peer = as_rigid_as_possible(binding, [scene.move.handle], n_rounds=ROUNDS)
         found = [
             es.deformation.measure_distortion(scene.mesh, es.TriangleMesh(some, scene.mesh.faces))
             for some in (ours, peer)

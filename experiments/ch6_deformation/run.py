@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from methods import METHODS
+from peers import as_rigid_as_possible
 from scenes import QUICK, SCENES, Scene
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
@@ -51,7 +52,7 @@ def measures(
 def compared(scene: Scene) -> dict[str, Any]:
     """Return the measures of all methods on a scene."""
     binding, handles = bound(scene)
-    goal = es.deformation.as_rigid_as_possible(binding, handles, n_rounds=1)
+    goal = as_rigid_as_possible(binding, handles, n_rounds=1)
     held = np.setdiff1d(np.arange(scene.mesh.n_vertices), binding.part.free)
     rows: dict[str, Any] = {"vertices": scene.mesh.n_vertices, "modes": binding.n_modes.tolist()}
     rows["held"] = len(held) / scene.mesh.n_vertices

@@ -89,7 +89,7 @@ def remesh(mesh: es.TriangleMesh, n_vertices: int, rng: np.random.Generator) -> 
     n_faces = 2 * n_vertices
     found = igl.decimate(np.array(points), np.array(fine.faces), n_faces)
     points, faces = found[:2] if isinstance(found[0], np.ndarray) else found[1:3]
-    coarse = es.geometry.drop_unreferenced(es.TriangleMesh(points, faces)).mesh
+    coarse = es.repair(es.TriangleMesh(points, faces), ["drop_unreferenced"]).mesh
     on_surface = es.geometry.closest_points(mesh, coarse.vertices).points
     coarse = es.TriangleMesh(on_surface, coarse.faces)
     return es.repair(coarse, ["drop_degenerate", "largest_component"]).mesh
@@ -128,7 +128,7 @@ def with_holes(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMe
         radius = unit * rng.uniform(*HOLE_RADII)
         gone |= wave(rng.integers(mesh.n_vertices), radius) <= radius
     rest = es.TriangleMesh(mesh.vertices, mesh.faces[~gone[mesh.faces].any(axis=1)])
-    return es.geometry.drop_unreferenced(rest).mesh
+    return es.repair(rest, ["drop_unreferenced"]).mesh
 
 
 def without_slab(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMesh:
@@ -138,7 +138,7 @@ def without_slab(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.Triangle
     low, high = np.quantile(heights, SLAB)
     gone = (heights > low) & (heights < high)
     rest = es.TriangleMesh(mesh.vertices, mesh.faces[~gone[mesh.faces].any(axis=1)])
-    return es.geometry.drop_unreferenced(rest).mesh
+    return es.repair(rest, ["drop_unreferenced"]).mesh
 
 
 def with_bridge(mesh: es.TriangleMesh, rng: np.random.Generator) -> es.TriangleMesh:

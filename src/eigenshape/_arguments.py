@@ -29,7 +29,7 @@ MAKERS = {
     "LabelTransfer": "es.transfer_labels(labeled, target)",
     "LabeledShape": "es.retrieval.LabeledShape(mesh, labels)",
     "Laplacian": "es.cotangent_laplacian(mesh)",
-    "LinearSolver": "es.calculus.poisson_solver(laplacian)",
+    "LinearSolver": "es.calculus.factor_equations(matrix)",
     "Mapping": "{title: value}",
     "MergeTree": "es.merge_tree(mesh, values)",
     "Move": "es.deformation.Move(region, handle)",
@@ -44,7 +44,7 @@ MAKERS = {
     "PersistenceDiagram": "es.features.persistence_diagram(shape, values)",
     "Perturbation": "es.stability.measure_perturbation(one, two)",
     "PointCloud": "es.PointCloud(points, dim=2)",
-    "Quadrature": "es.geometry.mesh_quadrature(mesh)",
+    "Quadrature": "es.geometry.shape_quadrature(mesh)",
     "Rate": "es.stability.theorem_rate(theorem, dim)",
     "Rotation": "es.Rotation(pivot, axis, angle)",
     "Segmentation": "es.segment(tree)",
@@ -70,7 +70,7 @@ READERS = {
 # The call that makes a value of one type from a value of another, if it is not the one in MAKERS.
 CONVERSIONS = {
     ("PointCloud", "Laplacian"): "es.point_cloud_laplacian(cloud)",
-    ("PointCloud", "Quadrature"): "es.geometry.cloud_quadrature(cloud)",
+    ("PointCloud", "Quadrature"): "es.geometry.shape_quadrature(cloud)",
     ("TriangleMesh", "PointCloud"): "es.PointCloud(mesh.points)",
     ("SimplicialMesh", "PointCloud"): "es.PointCloud(mesh.points, dim)",
     ("ndarray", "Laplacian"): "es.Laplacian(csr_array(stiffness), csr_array(mass))",

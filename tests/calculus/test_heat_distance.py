@@ -4,7 +4,6 @@ import pytest
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.calculus.heat_distance import (
     factorize_definite,
-    heat_distance_to_set,
     heat_distances,
     prepare_heat_geodesics,
 )
@@ -76,7 +75,7 @@ def test_many_sources_are_each_source_alone():
 def test_several_sources_count_as_one_set():
     square = grid(20, 20)
     left = np.flatnonzero(square.vertices[:, 0] == 0)
-    found = heat_distance_to_set(square, np.append(left, left))
+    found = heat_distances(square, [np.append(left, left)])[0]
     half_an_edge = 0.025
     assert found == pytest.approx(square.vertices[:, 0], abs=half_an_edge)
 
@@ -87,16 +86,15 @@ def test_components_without_a_source_are_infinitely_far():
     assert np.isinf(found[0, 42:]).all()
     assert np.isinf(found[1, :42]).all()
     assert found[0, :42] == pytest.approx(found[1, 42:], abs=1e-12)
-    set_of = heat_distance_to_set(two, [0])
+    set_of = heat_distances(two, [[0, 1], 42])[0]
     assert np.isinf(set_of[42:]).all()
-    assert set_of[:42] == pytest.approx(found[0, :42])
+    assert set_of[:42] == pytest.approx(heat_distances(icosphere(1), [[0, 1]])[0])
 
 
 def test_heat_that_underflows_is_named_and_the_remedy_works():
     line = interval(1500, length=1500.0)
-    for compute in (heat_distances, heat_distance_to_set):
-        with pytest.raises(InvalidParameterError, match="Heat from the sources must reach"):
-            compute(line, [0])
+    with pytest.raises(InvalidParameterError, match="Heat from the sources must reach"):
+        heat_distances(line, [0])
     warm = prepare_heat_geodesics(line, time_factor=6.0)
     assert heat_distances(warm, [0])[0] == pytest.approx(line.points[:, 0], abs=1e-6)
 
@@ -127,6 +125,8 @@ def test_bad_input_is_named():
     ball = icosphere(1)
     with pytest.raises(InvalidParameterError, match="at least one source; there is none"):
         heat_distances(ball, [])
+    with pytest.raises(InvalidParameterError, match="at least one source; there is none"):
+        heat_distances(ball, [[]])
     with pytest.raises(InvalidParameterError, match=r"A source must lie in 0\.\.41; it is 42"):
         heat_distances(ball, [42])
     with pytest.raises(InvalidParameterError, match="time_factor must be positive"):

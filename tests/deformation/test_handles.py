@@ -136,9 +136,6 @@ def test_every_method_asks_for_one_handle_a_region():
         lambda: es.deformation.bend(binding, two),
         lambda: es.deformation.move_skeleton(response, two),
         lambda: es.deformation.eigen_deformation(detailed, two),
-        lambda: es.deformation.as_rigid_as_possible(binding, two),
-        lambda: es.deformation.biharmonic_blend(binding, two),
-        lambda: es.deformation.spectral_rigid(binding, two),
     )
     for call in calls:
         with pytest.raises(es.InvalidParameterError, match="there are 1 regions and 2 handles"):

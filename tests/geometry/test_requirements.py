@@ -23,8 +23,7 @@ from eigenshape.geometry.distances.average_distance import average_geodesic_dist
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import REPAIRS, repair
 from eigenshape.geometry.requirements import require_joined
-from eigenshape.geometry.samples.cloud_measure import cloud_quadrature
-from eigenshape.geometry.samples.quadrature import mesh_quadrature
+from eigenshape.geometry.samples.cloud_measure import shape_quadrature
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import curvature_tensors
 from eigenshape.operators.connection import connection_laplacian
@@ -32,8 +31,6 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.smoothing import noise_level
-from eigenshape.retrieval.baselines.affinity import affinity_eigenvalues
-from eigenshape.retrieval.baselines.shape_dna import shape_dna
 from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.heat.recipe import SCALE_FREE
@@ -46,6 +43,7 @@ from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
+from eigenshape.spectral.comparison.shape_dna import shape_dna
 from eigenshape.spectral.solve import solve_spectrum
 
 BALL = icosphere(2)
@@ -54,7 +52,7 @@ OPERATORS = {
     "crouzeix_raviart": crouzeix_raviart_laplacian,
     "connection": connection_laplacian,
     "brackets": lambda mesh: bracket_eigenvalues(mesh, 4),
-    "quadrature": mesh_quadrature,
+    "quadrature": shape_quadrature,
     "gaussian_curvature": gaussian_curvature,
 }
 DESCRIBERS = {
@@ -71,7 +69,6 @@ DESCRIBERS = {
         LabeledShape(BALL, np.zeros(BALL.n_faces, dtype=np.int64)), mesh
     ),
     "shape_dna": shape_dna,
-    "affinity_eigenvalues": affinity_eigenvalues,
     "average_geodesic_distance": average_geodesic_distance,
 }
 
@@ -185,8 +182,8 @@ def test_copies_of_points():
     with pytest.raises(
         InvalidShapeError, match=r"Points must differ; .* \(6 such\)\. Try repair\(cloud, "
     ):
-        cloud_quadrature(cloud)
-    assert cloud_quadrature(repair(cloud, ["auto"]).cloud).n_points == 100
+        shape_quadrature(cloud)
+    assert shape_quadrature(repair(cloud, ["auto"]).cloud).n_points == 100
 
 
 def test_pieces_that_touch_without_a_seam_are_no_soup():

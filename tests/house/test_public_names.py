@@ -16,7 +16,7 @@ import eigenshape as es
 SOURCE = Path(es.__file__).parent
 ROOMS = {
     "calculus", "deformation", "features", "geometry", "io", "matching", "operators", "plot", "retrieval",
-    "retrieval.baselines", "scans", "shapes", "spectral", "stability", "types",
+    "scans", "shapes", "spectral", "stability", "types",
 }  # fmt: skip
 PROMISED = {
     "read_mesh", "write_mesh", "TriangleMesh", "partial_scan", "make_creature", "cotangent_laplacian",

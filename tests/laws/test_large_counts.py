@@ -22,7 +22,7 @@ def test_every_public_function_refuses_a_billion_or_answers_at_once():
     )
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert found["calls"] > 120
+    assert found["calls"] > 100
     assert not found["complaints"], "\n".join(
         f"{where}: {what}" for where, what in found["complaints"]
     )

@@ -17,6 +17,7 @@ from registered_operators import builders
 
 import eigenshape as es
 from eigenshape import calculus, deformation, geometry, operators, spectral, stability
+from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 
 UNITS = (2.0**-20, 2.0**20)
 TURN = es.Rotation([0, 0, 0], [1, 0, 0], 0.4)
@@ -84,6 +85,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "cotangent_laplacian": (2, lambda s: es.cotangent_laplacian(s.mesh).mass),
     "crouzeix_raviart_laplacian": (2, lambda s: operators.crouzeix_raviart_laplacian(s.mesh).mass),
     "curl": (0, lambda s: calculus.curl(s.mesh, s.slopes)),
+    "curl, matrix": (1, lambda s: calculus.curl(s.mesh)),
     "curvature_tensors": (0, lambda s: operators.curvature_tensors(s.mesh, 1.0)),
     "cut_by_planes": (
         1,
@@ -93,6 +95,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "denoise": (1, lambda s: operators.denoise(s.mesh)),
     "disjoint_union": (1, lambda s: geometry.disjoint_union(s.mesh, s.other)),
     "divergence": (0, lambda s: calculus.divergence(s.mesh, s.slopes)),
+    "divergence, matrix": (1, lambda s: calculus.divergence(s.mesh)),
     "dual_volumes": (2, lambda s: geometry.dual_volumes(s.mesh)),
     "edge_lengths": (1, lambda s: geometry.edge_lengths(s.mesh)),
     "enclosed_volume": (3, lambda s: geometry.enclosed_volume(s.mesh)),
@@ -105,7 +108,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "farthest_points": (0, lambda s: geometry.farthest_points(s.mesh, 9)[0]),
     "fem_laplacian": (3, lambda s: operators.fem_laplacian(s.solid, 2).mass),
     "fem_nodes": (1, lambda s: operators.fem_nodes(s.solid, 2)),
-    "fill_holes": (1, lambda s: geometry.fill_holes(s.sheet).mesh),
     "flatten_conformally": (1, lambda s: calculus.flatten_conformally(s.sheet)),
     "functional_map": (
         0,
@@ -116,22 +118,12 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         ),
     ),
     "gaussian_curvature": (-2, lambda s: geometry.gaussian_curvature(s.mesh)),
-    "geodesic_distance_to_set": (1, lambda s: geometry.geodesic_distance_to_set(s.mesh, [0, 9])),
-    "geodesic_distances": (1, lambda s: geometry.geodesic_distances(s.mesh, [0, 9])),
+    "geodesic_distances": (1, lambda s: geometry.geodesic_distances(s.mesh, [0, 9, [3, 5]])),
     "geodesic_path": (1, lambda s: calculus.geodesic_path(s.mesh, 0, 99).points),
     "gradient": (-1, lambda s: s.slopes),
-    "gradient_matrix": (-1, lambda s: calculus.gradient_matrix(s.mesh)),
+    "gradient, matrix": (-1, lambda s: calculus.gradient(s.mesh)),
     "harmonic_fields": (0, lambda s: len(calculus.harmonic_fields(s.mesh).T)),
-    "heat_distance_to_set": (1, lambda s: calculus.heat_distance_to_set(s.mesh, [0, 9])),
-    "heat_distances": (1, lambda s: calculus.heat_distances(s.mesh, [0, 9])),
-    "heat_solver": (
-        -2,
-        lambda s: calculus.heat_solver(s.laplacian, s.times[0]).solve(s.f),
-    ),
-    "helmholtz_solver": (
-        0,
-        lambda s: calculus.helmholtz_solver(s.laplacian, -1 / s.u**2).solve(s.f),
-    ),
+    "heat_distances": (1, lambda s: calculus.heat_distances(s.mesh, [0, 9, [3, 5]])),
     "level_set": (1, lambda s: calculus.level_set(s.mesh, s.f, 0.1).points),
     "logarithmic_map": (1, lambda s: calculus.logarithmic_map(s.mesh, 0)),
     "map_to_sphere": (0, lambda s: calculus.map_to_sphere(s.mesh)),
@@ -142,19 +134,18 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "measure_distortion": (0, lambda s: deformation.measure_distortion(s.mesh, s.other)),
     "merge_tree": (0, lambda s: es.merge_tree(s.mesh, s.f).values),
     "mesh_laplacian": (2, lambda s: es.mesh_laplacian(s.mesh).mass),
-    "mesh_quadrature": (2, lambda s: geometry.mesh_quadrature(s.mesh).weights),
+    "shape_quadrature": (2, lambda s: geometry.shape_quadrature(s.mesh).weights),
     "nodal_set": (1, lambda s: spectral.nodal_set(s.mesh, s.f).points),
     "noise_level": (0, lambda s: operators.noise_level(s.mesh)),
-    "normalize_area": (0, lambda s: geometry.normalize_area(s.mesh)),
-    "normalize_box": (0, lambda s: geometry.normalize_box(s.mesh)),
-    "normalize_diameter": (0, lambda s: geometry.normalize_diameter(s.mesh)),
+    "normalize_mesh": (0, lambda s: geometry.normalize_mesh(s.mesh, "box")),
+    "normalize_mesh, area": (0, lambda s: geometry.normalize_mesh(s.mesh, "area")),
+    "normalize_mesh, diameter": (0, lambda s: geometry.normalize_mesh(s.mesh, "diameter")),
     "operator_bundle": (-2, lambda s: spectral.operator_bundle(s.mesh, 5).eigenvalues[1:]),
     "part_tree": (0, lambda s: es.features.part_tree(s.mesh, s.spectrum).basins),
     "find_parts": (0, lambda s: es.find_parts(s.mesh).parts.labels),
     "partial_scan": (1, lambda s: es.partial_scan(s.mesh, [0, 0, 1], resolution=60).mesh),
     "persistence_diagram": (0, lambda s: es.features.persistence_diagram(s.mesh, s.f).maxima),
     "pointwise_time": (2, lambda s: operators.pointwise_time(s.mesh)),
-    "poisson_solver": (0, lambda s: calculus.poisson_solver(s.laplacian, [0]).solve(s.f)),
     "polyharmonic_matrix": (-4, lambda s: calculus.polyharmonic_matrix(s.laplacian, 3)),
     "prepare_heat_geodesics": (
         1,
@@ -179,7 +170,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         1,
         lambda s: geometry.sample_surface(s.mesh, 50, rng=np.random.default_rng(0)).points,
     ),
-    "shape_dna": (0, lambda s: es.retrieval.baselines.shape_dna(s.mesh, 9)),
+    "shape_dna": (0, lambda s: spectral.shape_dna(s.mesh, 9)),
     "signed_distance": (1, lambda s: geometry.signed_distance(s.mesh, s.other.vertices)),
     "signed_heat_distance": (
         1,
@@ -190,7 +181,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "simplex_volumes": (3, lambda s: geometry.simplex_volumes(s.solid)),
     "smooth_mesh": (
         1,
-        lambda s: spectral.smooth_mesh(s.mesh, s.spectrum, spectral.HeatFilter(s.times[0])),
+        lambda s: spectral.smooth_mesh(s.mesh, s.spectrum, lambda each: np.exp(-s.times[0] * each)),
     ),
     "solve_harmonic": (
         0,
@@ -227,10 +218,8 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         ),
     ),
     "vertex_normals": (0, lambda s: geometry.vertex_normals(s.mesh)),
-    "weld": (1, lambda s: geometry.weld(s.mesh).mesh),
     "compare_spectra": (0, lambda s: spectral.compare_spectra(s.spectrum, s.spectrum).relative),
     "winding_numbers": (0, lambda s: geometry.winding_numbers(s.mesh, s.other.vertices)),
-    "affinity_eigenvalues": (0, lambda s: es.retrieval.baselines.affinity_eigenvalues(s.mesh)),
     "anchor_nodes": (1, lambda s: stability.anchor_nodes(s.mesh, 0.5 * s.u).points),
     "approximate_heat_signature": (
         -2,
@@ -239,12 +228,8 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "boundary_surface": (1, lambda s: geometry.boundary_surface(s.solid)),
     "build_laplacian": (2, lambda s: es.build_laplacian(s.mesh, "cotangent").mass),
     "cheeger_estimate": (-1, lambda s: stability.cheeger_estimate(s.mesh, s.spectrum).upper),
-    "cloud_quadrature": (2, lambda s: geometry.cloud_quadrature(s.cloud).weights),
-    "collapse_needles": (1, lambda s: geometry.collapse_needles(s.mesh).mesh),
-    "curl_matrix": (1, lambda s: calculus.curl_matrix(s.mesh)),
+    "shape_quadrature, cloud": (2, lambda s: geometry.shape_quadrature(s.cloud).weights),
     "dirichlet_laplacian": (2, lambda s: operators.dirichlet_laplacian(s.laplacian, [0])[0].mass),
-    "divergence_matrix": (1, lambda s: calculus.divergence_matrix(s.mesh)),
-    "drop_degenerate": (1, lambda s: geometry.drop_degenerate(s.mesh).mesh),
     "embed_watermark": (1, lambda s: spectral.embed_watermark(s.mesh, "a key", k=30)),
     "extract_patches": (
         0,
@@ -253,17 +238,20 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "find_heat_features": (0, lambda s: es.retrieval.find_heat_features(s.mesh).parts.labels),
     "geodesic_balls": (1, lambda s: geometry.geodesic_balls(s.mesh, 0.4 * s.u)),
     "geodesic_waves": (1, lambda s: geometry.geodesic_waves(s.mesh)(0, s.u)[1]),
-    "largest_component": (1, lambda s: geometry.largest_component(s.mesh).mesh),
-    "orient": (1, lambda s: geometry.orient(s.mesh).mesh),
     "orient_outward": (1, lambda s: geometry.orient_outward(s.mesh)),
     "part_spectrum": (-2, lambda s: es.features.part_spectrum(s.mesh).eigenvalues[1:]),
     "random_planes": (
         1,
         lambda s: es.scans.random_planes(s.mesh, np.random.default_rng(0))[:, 3],
     ),
-    "cut_one_sided": (1, lambda s: es.geometry.cut_one_sided(s.mesh).mesh),
     "decimate": (1, lambda s: es.geometry.decimate(s.mesh, ratio=0.5).mesh),
-    "repair": (1, lambda s: es.repair(s.mesh, ["auto"]).mesh),
+    "repair": (
+        1,
+        lambda s: np.concatenate(
+            [es.repair(s.mesh, [name]).mesh.vertices for name in MESH_REPAIRS]
+            + [es.repair(s.sheet, ["fill_holes"]).mesh.vertices]
+        ),
+    ),
     "rig_shape": (1, lambda s: es.deform(s.rig, s.region, TURN)),
     "transport_vectors": (
         0,
@@ -271,7 +259,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
             calculus.prepare_vector_heat(s.mesh), [0, 9], np.eye(2)
         ),
     ),
-    "weld_seams": (1, lambda s: geometry.weld_seams(s.mesh).mesh),
     "weyl_bound": (
         -2,
         lambda s: stability.weyl_bound(s.laplacian, es.cotangent_laplacian(s.other)).norm,
@@ -307,7 +294,6 @@ WITHOUT = {
     "decompose_one_form",
     "describe",
     "detect_watermark",
-    "detect_watermarks",
     "draw",
     "draw_thumbnail",
     "edge_graph",
@@ -327,9 +313,7 @@ WITHOUT = {
     "is_closed",
     "is_manifold",
     "labels_from_votes",
-    "light_field",
     "local_triangles",
-    "map_closeness",
     "measure_perturbation",
     "nodal_domains",
     "normalized_cut",
@@ -344,7 +328,6 @@ WITHOUT = {
     "smooth_boundaries",
     "suggest_repairs",
     "three_quarter_view",
-    "to_arrays",
     "to_pyvista",
     "to_trimesh",
     "transfer_labels",
@@ -357,9 +340,6 @@ WITHOUT = {
 # Others that are the same code as a row above, or have laws of the unit of their own.
 ELSEWHERE = {
     "compress_mesh",
-    "drop_duplicate_faces",
-    "drop_duplicate_points",
-    "drop_unreferenced",
     "fuse_scans",
     "prepare_target",
     "carry_attributes",

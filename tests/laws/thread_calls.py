@@ -13,6 +13,7 @@ from registered_operators import builders
 from search_cases import RECIPE, make_source, mixtures
 
 import eigenshape as es
+from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 from eigenshape.retrieval.search.coarse import coarse_rows
 
 
@@ -108,10 +109,6 @@ class Shared:
             es.retrieval.heat_descriptor(spectrum, es.segment(self.tree, n_regions=6).features)
             for spectrum in (self.spectrum, self.spectrum2)
         )
-        self.light = tuple(
-            es.retrieval.baselines.light_field(mesh, n_fields=1, size=32)
-            for mesh in (self.ball, self.torus)
-        )
         self.meshes = self.folder / "meshes"
         self.meshes.mkdir()
         (self.meshes / "cat.ply").touch()
@@ -143,7 +140,7 @@ class Shared:
     def _make_solvers(self) -> None:
         self.height = self.many.vertices[:, 2]
         self.field = self.many.vertices[self.many.faces].mean(axis=1)
-        self.poisson = es.calculus.poisson_solver(self.many_laplacian)
+        self.poisson = es.calculus.factor_equations(self.many_laplacian.stiffness)
         self.bound = es.calculus.factor_equations(
             self.laplacian.stiffness,
             fixed=[0, 9],
@@ -311,7 +308,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "IndexReader": asked,
     "Matches.classify": classes,
     "carry_attributes": lambda v: es.io.carry_attributes(v.attributes, es.icosphere(1)).mesh,
-    "cut_one_sided": lambda v: es.geometry.cut_one_sided(v.animal),
     "decimate": decimated,
     "find_duplicates": lambda v: es.retrieval.find_duplicates(es.ShapeIndex.open(v.index.folder)),
     "read_fields": lambda v: es.io.read_fields(v.folder / "fields.vtu"),
@@ -326,10 +322,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3).fit_transform(v.torus.vertices),
     "Spectrum.save": lambda v: written(v.folder, ".npz", v.spectrum.save),
     "Spectrum.load": lambda v: es.Spectrum.load(v.folder / "spectrum.npz"),
-    "affinity_distance": lambda v: es.retrieval.baselines.affinity_distance(
-        v.spectrum.eigenvalues, v.spectrum2.eigenvalues
-    ),
-    "affinity_eigenvalues": lambda v: es.retrieval.baselines.affinity_eigenvalues(v.animal),
     "aim_camera": lambda v: es.plot.aim_camera(v.many),
     "anchor_nodes": lambda v: es.stability.anchor_nodes(v.ball, 0.5),
     "anchor_region": lambda v: es.stability.anchor_region(v.on_one.points, v.nodes.points, 0.5),
@@ -339,16 +331,12 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "anisotropic_laplacian": lambda v: es.operators.anisotropic_laplacian(
         v.ball, es.operators.curvature_tensors(v.ball, 2.0)
     ),
-    "apply_edit": lambda v: es.deformation.apply_edit(v.rig, v.edit).mesh,
     "apply_heat": lambda v: [
         es.spectral.apply_heat(v.laplacian, v.animal.vertices, 0.01),
         es.spectral.apply_heat(v.many_spectrum, v.height, [0.1, 0.2]),
     ],
     "approximate_heat_signature": lambda v: es.spectral.approximate_heat_signature(
         v.many_laplacian, 8, [0.5, 1.0]
-    ),
-    "as_rigid_as_possible": lambda v: es.deformation.as_rigid_as_possible(
-        v.binding, [v.handle], n_rounds=20
     ),
     "as_mesh": lambda v: es.as_mesh((v.ball.vertices, v.ball.faces)),
     "as_shape": lambda v: es.geometry.as_shape((v.ball.vertices, v.ball.faces)),
@@ -364,8 +352,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         for mode in ("graded", "uncrossed", "thesis")
     ],
     "betti_numbers": lambda v: [es.geometry.betti_numbers(mesh) for mesh in (v.torus, v.solid)],
-    "biharmonic_blend": lambda v: es.deformation.biharmonic_blend(v.binding, [v.handle]),
-    "biharmonic_distances": lambda v: es.spectral.biharmonic_distances(v.many_spectrum, [0, 9]),
     "bind": lambda v: es.deformation.bind(v.rig, [v.region], fixed=v.fixed).shares,
     "bottleneck_distance": lambda v: es.features.bottleneck_distance(v.diagram, v.diagram2),
     "bottleneck_matching": lambda v: es.stability.bottleneck_matching(
@@ -392,8 +378,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "cheeger_estimate": lambda v: es.stability.cheeger_estimate(v.animal, v.spectrum),
     "circle": lambda v: es.shapes.circle(9),
     "closest_points": lambda v: es.geometry.closest_points(v.animal, v.ball.vertices),
-    "cloud_quadrature": lambda v: es.geometry.cloud_quadrature(v.cloud),
-    "commute_time_distances": lambda v: es.spectral.commute_time_distances(v.many_spectrum, [0, 9]),
     "compare_shapes": lambda v: es.compare_shapes(
         v.ball, v.torus, es.stability.StabilityPlan(k=3, n_samples=150, times=(0.05,))
     ),
@@ -407,14 +391,10 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.change, v.on_one, v.on_two, nodes=v.nodes.points, delta=0.5, rho=3.0
     ),
     "cotangent_laplacian": lambda v: es.cotangent_laplacian(v.many),
-    "bounding_rate": lambda v: es.stability.bounding_rate(
-        es.stability.theorem_rate("lipschitz", 2), [0.1, 0.2], [0.01, 0.01], [1.0, 2.0]
-    ),
     "count_clusters": lambda v: es.spectral.count_clusters(v.graph_spectrum),
     "courant_bounds": lambda v: es.spectral.courant_bounds(v.spectrum),
     "crouzeix_raviart_laplacian": lambda v: es.operators.crouzeix_raviart_laplacian(v.ball),
-    "curl": lambda v: es.calculus.curl(v.many, v.field),
-    "curl_matrix": lambda v: es.calculus.curl_matrix(v.many),
+    "curl": lambda v: [es.calculus.curl(v.many, v.field), es.calculus.curl(v.many)],
     "curvature_tensors": lambda v: es.operators.curvature_tensors(v.animal, 2.0),
     "cut_by_planes": lambda v: es.scans.cut_by_planes(v.animal, [[0, 1, 0, 0.3]]),
     "decompose_field": lambda v: es.calculus.decompose_field(
@@ -429,27 +409,21 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "denoise": lambda v: es.operators.denoise(v.animal, reach=0.02),
     "describe": lambda v: [es.describe(v.animal), es.describe(v.animal, es.retrieval.SCALE_FREE)],
     "detailed_skeleton": lambda v: es.deformation.detailed_skeleton(v.binding).fine,
-    "detect_watermark": lambda v: es.spectral.detect_watermark(v.animal, v.marked, "a key", k=30),
-    "detect_watermarks": lambda v: es.spectral.detect_watermarks(
+    "detect_watermark": lambda v: es.spectral.detect_watermark(
         v.animal, v.marked, ["a key", "another"], k=30
     ),
-    "diffusion_distances": lambda v: es.spectral.diffusion_distances(v.many_spectrum, 0.2, [0, 9]),
-    "diffusion_map": lambda v: es.spectral.diffusion_map(v.many_spectrum, 0.2),
     "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(
         v.laplacian, np.array([0, 5])
     ),
     "disc": lambda v: es.shapes.disc(4),
     "disc_eigenvalues": lambda v: es.shapes.disc_eigenvalues(9),
     "disjoint_union": lambda v: es.geometry.disjoint_union(v.ball, v.torus),
-    "drop_duplicate_points": lambda v: es.geometry.drop_duplicate_points(v.cloud),
-    "collapse_needles": lambda v: es.geometry.collapse_needles(v.animal),
-    "divergence": lambda v: es.calculus.divergence(v.many, v.field),
-    "divergence_matrix": lambda v: es.calculus.divergence_matrix(v.many),
+    "divergence": lambda v: [
+        es.calculus.divergence(v.many, v.field),
+        es.calculus.divergence(v.many),
+    ],
     "draw": lambda v: es.plot.draw(v.ball, v.camera),
     "draw_thumbnail": lambda v: es.retrieval.draw_thumbnail(v.ball),
-    "drop_degenerate": lambda v: es.geometry.drop_degenerate(v.animal),
-    "drop_duplicate_faces": lambda v: es.geometry.drop_duplicate_faces(v.animal),
-    "drop_unreferenced": lambda v: es.geometry.drop_unreferenced(v.animal),
     "dual_volumes": lambda v: es.geometry.dual_volumes(v.many),
     "edge_graph": lambda v: es.operators.edge_graph(v.animal),
     "edge_lengths": lambda v: es.geometry.edge_lengths(v.many),
@@ -514,9 +488,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "filter_values": lambda v: [
         es.spectral.filter_values(v.many.vertices, v.many_spectrum, response, keep_rest=True)
         for response in (
-            es.spectral.LowPass(3.0),
-            es.spectral.BandPass(1.0, 3.0),
-            es.spectral.HeatFilter(0.1),
+            lambda values: values <= 3.0,
+            lambda values: np.exp(-0.1 * values),
         )
     ],
     "find_heat_features": lambda v: [
@@ -525,16 +498,13 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ],
     "find_items": lambda v: es.io.find_items(v.meshes),
     "find_parts": lambda v: es.find_parts(v.animal).parts,
-    "fit_rate": lambda v: es.stability.fit_rate(
-        [0.1, 0.2, 0.4], [0.01, 0.02, 0.03], [1.0, 2.0, 5.0]
-    ),
     "flat_torus_eigenvalues": lambda v: es.shapes.flat_torus_eigenvalues(9, np.eye(2)),
     "flatten_conformally": lambda v: es.calculus.flatten_conformally(v.grid),
     "from_arrays": lambda v: es.geometry.from_arrays(v.ball.vertices, v.ball.faces),
     "from_pyvista": lambda v: es.io.from_pyvista(es.io.to_pyvista(v.ball)),
     "from_trimesh": lambda v: es.io.from_trimesh(es.io.to_trimesh(v.ball)),
     "functional_laplacian": lambda v: (
-        es.operators.functional_laplacian(es.geometry.mesh_quadrature(v.animal), 0.01)
+        es.operators.functional_laplacian(es.geometry.shape_quadrature(v.animal), 0.01)
         @ v.animal.vertices[:, 0]
     ),
     "functional_map": lambda v: [
@@ -550,44 +520,37 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "gaussian_curvature": lambda v: es.geometry.gaussian_curvature(v.animal),
     "gaussian_laplacian": lambda v: es.operators.gaussian_laplacian(v.cloud.points, 0.02, 2),
     "geodesic_balls": lambda v: es.geometry.geodesic_balls(v.ball, 0.5),
-    "geodesic_distance_to_set": lambda v: es.geometry.geodesic_distance_to_set(v.animal, [0, 9]),
     "geodesic_distances": lambda v: es.geometry.geodesic_distances(v.animal, [0, 9]),
     "uneven_sphere": lambda v: es.shapes.uneven_sphere(200),
     "geodesic_path": lambda v: es.calculus.geodesic_path(v.ball, 0, 99),
     "geodesic_waves": lambda v: es.geometry.geodesic_waves(v.ball)(0, 1.0),
-    "global_point_signature": lambda v: es.spectral.global_point_signature(v.many_spectrum),
-    "gradient": lambda v: es.calculus.gradient(v.many, v.many.vertices),
-    "gradient_matrix": lambda v: es.calculus.gradient_matrix(v.many),
+    "gradient": lambda v: [
+        es.calculus.gradient(v.many, v.many.vertices),
+        es.calculus.gradient(v.many),
+    ],
     "graph_laplacian": lambda v: es.operators.graph_laplacian(v.animal, "normalized"),
     "grid": lambda v: es.shapes.grid(3, 4),
     "harmonic_fields": lambda v: es.calculus.harmonic_fields(v.torus),
     "heat_descriptor": lambda v: es.retrieval.heat_descriptor(v.spectrum, v.parts.features),
     "skeleton_response": lambda v: es.deformation.skeleton_response(v.binding),
-    "heat_distance_to_set": lambda v: es.calculus.heat_distance_to_set(v.by_heat_flow, [0, 9]),
     "heat_distances": lambda v: [
         es.calculus.heat_distances(shape, [0, 9]) for shape in (v.ball, v.by_heat_flow)
     ],
     "heat_kernel": lambda v: es.spectral.heat_kernel(v.many_spectrum, [0, 9], None, 0.2),
     "heat_kernel_signature": lambda v: es.heat_kernel_signature(v.many_spectrum, [0.3]),
-    "heat_solver": lambda v: es.calculus.heat_solver(v.laplacian, 0.01),
     "heat_trace": lambda v: es.spectral.heat_trace(v.many_spectrum, [0.5, 1.0]),
-    "helmholtz_solver": lambda v: es.calculus.helmholtz_solver(v.laplacian, 1.0),
     "icosphere": lambda v: es.icosphere(2),
     "interval": lambda v: es.shapes.interval(9),
     "irregular_grid": lambda v: es.shapes.irregular_grid(4, 5, rng=rng()),
     "is_closed": lambda v: es.geometry.is_closed(v.animal),
     "is_manifold": lambda v: es.geometry.is_manifold(v.animal),
-    "largest_component": lambda v: es.geometry.largest_component(v.animal),
     "level_set": lambda v: es.calculus.level_set(v.solid, v.solid.points[:, 0], 0.4),
-    "light_field": lambda v: es.retrieval.baselines.light_field(v.ball, n_fields=1, size=32),
-    "light_field_distance": lambda v: es.retrieval.baselines.light_field_distance(*v.light),
     "local_triangles": lambda v: es.operators.local_triangles(v.cloud),
     "logarithmic_map": lambda v: [
         es.calculus.logarithmic_map(v.ball, 0, method=method)
         for method in ("affine", "adaptive", "radial")
     ],
     "make_creature": lambda v: es.make_creature("quadruped", 3, n_vertices=700),
-    "map_closeness": lambda v: es.stability.map_closeness(v.ball, 1.01 * v.ball.vertices),
     "map_from_points": lambda v: es.spectral.map_from_points(
         v.many_spectrum, v.many_spectrum, np.arange(v.many.n_vertices), n_modes=6
     ),
@@ -614,18 +577,17 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "mesh_laplacian": lambda v: [
         es.mesh_laplacian(v.torus, distance=d) for d in ("euclidean", "geodesic")
     ],
-    "mesh_quadrature": lambda v: es.geometry.mesh_quadrature(v.many),
-    "minimize_quadratic": lambda v: es.calculus.minimize_quadratic(
-        v.laplacian.stiffness, fixed=[0, 9], values=[1.0, 2.0]
-    ),
+    "shape_quadrature": lambda v: [
+        es.geometry.shape_quadrature(each) for each in (v.many, v.cloud)
+    ],
     "move_skeleton": lambda v: es.deformation.move_skeleton(v.response, [v.handle]),
     "neighbor_graph": lambda v: es.operators.neighbor_graph(v.cloud.points, 6),
     "nodal_domains": lambda v: es.spectral.nodal_domains(v.many, v.height),
     "nodal_set": lambda v: es.spectral.nodal_set(v.many, v.height),
     "noise_level": lambda v: es.operators.noise_level(v.animal),
-    "normalize_area": lambda v: es.geometry.normalize_area(v.animal),
-    "normalize_box": lambda v: es.geometry.normalize_box(v.animal),
-    "normalize_diameter": lambda v: es.geometry.normalize_diameter(v.ball),
+    "normalize_mesh": lambda v: [
+        es.geometry.normalize_mesh(v.animal, measure) for measure in ("box", "area", "diameter")
+    ],
     "normalized_cut": lambda v: es.spectral.normalized_cut(
         v.normalized, v.animal.vertices[:, 1] > 0
     ),
@@ -633,7 +595,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "operator_bundle": lambda v: [
         es.spectral.operator_bundle(shape, 6) for shape in (v.ball, v.cloud)
     ],
-    "orient": lambda v: es.geometry.orient(v.animal),
     "orient_outward": lambda v: es.geometry.orient_outward(v.many),
     "part_colors": lambda v: es.plot.part_colors(v.animal, v.labels),
     "part_spectrum": lambda v: es.features.part_spectrum(v.animal),
@@ -649,7 +610,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "point_map": lambda v: es.spectral.point_map(v.map),
     "cloud_width": lambda v: es.operators.cloud_width(v.cloud),
     "pointwise_time": lambda v: es.operators.pointwise_time(v.many),
-    "poisson_solver": lambda v: es.calculus.poisson_solver(v.laplacian, fixed=[0, 9]),
     "polyharmonic_matrix": lambda v: es.calculus.polyharmonic_matrix(v.laplacian, 3),
     "prepare_heat_geodesics": lambda v: es.calculus.prepare_heat_geodesics(v.ball),
     "prepare_vector_heat": lambda v: es.calculus.prepare_vector_heat(v.ball),
@@ -658,7 +618,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "projective_plane": lambda v: es.shapes.projective_plane(1),
     "projective_plane_eigenvalues": lambda v: es.shapes.projective_plane_eigenvalues(9),
     "quadrature_laplacian": lambda v: es.operators.quadrature_laplacian(
-        es.geometry.mesh_quadrature(v.torus), 0.05
+        es.geometry.shape_quadrature(v.torus), 0.05
     ),
     "random_planes": lambda v: es.scans.random_planes(v.animal, rng()),
     "random_sphere": lambda v: es.shapes.random_sphere(90, rng=rng()),
@@ -681,7 +641,10 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.animal, es.deformation.BoxRegion([-1, 0, -1], [1, 1, 1])
     ),
     "remove_means": lambda v: es.calculus.remove_means(v.many_laplacian, v.many.vertices**2),
-    "repair": lambda v: es.repair(v.animal, ["weld", "drop_unreferenced"]),
+    "repair": lambda v: (
+        [es.repair(v.animal, [name]) for name in MESH_REPAIRS]
+        + [es.repair(v.grid, ["fill_holes"]), es.repair(v.cloud, ["drop_duplicate_points"])]
+    ),
     "replay": lambda v: es.deformation.replay(v.rig, [v.edit]).mesh,
     "rig_shape": lambda v: es.rig_shape(v.many, v.many_spectrum).factor,
     "rotation_from_drag": lambda v: es.deformation.rotation_from_drag(
@@ -694,14 +657,10 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         len(saved(v, ".svg")),
     ],  # random names in SVG
     "scale_invariant_signature": lambda v: es.spectral.scale_invariant_signature(v.many_spectrum),
-    "fill_holes": lambda v: es.geometry.fill_holes(v.grid),
     "segment": lambda v: es.segment(v.tree, n_regions=4),
     "self_intersections": lambda v: es.geometry.self_intersections(v.animal),
     "separated_groups": lambda v: es.spectral.separated_groups(v.spectrum.eigenvalues),
-    "shape_dna": lambda v: es.retrieval.baselines.shape_dna(v.animal),
-    "shape_dna_distance": lambda v: es.retrieval.baselines.shape_dna_distance(
-        v.spectrum.eigenvalues, v.spectrum2.eigenvalues
-    ),
+    "shape_dna": lambda v: es.spectral.shape_dna(v.animal),
     "signed_distance": lambda v: es.geometry.signed_distance(v.ball, v.animal.vertices),
     "signed_heat_distance": lambda v: es.calculus.signed_heat_distance(
         v.by_vector_heat, [v.animal.faces[0, [0, 1, 2, 0]]]
@@ -712,7 +671,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "smooth_boundaries": lambda v: es.features.smooth_boundaries(v.animal, v.parts),
     "smooth_mesh": lambda v: es.spectral.smooth_mesh(
-        v.animal, v.spectrum, es.spectral.LowPass(9.0), keep_volume=True
+        v.animal, v.spectrum, lambda values: values <= 9.0, keep_volume=True
     ),
     "solve_harmonic": lambda v: [
         es.calculus.solve_harmonic(v.laplacian, [0, 9], [1.0, 2.0], order=order) for order in (1, 2)
@@ -733,18 +692,16 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.spectral.spectral_clusters(v.graph_spectrum, 4, method=method)
         for method in ("k-means", "normalized-cut")
     ],
-    "spectral_embedding": lambda v: es.spectral.spectral_embedding(v.many_spectrum, power=0.5),
-    "spectral_hausdorff_distance": lambda v: es.spectral.spectral_hausdorff_distance(
-        v.spectrum.eigenvalues, v.spectrum2.eigenvalues
-    ),
-    "spectral_rigid": lambda v: es.deformation.spectral_rigid(
-        v.binding, [v.handle], n_modes=20, n_rounds=5
+    "spectral_distances": lambda v: [
+        es.spectral.spectral_distances(v.many_spectrum, [0, 9], method=method, t=t)
+        for method, t in (("biharmonic", None), ("commute-time", None), ("diffusion", 0.2))
+    ],
+    "spectral_embedding": lambda v: es.spectral.spectral_embedding(
+        v.many_spectrum, power=0.5, t=0.2
     ),
     "sphere_eigenvalues": lambda v: es.shapes.sphere_eigenvalues(9),
     "sphere_functional_eigenvalues": lambda v: es.shapes.sphere_functional_eigenvalues(9, 0.01),
     "sphere_harmonics": lambda v: es.shapes.sphere_harmonics(v.ball.vertices, 3),
-    "sphere_hull": lambda v: es.shapes.sphere_hull(v.ball.vertices),
-    "sphere_quadrature": lambda v: es.geometry.sphere_quadrature(90),
     "subdivide": lambda v: [es.geometry.subdivide(v.solid), es.geometry.subdivide(v.ball)],
     "suggest_repairs": lambda v: es.suggest_repairs(v.animal),
     "surface_area": lambda v: es.geometry.surface_area(v.many),
@@ -753,11 +710,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "theorem_rate": lambda v: es.stability.theorem_rate("lipschitz", 2),
     "three_quarter_view": lambda v: es.plot.three_quarter_view(v.many),
     "three_sphere": lambda v: es.shapes.three_sphere(60),
-    "to_arrays": lambda v: es.io.to_arrays(v.ball),
     "to_pyvista": lambda v: np.asarray(es.io.to_pyvista(v.ball).points),
     "to_trimesh": lambda v: np.asarray(es.io.to_trimesh(v.ball).vertices),
     "torus": lambda v: es.shapes.torus(9, 7),
-    "torus_quadrature": lambda v: es.geometry.torus_quadrature(9, 7),
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
     "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
@@ -795,7 +750,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "transport_vectors": lambda v: es.calculus.transport_vectors(
         v.by_vector_heat, [0, 9], [[1.0, 0.0], [0.0, 1.0]]
     ),
-    "uniform_quadrature": lambda v: es.geometry.uniform_quadrature(v.cloud.points, 2),
     "value_colors": lambda v: es.plot.value_colors(v.heat[:, 0]),
     "vertex_components": lambda v: es.geometry.vertex_components(v.animal),
     "vertex_normals": lambda v: es.geometry.vertex_normals(v.many),
@@ -803,8 +757,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "wave_kernel_signature": lambda v: es.wave_kernel_signature(
         v.many_spectrum, es.spectral.default_energies(v.many_spectrum, 4)[0]
     ),
-    "weld": lambda v: es.geometry.weld(v.animal),
-    "weld_seams": lambda v: es.geometry.weld_seams(v.animal),
     "weyl_bound": lambda v: es.stability.weyl_bound(v.laplacian, v.other),
     "winding_numbers": lambda v: es.geometry.winding_numbers(v.animal, v.ball.vertices),
     "witness_region": lambda v: es.stability.witness_region(

@@ -30,7 +30,7 @@ def meshes(request):
         meshes = tuple(
             es.read_mesh(folder / f"sumner_cat-{name}.ply") for name in ("reference", "05")
         )
-    return [es.geometry.normalize_area(mesh) for mesh in meshes]
+    return [es.geometry.normalize_mesh(mesh, "area") for mesh in meshes]
 
 
 @pytest.fixture(scope="module")

@@ -41,7 +41,7 @@ def test_the_map_from_vertex_to_vertex_is_measured(torus, bulged):
     assert bulged.delta == pytest.approx(steps.max())
     assert bulged.distance <= steps.max() * (1 + 1e-9)
     assert bulged.closeness.delta == pytest.approx(
-        es.stability.map_closeness(torus, other.vertices).delta
+        es.stability.measure_closeness(es.stability.measure_perturbation(torus, other)).delta
     )
     spectra = [
         es.solve_spectrum(es.cotangent_laplacian(mesh), 8).eigenvalues for mesh in (torus, other)

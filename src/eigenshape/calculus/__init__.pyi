@@ -4,18 +4,11 @@ from .conformal import angle_distortion as angle_distortion
 from .conformal import flatten_conformally as flatten_conformally
 from .conformal import map_to_sphere as map_to_sphere
 from .derivatives import curl as curl
-from .derivatives import curl_matrix as curl_matrix
 from .derivatives import divergence as divergence
-from .derivatives import divergence_matrix as divergence_matrix
 from .derivatives import gradient as gradient
-from .derivatives import gradient_matrix as gradient_matrix
-from .energies import minimize_quadratic as minimize_quadratic
 from .energies import polyharmonic_matrix as polyharmonic_matrix
 from .energies import solve_harmonic as solve_harmonic
 from .equations import boundary_load as boundary_load
-from .equations import heat_solver as heat_solver
-from .equations import helmholtz_solver as helmholtz_solver
-from .equations import poisson_solver as poisson_solver
 from .equations import remove_means as remove_means
 from .equations import solve_heat as solve_heat
 from .equations import solve_helmholtz as solve_helmholtz
@@ -25,7 +18,6 @@ from .flows import taubin_smooth as taubin_smooth
 from .geodesic_paths import geodesic_path as geodesic_path
 from .geodesic_rays import trace_geodesic as trace_geodesic
 from .heat_distance import HeatGeodesics as HeatGeodesics
-from .heat_distance import heat_distance_to_set as heat_distance_to_set
 from .heat_distance import heat_distances as heat_distances
 from .heat_distance import prepare_heat_geodesics as prepare_heat_geodesics
 from .hodge import HodgeDecomposition as HodgeDecomposition

@@ -1,5 +1,7 @@
 """Gradient, divergence and curl of piecewise linear functions on meshes of any dimension."""
 
+from typing import overload
+
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
@@ -20,48 +22,14 @@ from eigenshape.geometry.simplices import (
 from eigenshape.geometry.simplicial import Mesh
 
 
-def gradient_matrix(mesh: MeshLike) -> sp.csr_array:
-    """Build the matrix that takes values at vertices to one gradient per simplex.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-        Triangles, tetrahedra, segments, or m-simplices in R^d.
-
-    Returns
-    -------
-    (s·d, n) sparse
-        G, in 1/length. Row d·j + i is component i of the gradient on simplex j, so
-        (G @ values).reshape(s, d) is `gradient(mesh, values)`.
-
-    Raises
-    ------
-    InvalidShapeError
-        If a simplex has no volume or the same corners as another, or a point belongs to no simplex.
-
-    See Also
-    --------
-    es.calculus.gradient : The gradients themselves.
-    es.calculus.divergence_matrix : Its adjoint, up to the sign.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> square = es.shapes.grid(1, 1)
-    >>> G = es.calculus.gradient_matrix(square)
-    >>> G.shape
-    (6, 4)
-    >>> abs((G @ square.vertices[:, 0]).reshape(-1, 3).round(12)).tolist()
-    [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
-    """
-    mesh = as_simplicial(mesh)
-    require_sound(mesh)
-    gradients, _ = _gradients(mesh)
-    return _gradient_rows(mesh, gradients)
-
-
-def gradient(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, "s d ..."]:
-    """Compute the gradient of piecewise linear functions, one vector per simplex.
+@overload
+def gradient(mesh: MeshLike, values: None = None) -> sp.csr_array: ...
+@overload
+def gradient(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, "s d ..."]: ...
+def gradient(
+    mesh: MeshLike, values: ArrayLike | None = None
+) -> sp.csr_array | Float[np.ndarray, "s d ..."]:
+    """Compute the gradient of piecewise linear functions, one vector per simplex, or its matrix.
 
     ∇u = Σ_a u_a ∇λ_a over the corners a of a simplex, with λ_a its barycentric coordinates. The
     vector lies in the simplex.
@@ -70,13 +38,16 @@ def gradient(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, "s d ..."]:
     ----------
     mesh : MeshLike
         Triangles, tetrahedra, segments, or m-simplices in R^d.
-    values : (n,) or (n, k) float
-        Values at the points; each column is one function.
+    values : (n,) or (n, k) float, optional
+        Values at the points; each column is one function. Without values the matrix is returned.
 
     Returns
     -------
     (s, d) or (s, d, k) float
         In units of the values per length.
+    (s·d, n) sparse
+        If no values are given: G, in 1/length. Row d·j + i is component i of the gradient on
+        simplex j, so (G @ values).reshape(s, d) is `gradient(mesh, values)`.
 
     Raises
     ------
@@ -87,7 +58,6 @@ def gradient(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, "s d ..."]:
 
     See Also
     --------
-    es.calculus.gradient_matrix : The same as a sparse matrix.
     es.calculus.divergence : Its adjoint, up to the sign.
 
     Examples
@@ -98,55 +68,26 @@ def gradient(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, "s d ..."]:
     >>> cube = es.shapes.box(1, 1, 1)
     >>> es.calculus.gradient(cube, cube.points @ [1, 0, -2])[0].round(12).tolist()
     [1.0, 0.0, -2.0]
+    >>> es.calculus.gradient(cube).shape
+    (18, 8)
     """
     mesh = as_simplicial(mesh)
     require_sound(mesh)
+    if values is None:
+        return _gradient_rows(mesh, _gradients(mesh)[0])
     functions = point_functions(values, "values", mesh.n_points)
     gradients, _ = _gradients(mesh)
     return np.einsum("sad,sa...->sd...", gradients, functions[mesh.simplices])
 
 
-def divergence_matrix(mesh: MeshLike) -> sp.csr_array:
-    """Build the matrix of the integrated divergence: D = -Gᵀ diag(volumes).
-
-    D G = -W, with W the stiffness of `cotangent_laplacian`.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-        Triangles, tetrahedra, segments, or m-simplices in R^d.
-
-    Returns
-    -------
-    (n, s·d) sparse
-        In length^(m-1). Column d·j + i takes component i of the vector on simplex j.
-
-    Raises
-    ------
-    InvalidShapeError
-        If a simplex has no volume or the same corners as another, or a point belongs to no simplex.
-
-    See Also
-    --------
-    es.calculus.divergence : The divergence itself.
-    es.calculus.gradient_matrix : Its adjoint, up to the sign.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> ball = es.icosphere(1)
-    >>> G, D = es.calculus.gradient_matrix(ball), es.calculus.divergence_matrix(ball)
-    >>> bool(abs(D @ G + es.cotangent_laplacian(ball).stiffness).max() < 1e-14)
-    True
-    """
-    mesh = as_simplicial(mesh)
-    require_sound(mesh)
-    gradients, volumes = _gradients(mesh)
-    return (-_gradient_rows(mesh, gradients * volumes[:, None, None])).T.tocsr()
-
-
-def divergence(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]:
-    """Compute the integrated divergence of vectors on simplices, one number per point.
+@overload
+def divergence(mesh: MeshLike, vectors: None = None) -> sp.csr_array: ...
+@overload
+def divergence(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]: ...
+def divergence(
+    mesh: MeshLike, vectors: ArrayLike | None = None
+) -> sp.csr_array | Float[np.ndarray, "n ..."]:
+    """Compute the integrated divergence of vectors on simplices, one number per point, or its matrix.
 
     (div X)_i = -Σ V X·∇λ_i over the simplices at point i: the weak form -∫ X·∇λ_i (Polthier and
     Preuß 2003; libigl, LaPy and geometry-central integrate likewise). It is the adjoint of
@@ -158,13 +99,17 @@ def divergence(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]
     ----------
     mesh : MeshLike
         Triangles, tetrahedra, segments, or m-simplices in R^d.
-    vectors : (s, d) or (s, d, k) float
-        One vector per simplex, or k of them. Parts normal to the simplex do not count.
+    vectors : (s, d) or (s, d, k) float, optional
+        One vector per simplex, or k of them. Parts normal to the simplex do not count. Without
+        vectors the matrix is returned.
 
     Returns
     -------
     (n,) or (n, k) float
         In units of the vectors times length^(m-1).
+    (n, s·d) sparse
+        If no vectors are given: D = -Gᵀ diag(volumes), in length^(m-1), with G the matrix of
+        `gradient(mesh)`. Column d·j + i takes component i of the vector on simplex j. D G = -W.
 
     Raises
     ------
@@ -175,7 +120,7 @@ def divergence(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]
 
     See Also
     --------
-    es.calculus.divergence_matrix : The same as a sparse matrix.
+    es.calculus.gradient : Its adjoint, up to the sign.
 
     Examples
     --------
@@ -187,64 +132,31 @@ def divergence(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]
     >>> at_points = es.calculus.divergence(square, field) / es.geometry.dual_volumes(square)
     >>> at_points[40].round(12).item()  # the center
     2.0
-    """
-    mesh = as_simplicial(mesh)
-    require_sound(mesh)
-    field = simplex_vectors(vectors, "vectors", len(mesh.simplices), mesh.points.shape[1])
-    gradients, volumes = _gradients(mesh)
-    weighted = gradients * volumes[:, None, None]
-    return _sum_at_points(mesh, -np.einsum("sad,sd...->sa...", weighted, field))
 
+    The matrices of both derivatives give the stiffness:
 
-def curl_matrix(mesh: MeshLike) -> sp.csr_array:
-    """Build the matrix of the integrated curl of vectors on simplices.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-        As in `curl`.
-
-    Returns
-    -------
-    (n, s·d) or (3n, s·d) sparse
-        In length^(m-1). Column d·j + i takes component i of the vector on simplex j. On
-        tetrahedra, row 3·p + i is component i at point p.
-
-    Raises
-    ------
-    InvalidShapeError
-        As in `curl`.
-
-    See Also
-    --------
-    es.calculus.curl : The curl itself.
-
-    Examples
-    --------
-    The curl of a gradient is zero inside; a sphere has no boundary.
-
-    >>> import eigenshape as es
-    >>> ball = es.icosphere(1)
-    >>> C, G = es.calculus.curl_matrix(ball), es.calculus.gradient_matrix(ball)
-    >>> bool(abs(C @ G).max() < 1e-14)
+    >>> G, D = es.calculus.gradient(square), es.calculus.divergence(square)
+    >>> bool(abs(D @ G + es.cotangent_laplacian(square).stiffness).max() < 1e-14)
     True
     """
     mesh = as_simplicial(mesh)
     require_sound(mesh)
-    weights = _curl_weights(mesh)
-    n, s = mesh.n_points, len(mesh.simplices)
-    ambient, corners = weights.shape[-1], weights.shape[1]
-    width = 1 if weights.ndim == 3 else 3
-    entries = weights.reshape(s, corners, width, ambient)
-    points = np.broadcast_to(mesh.simplices[:, :, None, None], entries.shape)
-    rows = width * points + np.arange(width)[:, None]
-    columns = ambient * np.arange(s)[:, None, None, None] + np.arange(ambient)
-    places = (rows.ravel(), np.broadcast_to(columns, entries.shape).ravel())
-    return sp.coo_array((entries.ravel(), places), shape=(width * n, ambient * s)).tocsr()
+    gradients, volumes = _gradients(mesh)
+    weighted = gradients * volumes[:, None, None]
+    if vectors is None:
+        return (-_gradient_rows(mesh, weighted)).T.tocsr()
+    field = simplex_vectors(vectors, "vectors", len(mesh.simplices), mesh.points.shape[1])
+    return _sum_at_points(mesh, -np.einsum("sad,sd...->sa...", weighted, field))
 
 
-def curl(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]:
-    """Compute the integrated curl of vectors on triangles or tetrahedra, at each point.
+@overload
+def curl(mesh: MeshLike, vectors: None = None) -> sp.csr_array: ...
+@overload
+def curl(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]: ...
+def curl(
+    mesh: MeshLike, vectors: ArrayLike | None = None
+) -> sp.csr_array | Float[np.ndarray, "n ..."]:
+    """Compute the integrated curl of vectors on triangles or tetrahedra at each point, or its matrix.
 
     On tetrahedra it is ∫ curl X λ_i = Σ V X × ∇λ_i over the simplices at point i, a vector. On a
     surface it is its part along the normal N, the number Σ V N·(X × ∇λ_i) (Polthier and Preuß
@@ -257,14 +169,17 @@ def curl(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]:
     mesh : MeshLike
         Triangles in R³, consistently oriented; triangles in the plane, where counter-clockwise is
         positive; or tetrahedra in R³.
-    vectors : (s, d) or (s, d, k) float
-        One vector per simplex, or k of them.
+    vectors : (s, d) or (s, d, k) float, optional
+        One vector per simplex, or k of them. Without vectors the matrix is returned.
 
     Returns
     -------
     (n,), (n, k), (n, 3) or (n, 3, k) float
         One number per point on a surface, one vector on tetrahedra, in units of the vectors times
         length^(m-1).
+    (n, s·d) or (3n, s·d) sparse
+        If no vectors are given: the matrix, in length^(m-1). Column d·j + i takes component i of
+        the vector on simplex j. On tetrahedra, row 3·p + i is component i at point p.
 
     Raises
     ------
@@ -277,7 +192,6 @@ def curl(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]:
 
     See Also
     --------
-    es.calculus.curl_matrix : The same as a sparse matrix.
     es.calculus.divergence : The other derivative of a field.
 
     Examples
@@ -295,6 +209,8 @@ def curl(mesh: MeshLike, vectors: ArrayLike) -> Float[np.ndarray, "n ..."]:
     mesh = as_simplicial(mesh)
     require_sound(mesh)
     weights = _curl_weights(mesh)
+    if vectors is None:
+        return _curl_rows(mesh, weights)
     field = simplex_vectors(vectors, "vectors", len(mesh.simplices), mesh.points.shape[1])
     rule = "sad,sd...->sa..." if weights.ndim == 3 else "said,sd...->sai..."
     return _sum_at_points(mesh, np.einsum(rule, weights, field))
@@ -320,6 +236,19 @@ def _gradient_rows(mesh: Mesh, gradients: Float[np.ndarray, "s corners d"]) -> s
     rows = sp.csr_array((data.ravel(), columns.ravel(), starts), shape=(s * ambient, mesh.n_points))
     rows.sort_indices()
     return rows
+
+
+def _curl_rows(mesh: Mesh, weights: Float[np.ndarray, "s corners ..."]) -> sp.csr_array:
+    """Return the matrix with one row for each point, or three on tetrahedra."""
+    n, s = mesh.n_points, len(mesh.simplices)
+    ambient, corners = weights.shape[-1], weights.shape[1]
+    width = 1 if weights.ndim == 3 else 3
+    entries = weights.reshape(s, corners, width, ambient)
+    points = np.broadcast_to(mesh.simplices[:, :, None, None], entries.shape)
+    rows = width * points + np.arange(width)[:, None]
+    columns = ambient * np.arange(s)[:, None, None, None] + np.arange(ambient)
+    places = (rows.ravel(), np.broadcast_to(columns, entries.shape).ravel())
+    return sp.coo_array((entries.ravel(), places), shape=(width * n, ambient * s)).tocsr()
 
 
 def _curl_weights(mesh: Mesh) -> Float[np.ndarray, "s corners ..."]:

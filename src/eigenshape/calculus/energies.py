@@ -1,4 +1,4 @@
-"""Quadratic energies: their minima under constraints, and the smoothest interpolation of values."""
+"""The energies of harmonic and polyharmonic functions, and the smoothest interpolation of values."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -8,63 +8,11 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
-from eigenshape.calculus.linear_solver import SparseMatrix, factor_equations
+from eigenshape.calculus.linear_solver import factor_equations
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 
 # Each order multiplies the condition number by that of the operator, 1e3 to 1e6.
 MOST_ORDER = 8
-
-
-def minimize_quadratic(
-    matrix: SparseMatrix,
-    linear: ArrayLike = 0.0,
-    *,
-    fixed: ArrayLike | None = None,
-    values: ArrayLike = 0.0,
-    constraints: SparseMatrix | ArrayLike | None = None,
-    targets: ArrayLike = 0.0,
-) -> Float[np.ndarray, "n ..."]:
-    """Minimize ½ xᵀQx - xᵀb with fixed values and linear constraints C x = d.
-
-    Parameters
-    ----------
-    matrix : (n, n) sparse
-        Q, symmetric and positive semidefinite, such as a stiffness or `polyharmonic_matrix`.
-    linear : (n,) or (n, k) float, or a number
-        b.
-    fixed : (c,) int, optional
-        Points where values are given.
-    values : (c,) or (c, k) float, or a number
-        The values there.
-    constraints : (p, n) sparse or float, optional
-        C.
-    targets : (p,) or (p, k) float, or a number
-        d.
-
-    Returns
-    -------
-    (n,) or (n, k) float
-        x. Where it is determined up to a constant on a component, its mean there is 0.
-
-    Raises
-    ------
-    InvalidParameterError
-        As in `factor_equations`, which keeps the factor, and `LinearSolver.solve`.
-
-    See Also
-    --------
-    es.calculus.solve_harmonic : The smoothest functions through given values.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> from scipy.sparse import eye_array
-    >>> Q = eye_array(3)
-    >>> es.calculus.minimize_quadratic(Q, constraints=[[1, 1, 1]], targets=[6]).round(12).tolist()
-    [2.0, 2.0, 2.0]
-    """
-    solver = factor_equations(matrix, fixed, constraints)
-    return solver.solve(linear, values=values, targets=targets)
 
 
 def polyharmonic_matrix(laplacian: Laplacian, order: Integer = 2) -> sp.csr_array:

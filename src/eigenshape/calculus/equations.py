@@ -17,12 +17,7 @@ from eigenshape._arrays import (
 from eigenshape._errors import InvalidShapeError
 from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike, Integer
-from eigenshape.calculus.linear_solver import (
-    LinearSolver,
-    SparseMatrix,
-    factor_definite,
-    factor_equations,
-)
+from eigenshape.calculus.linear_solver import factor_definite, factor_equations
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.simplicial import SimplicialMesh
@@ -33,142 +28,6 @@ from eigenshape.operators.laplacian import Laplacian, require_matrix
 # Differences from a mean up to this share of the value are the rounding of sums of up to a million
 # numbers.
 ROUNDING = 1e-12
-
-
-def poisson_solver(
-    laplacian: Laplacian,
-    fixed: ArrayLike | None = None,
-    constraints: SparseMatrix | ArrayLike | None = None,
-) -> LinearSolver:
-    """Factor the Poisson equation W u = b, for many right-hand sides.
-
-    Parameters
-    ----------
-    laplacian : Laplacian
-    fixed : (c,) int, optional
-        Points where values are given (Dirichlet). The rest of a boundary is free (Neumann).
-    constraints : (p, n) sparse or float, optional
-        As in `factor_equations`.
-
-    Returns
-    -------
-    LinearSolver
-        Its method `solve` takes an integrated right-hand side b: B f for a source f,
-        -`divergence` of a field, or `boundary_load`. On a component without fixed point the mean
-        of u, weighted by the mass, is 0.
-
-    Raises
-    ------
-    InvalidParameterError
-        If the operator has `correct="log"`; or as in `factor_equations`.
-
-    See Also
-    --------
-    es.calculus.solve_poisson : Factor and solve at once.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> import numpy as np
-    >>> ball = es.icosphere(2)
-    >>> laplacian = es.cotangent_laplacian(ball)
-    >>> solver = es.calculus.poisson_solver(laplacian)
-    >>> sources = es.calculus.remove_means(laplacian, np.eye(ball.n_vertices)[:, :100])
-    >>> solver.solve(laplacian.mass @ sources).shape
-    (162, 100)
-    """
-    require_type(laplacian, Laplacian, "laplacian")
-    require_matrix(laplacian)
-    weights = laplacian.mass.sum(axis=1)
-    return factor_equations(laplacian.stiffness, fixed, constraints, weights=weights)
-
-
-def helmholtz_solver(
-    laplacian: Laplacian, squared_wavenumber: float, fixed: ArrayLike | None = None
-) -> LinearSolver:
-    """Factor the Helmholtz equation (W - κ B) u = b, for many right-hand sides.
-
-    Parameters
-    ----------
-    laplacian : Laplacian
-    squared_wavenumber : float
-        κ, in 1/length²: positive for waves, negative for the screened Poisson equation.
-    fixed : (c,) int, optional
-        Points where values are given (Dirichlet).
-
-    Returns
-    -------
-    LinearSolver
-
-    Raises
-    ------
-    InvalidParameterError
-        If κ is not finite, or an eigenvalue of the operator up to rounding; if the operator has
-        `correct="log"`; or as in `factor_equations`.
-
-    See Also
-    --------
-    es.calculus.solve_helmholtz : Factor and solve at once.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> laplacian = es.cotangent_laplacian(es.icosphere(2))
-    >>> solver = es.calculus.helmholtz_solver(laplacian, -2.0)
-    >>> solver.solve(laplacian.mass.sum(axis=1))[:3].round(12).tolist()
-    [0.5, 0.5, 0.5]
-    """
-    require_type(laplacian, Laplacian, "laplacian")
-    require_matrix(laplacian)
-    (kappa,) = finite_values(squared_wavenumber, "squared_wavenumber")
-    weights = laplacian.mass.sum(axis=1)
-    matrix = laplacian.stiffness - kappa * laplacian.mass
-    if kappa == 0:
-        return factor_equations(matrix, fixed, weights=weights)
-    return factor_definite(matrix, fixed, indefinite=bool(kappa > 0))
-
-
-def heat_solver(laplacian: Laplacian, t: float, fixed: ArrayLike | None = None) -> LinearSolver:
-    """Factor one implicit step of the heat equation, (B + t W) u = b, for many right-hand sides.
-
-    Parameters
-    ----------
-    laplacian : Laplacian
-    t : float
-        Length of the step, in length².
-    fixed : (c,) int, optional
-        Points where values are given (Dirichlet).
-
-    Returns
-    -------
-    LinearSolver
-        Its `solve` takes b = B u₀, with u₀ the values before the step.
-
-    Raises
-    ------
-    InvalidParameterError
-        If t is not positive, or the operator has `correct="log"`; or as in `factor_equations`.
-
-    See Also
-    --------
-    es.calculus.solve_heat : Several steps, with sources.
-
-    Examples
-    --------
-    Heat is conserved:
-
-    >>> import eigenshape as es
-    >>> import numpy as np
-    >>> laplacian = es.cotangent_laplacian(es.icosphere(2))
-    >>> start = np.eye(laplacian.n_points)[:, 0]
-    >>> after = es.calculus.heat_solver(laplacian, 0.1).solve(laplacian.mass @ start)
-    >>> bool(np.isclose((laplacian.mass @ after).sum(), (laplacian.mass @ start).sum()))
-    True
-    """
-    require_type(laplacian, Laplacian, "laplacian")
-    require_matrix(laplacian)
-    (step,) = positive_values(t, "t")
-    return factor_definite(laplacian.mass + step * laplacian.stiffness, fixed)
 
 
 def remove_means(laplacian: Laplacian, values: ArrayLike) -> Float[np.ndarray, "n ..."]:
@@ -245,11 +104,12 @@ def solve_poisson(
     ------
     InvalidParameterError
         If an array has another length or a number is not finite, a point is fixed at two values, or
-        on a component without fixed point B f + load does not sum to 0; or as in `poisson_solver`.
+        on a component without fixed point B f + load does not sum to 0; if the operator has
+        `correct="log"`; or as in `factor_equations`.
 
     See Also
     --------
-    es.calculus.poisson_solver : The factor, kept for many right-hand sides.
+    es.calculus.factor_equations : The factor, kept for many right-hand sides.
 
     Examples
     --------
@@ -262,7 +122,10 @@ def solve_poisson(
     >>> bool(abs(u - z).max() < 0.01)
     True
     """
-    solver = poisson_solver(laplacian, fixed)
+    require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
+    weights = laplacian.mass.sum(axis=1)
+    solver = factor_equations(laplacian.stiffness, fixed, weights=weights)
     return solver.solve(_right_hand_side(laplacian, source, load), values=values)
 
 
@@ -300,7 +163,7 @@ def solve_helmholtz(
 
     See Also
     --------
-    es.calculus.helmholtz_solver : The factor, kept for many right-hand sides.
+    es.calculus.factor_equations : The factor, kept for many right-hand sides.
 
     Examples
     --------
@@ -309,7 +172,13 @@ def solve_helmholtz(
     >>> es.calculus.solve_helmholtz(laplacian, -4.0, 1.0)[0].round(12).item()
     0.25
     """
-    solver = helmholtz_solver(laplacian, squared_wavenumber, fixed)
+    (kappa,) = finite_values(squared_wavenumber, "squared_wavenumber")
+    if kappa == 0:
+        return solve_poisson(laplacian, source, load=load, fixed=fixed, values=values)
+    require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
+    matrix = laplacian.stiffness - kappa * laplacian.mass
+    solver = factor_definite(matrix, fixed, indefinite=bool(kappa > 0))
     return solver.solve(_right_hand_side(laplacian, source, load), values=values)
 
 
@@ -359,11 +228,12 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     ------
     InvalidParameterError
         If t is not positive, n_steps is not in 1..1,000,000, an array has another length or a number is not
-        finite, or a point is fixed at two values; or as in `heat_solver`.
+        finite, a point is fixed at two values, or the operator has `correct="log"`; or as in
+        `factor_equations`.
 
     See Also
     --------
-    es.calculus.heat_solver : The factor of one step.
+    es.calculus.factor_equations : The factor of a step, B + τW, kept for many calls.
     es.spectral.apply_heat : Heat of a function, exact to a given accuracy; without sources, loads
         and fixed values.
 
@@ -379,11 +249,13 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     [0.0, 0.25, 0.5, 0.75, 1.0]
     """
     require_type(laplacian, Laplacian, "laplacian")
+    require_matrix(laplacian)
     count = step_number(n_steps, "n_steps")
     (time,) = positive_values(t, "t")
     current = point_functions(start, "start", laplacian.n_points)
-    solver = heat_solver(laplacian, time / count, fixed)
-    added = (time / count) * _right_hand_side(laplacian, source, load)
+    step = time / count
+    solver = factor_definite(laplacian.mass + step * laplacian.stiffness, fixed)
+    added = step * _right_hand_side(laplacian, source, load)
     report_progress = progress or silent
     for number in range(count):
         report_progress(number / count, f"step {number + 1} of {count}")
@@ -445,7 +317,6 @@ def _right_hand_side(
     laplacian: Laplacian, source: ArrayLike, load: ArrayLike
 ) -> Float[np.ndarray, "n ..."]:
     """Return B f + load."""
-    require_type(laplacian, Laplacian, "laplacian")
     terms = []
     for name, given in (("source", source), ("load", load)):
         numbers = real_numbers(given, name)

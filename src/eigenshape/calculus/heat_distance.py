@@ -18,6 +18,7 @@ from eigenshape.calculus.grounded import (
 )
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
+from eigenshape.geometry.distances.geodesic import source_sets
 from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, simplex_volumes, size_one
@@ -32,6 +33,7 @@ from eigenshape.sparse.symmetric_factor import SymmetricFactor
 # Sources that are solved for together: the lanes of a factor, and few enough that the gradients of
 # all simplices fit in the cache.
 SOURCES_AT_ONCE = 8
+NO_SOURCE = "There must be at least one source; there is none."
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +129,7 @@ def prepare_heat_geodesics(
 
     See Also
     --------
-    heat_distances, heat_distance_to_set : Distances from sources.
+    heat_distances : Distances from sources.
 
     Examples
     --------
@@ -154,7 +156,7 @@ def prepare_heat_geodesics(
 def heat_distances(
     shape: ShapeLike | HeatGeodesics, sources: ArrayLike, *, progress: Progress | None = None
 ) -> Float[np.ndarray, "k n"]:
-    """Compute geodesic distances from some points to all points by the heat method.
+    """Compute geodesic distances from some points, or sets of points, to all points by the heat method.
 
     Heat u of a short time t, (B + tW) u = e_source, falls off along shortest paths. So the field
     X = -∇u / |∇u| is close to the gradient of the distance, which follows from the Poisson equation
@@ -169,16 +171,18 @@ def heat_distances(
     ----------
     shape : ShapeLike or HeatGeodesics
         `prepare_heat_geodesics(shape)` keeps the factors for further calls, and has the options.
-    sources : (k,) int
-        Points.
+    sources : (k,) int, or k lists of int
+        Points. The distance from a list of points is that to the nearest of them, with heat from
+        all at once.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
     Returns
     -------
     (k, n) float
-        Distance from each source to each point, in length; 0 at the source, infinite on other
-        components. Near the source the values may be slightly negative.
+        Distance from each source to each point, in length; infinite on other components. It is 0 at
+        the source, and 0 in the mean over the points of a list in a component. Near the source the
+        values may be slightly negative.
 
     Raises
     ------
@@ -190,7 +194,6 @@ def heat_distances(
 
     See Also
     --------
-    heat_distance_to_set : Distance to the nearest of several points.
     eigenshape.geometry.geodesic_distances : The same by waves that cross triangles.
 
     Examples
@@ -202,72 +205,38 @@ def heat_distances(
     >>> distances = es.calculus.heat_distances(ball, [0])
     >>> bool(abs(distances.max() - 3.1416) < 0.03)
     True
+
+    The distance of the vertices of a square from its left side.
+
+    >>> square = es.shapes.grid(20, 20)
+    >>> left = (square.vertices[:, 0] == 0).nonzero()[0]
+    >>> distance = es.calculus.heat_distances(square, [left])[0]
+    >>> bool(abs(distance - square.vertices[:, 0]).max() < 0.025)  # half an edge
+    True
     """
     solver = as_heat_geodesics(shape)
-    wanted = require_sources(sources, solver.n_points)
+    wanted = source_sets(sources, solver.n_points)
+    if not sum(len(points) for points in wanted):
+        raise InvalidParameterError(NO_SOURCE)
     rows = np.empty((len(wanted), solver.n_points))
+    n_components = int(solver.components.max()) + 1
     report_progress = progress or silent
     for first in range(0, len(wanted), SOURCES_AT_ONCE):
         report_progress(first / len(wanted), f"source {first + 1} of {len(wanted)}")
         chosen = wanted[first : first + SOURCES_AT_ONCE]
         impulses = np.zeros((solver.n_points, len(chosen)))
-        impulses[chosen, np.arange(len(chosen))] = 1.0
+        for column, points in enumerate(chosen):
+            impulses[points, column] = 1.0
         found = _distances_of(solver, impulses)
-        rows[first : first + len(chosen)] = found.T - found[chosen, np.arange(len(chosen))][:, None]
-        apart = solver.components[chosen][:, None] != solver.components
-        rows[first : first + len(chosen)][apart] = np.inf
+        for column, points in enumerate(chosen):
+            # The constant of each component makes the mean over its sources 0.
+            at_sources = solver.components[points]
+            counts = np.bincount(at_sources, minlength=n_components)
+            sums = np.bincount(at_sources, found[points, column], minlength=n_components)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                shifts = np.where(counts > 0, -sums / counts, np.inf)
+            rows[first + column] = found[:, column] + shifts[solver.components]
     return in_length(rows, solver.scale, 1)
-
-
-def heat_distance_to_set(
-    shape: ShapeLike | HeatGeodesics, sources: ArrayLike
-) -> Float[np.ndarray, " n"]:
-    """Compute the geodesic distance to the nearest of several points by the heat method.
-
-    The method is that of `heat_distances`, with heat from all sources at once. The mean of the
-    values at the sources of a component is 0.
-
-    Parameters
-    ----------
-    shape : ShapeLike or HeatGeodesics
-    sources : (k,) int
-        Points; duplicates are ignored.
-
-    Returns
-    -------
-    (n,) float
-        Distance of each point, in length; infinite on components without a source.
-
-    Raises
-    ------
-    InvalidParameterError
-        If there is no source, a source is not a point, or heat is too small for a float somewhere:
-        the shape is too long for the time.
-    InvalidShapeError
-        As in `prepare_heat_geodesics`.
-
-    Examples
-    --------
-    The distance of the vertices of a square from its left side.
-
-    >>> import eigenshape as es
-    >>> square = es.shapes.grid(20, 20)
-    >>> left = (square.vertices[:, 0] == 0).nonzero()[0]
-    >>> distance = es.calculus.heat_distance_to_set(square, left)
-    >>> bool(abs(distance - square.vertices[:, 0]).max() < 0.025)  # half an edge
-    True
-    """
-    solver = as_heat_geodesics(shape)
-    wanted = np.unique(require_sources(sources, solver.n_points))
-    impulses = np.zeros((solver.n_points, 1))
-    impulses[wanted] = 1.0
-    distance = _distances_of(solver, impulses)[:, 0]
-    n_components = int(solver.components.max()) + 1
-    counts = np.bincount(solver.components[wanted], minlength=n_components)
-    sums = np.bincount(solver.components[wanted], distance[wanted], minlength=n_components)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shifts = np.where(counts > 0, -sums / counts, np.inf)
-    return in_length(distance + shifts[solver.components], solver.scale, 1)
 
 
 def as_heat_geodesics(shape: ShapeLike | HeatGeodesics) -> HeatGeodesics:
@@ -285,7 +254,7 @@ def require_sources(sources: ArrayLike, n_points: int) -> Int[np.ndarray, " k"]:
     """
     wanted = whole_numbers(sources, "A source", 0, n_points - 1)
     if not wanted.size:
-        raise InvalidParameterError("There must be at least one source; there is none.")
+        raise InvalidParameterError(NO_SOURCE)
     return wanted
 
 

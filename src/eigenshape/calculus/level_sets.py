@@ -126,7 +126,7 @@ class LevelSet(ReadOnly):
         -------
         TriangleMesh
             With faces of zero area where the level set passes through a vertex of the solid;
-            `drop_degenerate` removes them.
+            `repair(mesh, ["drop_degenerate"])` removes them.
 
         Raises
         ------

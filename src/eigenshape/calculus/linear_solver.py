@@ -58,15 +58,13 @@ class LinearSolver(ReadOnly):
 
     See Also
     --------
-    es.calculus.poisson_solver, es.calculus.helmholtz_solver, es.calculus.heat_solver : Make solvers
-        for the equations of a Laplacian.
     es.calculus.factor_equations : Make a solver for any symmetric matrix.
 
     Examples
     --------
     >>> import eigenshape as es
     >>> laplacian = es.cotangent_laplacian(es.shapes.interval(2))
-    >>> solver = es.calculus.poisson_solver(laplacian, fixed=[0, 2])
+    >>> solver = es.calculus.factor_equations(laplacian.stiffness, fixed=[0, 2])
     >>> solver.solve(values=[1.0, 3.0]).round(12).tolist()
     [1.0, 2.0, 3.0]
     """
@@ -297,6 +295,10 @@ def factor_equations(
 ) -> LinearSolver:
     """Factor a symmetric system, for many right-hand sides.
 
+    With the matrices of a Laplacian, W is the Poisson equation, for which `weights=B.sum(axis=1)`
+    makes means those over the shape; W - κB is the Helmholtz equation, `indefinite` if κ > 0; and
+    B + tW is one implicit step of the heat equation. `solve` takes integrated right-hand sides.
+
     Fixed points are eliminated and the rest is factored as L D Lᵀ; constraints follow by the Schur
     complement, a dense system of their number. That takes one solve and n numbers of memory for
     each constraint, which is meant for hundreds of them.
@@ -328,7 +330,8 @@ def factor_equations(
 
     See Also
     --------
-    es.calculus.minimize_quadratic : Factor and solve at once.
+    es.calculus.solve_poisson, es.calculus.solve_helmholtz, es.calculus.solve_heat : Factor and solve
+        the equations of a Laplacian at once.
 
     Examples
     --------
@@ -339,6 +342,16 @@ def factor_equations(
     >>> solver = es.calculus.factor_equations(W, fixed=[0, 4], constraints=[[1, 1, 1, 1, 1]])
     >>> solver.solve(values=[0, 1], targets=[3]).round(4).tolist()
     [0.0, 0.4, 0.7, 0.9, 1.0]
+
+    The Poisson equation on a closed surface, for 100 sources:
+
+    >>> import numpy as np
+    >>> laplacian = es.cotangent_laplacian(es.icosphere(2))
+    >>> weights = laplacian.mass.sum(axis=1)
+    >>> solver = es.calculus.factor_equations(laplacian.stiffness, weights=weights)
+    >>> sources = es.calculus.remove_means(laplacian, np.eye(laplacian.n_points)[:, :100])
+    >>> solver.solve(laplacian.mass @ sources).shape
+    (162, 100)
     """
     system = _require_symmetric(matrix)
     points = require_points([] if fixed is None else fixed, system.shape[0])

@@ -66,7 +66,7 @@ def signed_heat_distance(
 
     See Also
     --------
-    heat_distance_to_set : Distance without a sign.
+    heat_distances : Distance without a sign.
     eigenshape.geometry.signed_distance : The distance in space to a closed surface.
 
     Examples

@@ -43,7 +43,7 @@ def decimate(
         )
     surface = steps.load_surface(mesh, repair)
     # Vertices are double along seams of textures, where the surface would come apart.
-    joined = es.geometry.weld_seams(surface)
+    joined = es.repair(surface, ["weld_seams"])
     if joined.mesh.n_vertices < surface.n_vertices:
         print_repairs(joined.report)
     done = es.geometry.decimate(joined.mesh, faces, ratio=ratio)

@@ -6,13 +6,9 @@ from .distortion import Distortion as Distortion
 from .distortion import measure_distortion as measure_distortion
 from .edits import Edit as Edit
 from .edits import Move as Move
-from .edits import apply_edit as apply_edit
 from .handles import Rotation as Rotation
 from .handles import Translation as Translation
 from .handles import rotation_from_drag as rotation_from_drag
-from .peers import as_rigid_as_possible as as_rigid_as_possible
-from .peers import biharmonic_blend as biharmonic_blend
-from .peers import spectral_rigid as spectral_rigid
 from .region import BoxRegion as BoxRegion
 from .region import BrushRegion as BrushRegion
 from .region import region_boundary as region_boundary

@@ -20,7 +20,7 @@ from eigenshape.deformation.rigidity import (
     pull_part,
     require_fixed_vertices,
 )
-from eigenshape.geometry.distances.geodesic import geodesic_distance_to_set
+from eigenshape.geometry.distances.geodesic import geodesic_distances
 
 # (least extent of a region over that of the rest, number of modes): the rule of thesis 6.3.2.
 MODE_RULE = ((0.75, 8), (0.1, 50), (0.0, 300))
@@ -169,7 +169,7 @@ def bind(
     require_fixed_vertices(rig.edges, known)
 
     rims = [require_boundary(rig.mesh, mask, number) for number, mask in enumerate(masks)]
-    distances = np.array([geodesic_distance_to_set(rig.mesh, rim) for rim in rims])
+    distances = geodesic_distances(rig.mesh, rims)
     if n_modes is None:
         counts = [_modes_by_rule(rig, *pair) for pair in zip(masks, distances, strict=True)]
     else:

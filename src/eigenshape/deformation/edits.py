@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import describe_value, require_each, require_type
+from eigenshape._arguments import describe_value, require_each
 from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._text import html_repr, short_repr
@@ -105,8 +105,7 @@ class Edit(ReadOnly):
 
     See Also
     --------
-    apply_edit : Apply an edit to a rig.
-    replay : Apply several edits one after the other.
+    replay : Apply edits one after the other.
 
     Examples
     --------
@@ -116,8 +115,8 @@ class Edit(ReadOnly):
     >>> mesh = es.icosphere(2)
     >>> top = es.deformation.Move(mesh.vertices[:, 2] > 0.5, es.Translation([0, 0, 0.5]))
     >>> bottom = es.deformation.Move(mesh.vertices[:, 2] < -0.5, es.Translation([0, 0, -0.5]))
-    >>> egg = es.deformation.apply_edit(es.rig_shape(mesh), es.deformation.Edit((top, bottom)))
-    >>> heights = egg.mesh.vertices[:, 2]
+    >>> edit = es.deformation.Edit((top, bottom))
+    >>> heights = es.deformation.replay(es.rig_shape(mesh), [edit]).mesh.vertices[:, 2]
     >>> heights.max().round(1).item(), heights.min().round(1).item()
     (1.5, -1.5)
     """
@@ -136,36 +135,7 @@ class Edit(ReadOnly):
 
 
 def apply_edit(rig: EigenRig, edit: Edit) -> EigenRig:
-    """Apply an edit to a rig.
-
-    Boxes and brushes select vertices in the present pose of the rig.
-
-    Parameters
-    ----------
-    rig : EigenRig
-    edit : Edit
-
-    Returns
-    -------
-    EigenRig
-        The rig in its new pose; `rig.mesh` is the deformed shape.
-
-    Raises
-    ------
-    InvalidParameterError
-        As for `bind` and `bend`.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> top = es.deformation.BoxRegion([-9, -9, 0.2], [9, 9, 9])
-    >>> edit = es.deformation.Edit((es.deformation.Move(top, es.Translation([0, 0, 1])),))
-    >>> lifted = es.deformation.apply_edit(es.rig_shape(es.icosphere(2)), edit)
-    >>> float(lifted.mesh.vertices[:, 2].max().round(3))
-    2.0
-    """
-    require_type(rig, EigenRig, "rig")
-    require_type(edit, Edit, "edit")
+    """Return a rig in its new pose; boxes and brushes select vertices in the present one."""
     regions = [move.region for move in edit.moves]
     handles = [move.handle for move in edit.moves]
     binding = bind(rig, regions, fixed=edit.fixed, n_modes=edit.n_modes)

@@ -23,7 +23,7 @@ from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.deformation.handles import as_vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.distances.geodesic import geodesic_distance_to_set
+from eigenshape.geometry.distances.geodesic import geodesic_distances
 from eigenshape.geometry.mesh import TriangleMesh
 
 
@@ -178,9 +178,8 @@ def region_mask(mesh: MeshLike, region: Region) -> Bool[np.ndarray, " n"]:
         return np.asarray(inside.all(axis=1))
     if isinstance(region, BrushRegion):
         nearest = int(cKDTree(mesh.vertices).query(region.center)[1])
-        return np.asarray(
-            geodesic_distance_to_set(mesh, [nearest], reach=region.radius) <= region.radius
-        )
+        distances = geodesic_distances(mesh, [nearest], reach=region.radius)[0]
+        return np.asarray(distances <= region.radius)
     chosen = _entries(region)
     if chosen.dtype == bool:
         if chosen.shape != (mesh.n_vertices,):

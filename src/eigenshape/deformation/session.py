@@ -310,7 +310,7 @@ class DeformationSession:
         Raises
         ------
         InvalidParameterError
-            As for `apply_edit`.
+            As for `bind` and `bend`.
         """
         require_type(edit, Edit, "edit")
         self._advance(edit, apply_edit(self.rig, edit))

@@ -1,123 +1,68 @@
-"""Scaling of meshes to a standard size, with the mean of the vertices at the origin."""
+"""Scaling of meshes to size 1."""
 
-from collections.abc import Callable
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import cdist
 
-from eigenshape._errors import InvalidShapeError
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
 
 Points = Float[np.ndarray, "n 3"]
+Measure = Literal["box", "area", "diameter"]
 
 
-def normalize_box(mesh: MeshLike) -> TriangleMesh:
-    """Scale a mesh so that the longest side of its axis-aligned bounding box is 1 (thesis 5.4).
+def normalize_mesh(mesh: MeshLike, measure: Measure) -> TriangleMesh:
+    """Scale a mesh to size 1, with the mean of its vertices at the origin.
 
     Parameters
     ----------
     mesh : MeshLike
+    measure : {"box", "area", "diameter"}
+        What becomes 1: the longest side of the axis-aligned bounding box (thesis 5.4), the surface
+        area, or the largest distance between two vertices.
 
     Returns
     -------
     TriangleMesh
-        The scaled mesh, with the mean of its vertices at the origin.
 
     Raises
     ------
+    InvalidParameterError
+        If the measure is not one of the three.
     InvalidShapeError
-        If all vertices are equal.
-
-    See Also
-    --------
-    normalize_area, normalize_diameter
+        If all vertices are equal, or no face has area.
 
     Examples
     --------
     >>> import numpy as np
     >>> import eigenshape as es
-    >>> mesh = es.geometry.normalize_box(es.shapes.grid(2, 2, width=4, height=2))
-    >>> np.ptp(mesh.vertices, axis=0).tolist()
-    [1.0, 0.5, 0.0]
-    """
-    mesh = as_mesh(mesh)
-    return _resize(mesh, lambda points: float(np.ptp(points, axis=0).max()))
-
-
-def normalize_area(mesh: MeshLike) -> TriangleMesh:
-    """Scale a mesh so that its surface area is 1.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-
-    Returns
-    -------
-    TriangleMesh
-        The scaled mesh, with the mean of its vertices at the origin.
-
-    Raises
-    ------
-    InvalidShapeError
-        If no face has area.
-
-    See Also
-    --------
-    normalize_box, normalize_diameter
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> round(es.geometry.surface_area(es.geometry.normalize_area(es.icosphere(1))), 6)
+    >>> sheet = es.shapes.grid(2, 2, width=3, height=4)
+    >>> np.ptp(es.geometry.normalize_mesh(sheet, "box").vertices, axis=0).tolist()
+    [0.75, 1.0, 0.0]
+    >>> round(es.geometry.surface_area(es.geometry.normalize_mesh(sheet, "area")), 6)
     1.0
-    """
-    mesh = as_mesh(mesh)
-    sound = np.delete(mesh.faces, degenerate_simplices(mesh), axis=0)
-    return _resize(
-        mesh, lambda points: float(np.linalg.norm(area_vectors(points[sound]), axis=1).sum()) ** 0.5
-    )
-
-
-def normalize_diameter(mesh: MeshLike) -> TriangleMesh:
-    """Scale a mesh so that the largest distance between two vertices is 1.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-
-    Returns
-    -------
-    TriangleMesh
-        The scaled mesh, with the mean of its vertices at the origin.
-
-    Raises
-    ------
-    InvalidShapeError
-        If all vertices are equal.
-
-    See Also
-    --------
-    normalize_box, normalize_area
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> mesh = es.geometry.normalize_diameter(es.shapes.grid(2, 2, width=3, height=4))
-    >>> mesh.vertices.max(axis=0).round(6).tolist()
+    >>> es.geometry.normalize_mesh(sheet, "diameter").vertices.max(axis=0).round(6).tolist()
     [0.3, 0.4, 0.0]
     """
     mesh = as_mesh(mesh)
-    return _resize(mesh, _diameter)
-
-
-def _resize(mesh: TriangleMesh, size_of: Callable[[Points], float]) -> TriangleMesh:
     points, _ = scale_to_unit(mesh)
-    size = size_of(points)
+    if measure == "box":
+        size = float(np.ptp(points, axis=0).max())
+    elif measure == "area":
+        sound = np.delete(mesh.faces, degenerate_simplices(mesh), axis=0)
+        size = float(np.linalg.norm(area_vectors(points[sound]), axis=1).sum()) ** 0.5
+    elif measure == "diameter":
+        size = _diameter(points)
+    else:
+        raise InvalidParameterError(
+            f"measure must be one of {', '.join(get_args(Measure))}; it is {measure!r}."
+        )
     if not size > 0:
         raise InvalidShapeError(
             "A mesh must have a size above zero to be normalized; "

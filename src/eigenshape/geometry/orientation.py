@@ -42,7 +42,7 @@ def orient_outward(mesh: MeshLike) -> TriangleMesh:
 
     See Also
     --------
-    orient : Turn single faces over so that neighbors agree.
+    repair : "orient" turns single faces over so that neighbors agree.
 
     Notes
     -----

@@ -116,7 +116,7 @@ def vertex_components(mesh: MeshLike) -> tuple[int, Int[np.ndarray, " n"]]:
 
     See Also
     --------
-    largest_component : Keep the component with the largest area.
+    repair : "largest_component" keeps the component with the largest area.
 
     Examples
     --------
@@ -278,7 +278,7 @@ def boundary_loops(mesh: MeshLike) -> list[Int[np.ndarray, " k"]]:
     See Also
     --------
     boundary_edges : The edges themselves.
-    fill_holes : Close the loops with faces.
+    repair : "fill_holes" closes the loops with faces.
 
     Notes
     -----

@@ -29,7 +29,7 @@ def disjoint_union(*meshes: MeshLike) -> TriangleMesh:
 
     See Also
     --------
-    weld : Join vertices at the same place.
+    repair : "weld" joins vertices at the same place.
 
     Examples
     --------

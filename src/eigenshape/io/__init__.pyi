@@ -2,7 +2,6 @@ from .attributes import Material as Material
 from .attributes import MeshAttributes as MeshAttributes
 from .bridges import from_pyvista as from_pyvista
 from .bridges import from_trimesh as from_trimesh
-from .bridges import to_arrays as to_arrays
 from .bridges import to_pyvista as to_pyvista
 from .bridges import to_trimesh as to_trimesh
 from .carrying import carry_attributes as carry_attributes

@@ -1,4 +1,4 @@
-"""Conversion from and to plain arrays, trimesh and PyVista."""
+"""Conversion from and to trimesh and PyVista."""
 
 from importlib import import_module
 from types import ModuleType
@@ -18,33 +18,6 @@ POINTS, LINES = (
     (1, 2),
     (3, 4),
 )  # VTK's numbers of cells for one or several points, and for a segment or polyline
-
-
-def to_arrays(shape: ShapeLike) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the points and simplices of a shape as writable arrays.
-
-    Parameters
-    ----------
-    shape : ShapeLike
-
-    Returns
-    -------
-    points : (n, d) float
-    simplices : (s, m + 1) int, or None for a point cloud
-
-    See Also
-    --------
-    from_arrays : Make a shape from arrays.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> points, faces = es.io.to_arrays(es.icosphere(0))
-    >>> points.shape, faces.shape
-    ((12, 3), (20, 3))
-    """
-    shape = as_shape(shape)
-    return shape.points.copy(), None if isinstance(shape, PointCloud) else shape.simplices.copy()
 
 
 def from_trimesh(mesh: Any, *, dim: Integer = 2) -> TriangleMesh | PointCloud:

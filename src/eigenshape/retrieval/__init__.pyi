@@ -1,4 +1,3 @@
-from . import baselines as baselines
 from .description import describe as describe
 from .heat.descriptor import HeatDescriptor as HeatDescriptor
 from .heat.features import HeatFeatures as HeatFeatures

@@ -17,7 +17,6 @@ from .harmonics import sphere_harmonics as sphere_harmonics
 from .spheres import fibonacci_sphere as fibonacci_sphere
 from .spheres import projective_plane as projective_plane
 from .spheres import random_sphere as random_sphere
-from .spheres import sphere_hull as sphere_hull
 from .spheres import three_sphere as three_sphere
 from .spheres import uneven_sphere as uneven_sphere
 from .surfaces import grid as grid

@@ -194,33 +194,10 @@ def three_sphere(n: Integer = 1000) -> SimplicialMesh:
 
 
 def sphere_hull(points: ArrayLike) -> SimplicialMesh:
-    """Make a mesh of points on a sphere in R^d, from the simplices of their convex hull.
+    """Make a mesh of points on a sphere in R^d from their convex hull; simplices are not oriented.
 
-    Parameters
-    ----------
-    points : (n, d) float
-        Points on a sphere around the origin, d ≥ 2, in any length unit.
-
-    Returns
-    -------
-    SimplicialMesh
-        Of dimension d - 1. Its simplices are not oriented.
-
-    Raises
-    ------
-    InvalidShapeError
-        If a point is not a vertex of the hull, such as the second of two equal points, or the hull
-        has no volume.
-
-    See Also
-    --------
-    fibonacci_sphere, three_sphere
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> es.shapes.sphere_hull([[1, 0], [0, 1], [-1, 0], [0, -1]])
-    SimplicialMesh(4 points in R^2, 4 simplices of dimension 1)
+    Raises an error if a point is not a vertex of the hull, such as the second of two equal points,
+    or if the hull has no volume.
     """
     rows = finite_rows(points, "points")
     try:

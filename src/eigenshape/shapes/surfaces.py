@@ -97,10 +97,6 @@ def torus(
     InvalidParameterError
         If a number is out of range or a radius is not positive.
 
-    See Also
-    --------
-    torus_quadrature : A quadrature of the same torus.
-
     Examples
     --------
     >>> import eigenshape as es

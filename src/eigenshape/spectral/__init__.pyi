@@ -5,9 +5,9 @@ from .comparison.angles import EigenspaceAngles as EigenspaceAngles
 from .comparison.angles import eigenspace_angles as eigenspace_angles
 from .comparison.eigenspaces import eigenspace_errors as eigenspace_errors
 from .comparison.eigenspaces import separated_groups as separated_groups
+from .comparison.shape_dna import shape_dna as shape_dna
 from .comparison.spectra import SpectrumComparison as SpectrumComparison
 from .comparison.spectra import compare_spectra as compare_spectra
-from .comparison.spectra import spectral_hausdorff_distance as spectral_hausdorff_distance
 from .diffusion.heat_flow import apply_heat as apply_heat
 from .diffusion.heat_kernel import HeatTrace as HeatTrace
 from .diffusion.heat_kernel import heat_kernel as heat_kernel
@@ -48,17 +48,10 @@ from .tools.clustering import spectral_clusters as spectral_clusters
 from .tools.compression import CompressedMesh as CompressedMesh
 from .tools.compression import compress_mesh as compress_mesh
 from .tools.compression import decompress_mesh as decompress_mesh
-from .tools.embedding import biharmonic_distances as biharmonic_distances
-from .tools.embedding import commute_time_distances as commute_time_distances
-from .tools.embedding import diffusion_distances as diffusion_distances
-from .tools.embedding import diffusion_map as diffusion_map
-from .tools.embedding import global_point_signature as global_point_signature
+from .tools.embedding import spectral_distances as spectral_distances
 from .tools.embedding import spectral_embedding as spectral_embedding
 from .tools.estimators import SpectralClusterer as SpectralClusterer
 from .tools.estimators import SpectralEmbedder as SpectralEmbedder
-from .tools.filters import BandPass as BandPass
-from .tools.filters import HeatFilter as HeatFilter
-from .tools.filters import LowPass as LowPass
 from .tools.filters import filter_values as filter_values
 from .tools.filters import smooth_mesh as smooth_mesh
 from .tools.nodal import NodalDomains as NodalDomains
@@ -69,5 +62,4 @@ from .tools.projection import project as project
 from .tools.projection import reconstruct as reconstruct
 from .tools.watermark import WatermarkTest as WatermarkTest
 from .tools.watermark import detect_watermark as detect_watermark
-from .tools.watermark import detect_watermarks as detect_watermarks
 from .tools.watermark import embed_watermark as embed_watermark

@@ -9,7 +9,6 @@ from .bounds import weyl_bound as weyl_bound
 from .cheeger import CheegerEstimate as CheegerEstimate
 from .cheeger import cheeger_estimate as cheeger_estimate
 from .closeness import Closeness as Closeness
-from .closeness import map_closeness as map_closeness
 from .closeness import measure_closeness as measure_closeness
 from .correspondence import BottleneckMatching as BottleneckMatching
 from .correspondence import MaximumMatching as MaximumMatching
@@ -23,8 +22,6 @@ from .perturbation import vertex_pairs as vertex_pairs
 from .plan import StabilityPlan as StabilityPlan
 from .rates import THEOREMS as THEOREMS
 from .rates import Rate as Rate
-from .rates import bounding_rate as bounding_rate
-from .rates import fit_rate as fit_rate
 from .rates import theorem_rate as theorem_rate
 from .report import StabilityReport as StabilityReport
 from .report import compare_shapes as compare_shapes

@@ -7,16 +7,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_rows, freeze
-from eigenshape._errors import InvalidParameterError
+from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._text import html_repr, short_repr
-from eigenshape._typing import ArrayLike
-from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.enclosing_ball import enclosing_ball
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import require_volumes, size_one, volumes
-from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.stability.perturbation import Perturbation, measure_perturbation, vertex_pairs
+from eigenshape.stability.perturbation import Perturbation, vertex_pairs
 
 Limit = Literal["nothing", "displacement", "Jacobian", "ball", "volume"]
 
@@ -47,7 +42,6 @@ class Closeness(ReadOnly):
 
     See Also
     --------
-    map_closeness : Closeness of a mesh and its image under a map.
     measure_closeness : Closeness of a shape and a changed shape.
 
     Examples
@@ -56,7 +50,8 @@ class Closeness(ReadOnly):
 
     >>> import eigenshape as es
     >>> mesh = es.icosphere(2)
-    >>> closeness = es.stability.map_closeness(mesh, 2 * mesh.vertices)
+    >>> larger = es.TriangleMesh(2 * mesh.vertices, mesh.faces)
+    >>> closeness = es.stability.measure_closeness(es.stability.measure_perturbation(mesh, larger))
     >>> closeness.limited_by, round(closeness.delta, 6)
     ('Jacobian', 3.0)
     """
@@ -107,7 +102,8 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
 
     C1: outside the regions, |x - Φ(x)| ≤ δ and 1 - δ ≤ JΦ ≤ 1 + δ. C2: X_i and Y_i lie in one ball
     of radius δ, and (1 - δ) vol(X_i) ≤ vol(Y_i) ≤ (1 + δ) vol(X_i). Lengths are those of the shapes
-    scaled to vol(M) = 1. Without regions, this is δ_H of thesis 3.1, with factor 1 in its O.
+    scaled to vol(M) = 1. Without regions, for a mesh and its image under a map, this is δ_H of
+    thesis 3.1, with factor 1 in its O.
 
     Parameters
     ----------
@@ -125,7 +121,6 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
     See Also
     --------
     measure_perturbation : Describe how one shape became another.
-    map_closeness : The same for a mesh and its image under a map.
 
     Examples
     --------
@@ -157,46 +152,6 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
         _sums(volumes_two, perturbation.regions_two) / _sums(volumes_one, perturbation.regions_one),
         scale * float(volumes_one.sum()) ** (1 / perturbation.one.dim),
     )
-
-
-def map_closeness(mesh: MeshLike, images: ArrayLike) -> Closeness:
-    """Compute the smallest δ_H for which a shape and its image are δ_H-close (thesis 3.1).
-
-    Parameters
-    ----------
-    mesh : MeshLike
-    images : (n, d) float
-        Images of the vertices, in length; the map is linear on each face.
-
-    Returns
-    -------
-    Closeness
-        Without regions.
-
-    Raises
-    ------
-    InvalidShapeError
-        If a simplex has no volume, or an image is not finite.
-    InvalidParameterError
-        If the number of images differs from the number of vertices.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> mesh = es.icosphere(2)
-    >>> closeness = es.stability.map_closeness(mesh, mesh.vertices + [0.1, 0, 0])
-    >>> closeness.limited_by, closeness.displacement.max().round(6).tolist()
-    ('displacement', 0.1)
-    """
-    mesh = as_simplicial(mesh)
-    places = finite_rows(images, "points", mesh.points.shape[1])
-    if len(places) != mesh.n_points:
-        raise InvalidParameterError(
-            "A map must have one image per vertex; "
-            f"there are {len(places)} images of {mesh.n_points} vertices."
-        )
-    kind = TriangleMesh if isinstance(mesh, TriangleMesh) else SimplicialMesh
-    return measure_closeness(measure_perturbation(mesh, kind(places, mesh.simplices)))
 
 
 def _scale_points(

@@ -6,8 +6,7 @@ from math import e, exp, lgamma, pi, sqrt
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, whole_number
+from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike, Integer
@@ -31,7 +30,6 @@ class Rate:
     See Also
     --------
     theorem_rate : Rates that theorems prove.
-    fit_rate : Rate fitted to measurements.
 
     Examples
     --------
@@ -116,91 +114,3 @@ def theorem_rate(theorem: str, dim: Integer) -> Rate:
             f"theorem must be one of {', '.join(THEOREMS)}; it is {theorem!r}."
         )
     return rates[theorem]
-
-
-def bounding_rate(rate: Rate, delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> Rate:
-    """Return a rate with the smallest constant that bounds all measurements from above.
-
-    Parameters
-    ----------
-    rate : Rate
-        The exponents; its constant is ignored.
-    delta, t, measured : (q,) float
-        Closeness, heat time and measured change of each measurement; all positive.
-
-    Returns
-    -------
-    Rate
-
-    Raises
-    ------
-    InvalidParameterError
-        If a value is not positive and finite, or the lengths differ.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> linear = es.stability.Rate(delta=1, t=0)
-    >>> es.stability.bounding_rate(linear, [1, 2], [1, 1], [3, 4]).constant
-    3.0
-    """
-    require_type(rate, Rate, "rate")
-    deltas, times, values = _check_measurements(delta, t, measured)
-    shape = Rate(rate.delta, rate.t)
-    return Rate(rate.delta, rate.t, float((values / shape.at(deltas, times)).max()))
-
-
-def fit_rate(delta: ArrayLike, t: ArrayLike, measured: ArrayLike) -> Rate:
-    """Fit exponents and constant to measurements, by least squares of the logarithms.
-
-    If `delta` or `t` is constant, its exponent is 0.
-
-    Parameters
-    ----------
-    delta, t, measured : (q,) float
-        Closeness, heat time and measured change of each measurement; all positive.
-
-    Returns
-    -------
-    Rate
-
-    Raises
-    ------
-    InvalidParameterError
-        If a value is not positive and finite, the lengths differ, or the measurements do not
-        determine the exponents.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> rate = es.stability.fit_rate([1, 2, 4], [1, 1, 1], [3, 12, 48])
-    >>> round(rate.delta, 6), round(rate.constant, 6)
-    (2.0, 3.0)
-    """
-    deltas, times, values = _check_measurements(delta, t, measured)
-    columns = np.log(np.column_stack([deltas, times]))
-    centered = columns - columns.mean(axis=0)
-    varied = np.ptp(columns, axis=0) > 0
-    if not varied.any() or np.linalg.matrix_rank(centered[:, varied]) < np.count_nonzero(varied):
-        raise InvalidParameterError(
-            "delta and t must vary, and not together, to determine their exponents; "
-            f"in these {len(values)} measurements they do not."
-        )
-    exponents = np.zeros(2)
-    logs = np.log(values)
-    exponents[varied] = np.linalg.lstsq(centered[:, varied], logs - logs.mean(), rcond=None)[0]
-    constant = float(np.exp(logs.mean() - columns.mean(axis=0) @ exponents))
-    return Rate(float(exponents[0]), float(exponents[1]), constant)
-
-
-def _check_measurements(
-    delta: ArrayLike, t: ArrayLike, measured: ArrayLike
-) -> tuple[Float[np.ndarray, " q"], ...]:
-    named = {"delta": delta, "t": t, "measured": measured}
-    rows = [np.atleast_1d(positive_values(value, name)) for name, value in named.items()]
-    counts = [len(row) for row in rows]
-    if len(set(counts)) > 1:
-        raise InvalidParameterError(
-            f"delta, t and measured must have the same length; the lengths are {counts}."
-        )
-    return tuple(rows)

@@ -21,7 +21,8 @@ from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_a
 from eigenshape.spectral.comparison.spectra import SpectrumComparison, compare_spectra
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.stability.bounds import TimeRange, admissible_times
-from eigenshape.stability.closeness import Closeness, map_closeness
+from eigenshape.stability.closeness import Closeness, measure_closeness
+from eigenshape.stability.perturbation import measure_perturbation
 from eigenshape.stability.plan import USUAL_K, StabilityPlan
 from eigenshape.stability.sampled import (
     ChangeAtTime,
@@ -195,7 +196,7 @@ def compare_shapes(
 
     See Also
     --------
-    map_closeness : Closeness of a mesh and its image.
+    measure_closeness : Closeness of a mesh and its image.
     theorem_rate : Rates of change that theorems prove.
 
     Examples
@@ -231,7 +232,9 @@ def compare_shapes(
     distance = float(max(each.max() for each in distances))
     closeness = None
     if meshes is not None and images is not None:
-        closeness = map_closeness(meshes[0], two.points[images])
+        mesh = meshes[0]
+        image = type(mesh)(two.points[images], mesh.simplices)
+        closeness = measure_closeness(measure_perturbation(mesh, image))
     delta = float(closeness.displacement.max()) if closeness else distance
     spacing = max(
         neighbor_distance(points, one.dim) for points in (samples.one, samples.two, samples.again)

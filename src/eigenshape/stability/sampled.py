@@ -11,7 +11,7 @@ from eigenshape._arrays import freeze
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
-from eigenshape.geometry.samples.quadrature import uniform_quadrature
+from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.samples.surface_points import sample_surface
 from eigenshape.operators.clouds.kernel import (
     KernelOptions,
@@ -184,7 +184,7 @@ def _graph_laplacian(
     range: `ChangeAtTime.admissible` reports them. (A filter of warnings would act on other threads
     too.)
     """
-    measure = uniform_quadrature(points, dim)
+    measure = Quadrature(points, None, dim)
     kernel = choose_kernel(KernelOptions(t=t), neighbor_distance(measure.points, dim))
     laplacian = kernel_laplacian(measure, kernel)
     require_whole(laplacian, labels, kernel)

@@ -8,7 +8,6 @@ from scipy.spatial import Delaunay
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.distances.geodesic import (
     geodesic_balls,
-    geodesic_distance_to_set,
     geodesic_distances,
 )
 from eigenshape.geometry.mesh import TriangleMesh
@@ -107,7 +106,7 @@ def test_from_a_line_on_a_grid_the_way_is_straight(place):
     mesh = grid(10, 10)
     away = np.abs(mesh.vertices[:, 0] - place / 10)
     line = np.flatnonzero(away < 1e-9)
-    np.testing.assert_allclose(geodesic_distance_to_set(mesh, line), away, atol=1e-15)
+    np.testing.assert_allclose(geodesic_distances(mesh, [line])[0], away, atol=1e-15)
 
 
 def test_from_a_line_through_irregular_triangles_it_is_straight_up_to_few_per_cent():
@@ -117,38 +116,31 @@ def test_from_a_line_through_irregular_triangles_it_is_straight_up_to_few_per_ce
     )
     mesh = TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), Delaunay(flat).simplices)
     away = np.abs(flat[:2000, 0] - 0.5)
-    ratio = geodesic_distance_to_set(mesh, np.arange(2000, 2060))[:2000] / away
+    ratio = geodesic_distances(mesh, [np.arange(2000, 2060)])[0][:2000] / away
     assert ratio.min() > 1 - 1e-9
     assert np.median(ratio) < 1.002
     assert ratio[away > 0.02].max() < 1.07
-
-
-def test_one_source_is_a_set():
-    mesh = icosphere(3)
-    np.testing.assert_array_equal(
-        geodesic_distance_to_set(mesh, [7]), geodesic_distances(mesh, [7])[0]
-    )
 
 
 def test_from_far_sources_it_is_the_least_of_their_distances():
     mesh = icosphere(3)
     sources = [0, 1, 2, 3]  # corners of the icosahedron
     found, least = (
-        geodesic_distance_to_set(mesh, sources),
+        geodesic_distances(mesh, [sources])[0],
         geodesic_distances(mesh, sources).min(axis=0),
     )
     assert (found[sources] == 0).all()
     np.testing.assert_allclose(
         found, least, rtol=0.03
     )  # half-way between two the front counts as straight
-    np.testing.assert_array_equal(found, geodesic_distance_to_set(mesh, [3, 2, 2, 1, 0]))
+    np.testing.assert_array_equal(found, geodesic_distances(mesh, [[3, 2, 2, 1, 0]])[0])
 
 
 def test_beyond_the_reach_it_is_infinite():
     mesh = icosphere(3)
     whole, near = (
-        geodesic_distance_to_set(mesh, [0, 9]),
-        geodesic_distance_to_set(mesh, [0, 9], reach=0.5),
+        geodesic_distances(mesh, [[0, 9]])[0],
+        geodesic_distances(mesh, [[0, 9]], reach=0.5)[0],
     )
     np.testing.assert_array_equal(near, np.where(whole <= 0.5, whole, np.inf))
     assert 2 < np.isfinite(near).sum() < mesh.n_vertices
@@ -156,25 +148,25 @@ def test_beyond_the_reach_it_is_infinite():
 
 def test_another_component_is_infinitely_far_and_so_is_nothing():
     mesh = disjoint_union(icosphere(1), icosphere(1))
-    assert np.isinf(geodesic_distance_to_set(mesh, [0, 1])).tolist() == [False] * 42 + [True] * 42
-    assert np.isinf(geodesic_distance_to_set(mesh, [])).all()
+    assert np.isinf(geodesic_distances(mesh, [[0, 1]])[0]).tolist() == [False] * 42 + [True] * 42
+    assert np.isinf(geodesic_distances(mesh, [[]])[0]).all()
 
 
 @pytest.mark.parametrize("size", [1e-100, 1e100])
 def test_units_change_no_distance_from_a_set(size):
     mesh = icosphere(2)
-    one = geodesic_distance_to_set(mesh, [0, 5, 9])
-    other = geodesic_distance_to_set(TriangleMesh(size * mesh.vertices, mesh.faces), [0, 5, 9])
+    one = geodesic_distances(mesh, [[0, 5, 9]])[0]
+    other = geodesic_distances(TriangleMesh(size * mesh.vertices, mesh.faces), [[0, 5, 9]])[0]
     np.testing.assert_allclose(other / size, one, rtol=1e-12)
 
 
 def test_sources_must_be_vertices_of_a_surface():
     with pytest.raises(InvalidParameterError, match=r"A source must lie in 0\.\.41; it is 42"):
-        geodesic_distance_to_set(icosphere(1), [3, 42])
+        geodesic_distances(icosphere(1), [[3, 42]])[0]
     with pytest.raises(
         InvalidShapeError, match="need a mesh of dimension 2; this one has dimension 1"
     ):
-        geodesic_distance_to_set(SimplicialMesh([[0.0], [1.0]], [[0, 1]]), [0])
+        geodesic_distances(SimplicialMesh([[0.0], [1.0]], [[0, 1]]), [[0]])[0]
 
 
 def test_edges_without_length_change_no_distance():

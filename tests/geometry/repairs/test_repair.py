@@ -26,9 +26,9 @@ from eigenshape.geometry.topology import (
     is_manifold,
 )
 from eigenshape.geometry.union import disjoint_union
-from eigenshape.retrieval.baselines.shape_dna import shape_dna
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere
+from eigenshape.spectral.comparison.shape_dna import shape_dna
 
 
 def test_the_names_that_help_lists_are_those_of_the_repairs():

@@ -3,18 +3,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from exact_quadratures import sphere_quadrature, torus_quadrature
 from scipy.special import eval_legendre
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.samples.quadrature import (
-    Quadrature,
-    mesh_quadrature,
-    sphere_quadrature,
-    torus_quadrature,
-    uniform_quadrature,
-)
+from eigenshape.geometry.samples.cloud_measure import shape_quadrature
+from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.union import disjoint_union
@@ -203,7 +199,7 @@ def test_another_text_is_no_time():
 
 def test_without_a_matrix_it_is_the_same():
     mesh = icosphere(3)
-    measure, stored = mesh_quadrature(mesh), mesh_laplacian(mesh)
+    measure, stored = shape_quadrature(mesh), mesh_laplacian(mesh)
     fields = np.random.default_rng(0).normal(size=(mesh.n_vertices, 3))
     product = functional_laplacian(measure, stored.kernel.t, cutoff=4.0) @ fields
     np.testing.assert_allclose(
@@ -217,7 +213,7 @@ def test_weights_that_are_volumes_make_the_mesh_laplacian():
     mesh = icosphere(2)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = quadrature_laplacian(mesh_quadrature(mesh), mesh_laplacian(mesh).kernel.t)
+        found = quadrature_laplacian(shape_quadrature(mesh), mesh_laplacian(mesh).kernel.t)
     assert abs(found.stiffness - mesh_laplacian(mesh).stiffness).max() < 1e-15
 
 
@@ -320,7 +316,7 @@ def test_too_small_and_equal_samples_are_refused():
     with pytest.raises(
         InvalidShapeError, match="A sample of dimension 2 must have over 6 points; it has 6"
     ):
-        quadrature_laplacian(uniform_quadrature(np.eye(6), 2), 1.0)
+        quadrature_laplacian(Quadrature(np.eye(6), None, 2), 1.0)
     with pytest.raises(
         InvalidShapeError, match=r"The points of a sample must differ; all 9 are \[1.0, 1.0\]"
     ):
@@ -362,8 +358,8 @@ def test_points_must_span_the_dimension_that_they_sample(scale, flat, place):
     )
     fact = rf"The points of a sample must span {flat + 1} dimensions; all 60 lie {place} through point 0"
     with pytest.raises(InvalidShapeError, match=fact):
-        quadrature_laplacian(uniform_quadrature(points, flat + 1), scale**2)
-    assert quadrature_laplacian(uniform_quadrature(points, flat), scale**2).n_points == 60
+        quadrature_laplacian(Quadrature(points, None, flat + 1), scale**2)
+    assert quadrature_laplacian(Quadrature(points, None, flat), scale**2).n_points == 60
 
 
 @pytest.mark.long

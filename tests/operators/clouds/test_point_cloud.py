@@ -3,7 +3,7 @@ import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.samples.cloud_measure import cloud_quadrature
+from eigenshape.geometry.samples.cloud_measure import shape_quadrature
 from eigenshape.operators.clouds import cloud_kernel
 from eigenshape.operators.clouds.cloud_kernel import cloud_width, point_cloud_laplacian
 from eigenshape.operators.clouds.gaussian import gaussian_laplacian
@@ -41,7 +41,7 @@ def test_the_mass_is_the_measure_of_the_cloud():
     cloud = PointCloud(fibonacci_sphere(300).vertices)
     np.testing.assert_array_equal(
         point_cloud_laplacian(cloud, form="literal").mass.diagonal(),
-        cloud_quadrature(cloud).weights,
+        shape_quadrature(cloud).weights,
     )
 
 

@@ -21,7 +21,7 @@ def true_errors(laplacian, found, values):
 
 
 def creature(n_vertices=5000, kind="quadruped"):
-    mesh = es.geometry.normalize_box(es.make_creature(kind, 1, n_vertices=n_vertices))
+    mesh = es.geometry.normalize_mesh(es.make_creature(kind, 1, n_vertices=n_vertices), "box")
     return mesh, es.cotangent_laplacian(mesh)
 
 
@@ -208,7 +208,7 @@ def test_what_is_refused():
 @pytest.mark.parametrize("name", ["dragon", "armadillo"])
 def test_scans(data, name):
     path = next((data / "classics").glob(f"{name}.*"))
-    mesh = es.geometry.normalize_box(es.read_mesh(path))
+    mesh = es.geometry.normalize_mesh(es.read_mesh(path), "box")
     laplacian = es.cotangent_laplacian(mesh)
     times = es.retrieval.THESIS.time_unit * np.array(es.retrieval.THESIS.scales)
     found = es.spectral.approximate_heat_signature(laplacian, 300, times)

@@ -1,6 +1,7 @@
 """Embeddings and distances: what is known in closed form, and what no choice of basis changes."""
 
 from dataclasses import replace
+from functools import partial
 from inspect import unwrap  # past the check of types, which only tests have
 
 import numpy as np
@@ -18,11 +19,9 @@ BALL = es.icosphere(2)
 SPECTRUM = es.solve_spectrum(es.cotangent_laplacian(BALL), 36)
 TWO = disjoint_union(BALL, es.TriangleMesh(BALL.vertices * 0.5 + 5, BALL.faces))
 DISTANCES = {
-    "commute-time": es.spectral.commute_time_distances,
-    "biharmonic": es.spectral.biharmonic_distances,
-    "diffusion": lambda spectrum, points=None: es.spectral.diffusion_distances(
-        spectrum, 0.1, points
-    ),
+    "commute-time": partial(es.spectral.spectral_distances, method="commute-time"),
+    "biharmonic": es.spectral.spectral_distances,
+    "diffusion": partial(es.spectral.spectral_distances, method="diffusion", t=0.1),
 }
 
 
@@ -38,7 +37,7 @@ def graph_of(seed, n=12):
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["weighted", "normalized"]))
 def test_commute_time_distances_are_effective_resistances(seed, kind):
     laplacian = es.operators.graph_laplacian(graph_of(seed), kind)
-    found = es.spectral.commute_time_distances(es.solve_spectrum(laplacian, 12)) ** 2
+    found = DISTANCES["commute-time"](es.solve_spectrum(laplacian, 12)) ** 2
     inverse = np.linalg.pinv(laplacian.stiffness.toarray())
     diagonal = np.diag(inverse)
     np.testing.assert_allclose(found, diagonal[:, None] + diagonal - 2 * inverse, atol=1e-9)
@@ -106,11 +105,7 @@ def test_scalings_are_powers_of_the_eigenvalues():
     for power in (-0.5, -1.0, 2.0):
         scaled = es.spectral.spectral_embedding(SPECTRUM, 8, power=power)
         np.testing.assert_allclose(scaled, plain * values**power)
-    np.testing.assert_array_equal(
-        es.spectral.global_point_signature(SPECTRUM, 8),
-        es.spectral.spectral_embedding(SPECTRUM, 8, power=-0.5),
-    )
-    heat = es.spectral.diffusion_map(SPECTRUM, 0.1, 8)
+    heat = es.spectral.spectral_embedding(SPECTRUM, 8, t=0.1)
     np.testing.assert_allclose(heat, plain * np.exp(-0.1 * values))
 
 
@@ -134,14 +129,14 @@ def test_components_are_infinitely_far_and_keep_their_own_distances(rotate):
     # Heat stays in each component: the distance is at least that of the two constants.
     areas = [es.geometry.surface_area(mesh) for mesh in (BALL, TWO)]
     least = np.sqrt(1 / areas[0] + 1 / (areas[1] - areas[0]))
-    late = es.spectral.diffusion_distances(spectrum, 20.0, [0])[n:, 0]
+    late = es.spectral.spectral_distances(spectrum, [0], method="diffusion", t=20.0)[n:, 0]
     np.testing.assert_allclose(late, least, rtol=1e-6)
 
 
 def test_clouds_and_graphs_have_distances_too():
     cloud = es.PointCloud(es.icosphere(3).vertices, dim=2)
     spectrum = es.solve_spectrum(es.point_cloud_laplacian(cloud), 20)
-    found = es.spectral.biharmonic_distances(spectrum, [0])[:, 0]
+    found = es.spectral.spectral_distances(spectrum, [0])[:, 0]
     across = np.linalg.norm(cloud.points + cloud.points[0], axis=1)
     assert across[found.argmax()] < 0.1
 
@@ -150,14 +145,14 @@ def test_distances_scale_with_the_unit():
     large = es.solve_spectrum(
         es.cotangent_laplacian(es.TriangleMesh(BALL.vertices * 2.0**40, BALL.faces)), 36
     )
-    one, other = (es.spectral.biharmonic_distances(each, [0]) for each in (SPECTRUM, large))
+    one, other = (es.spectral.spectral_distances(each, [0]) for each in (SPECTRUM, large))
     np.testing.assert_allclose(other, one * 2.0**40, rtol=1e-9)
 
 
 def test_pairs_that_do_not_fit_into_memory_are_refused(monkeypatch):
     monkeypatch.setattr(_memory, "machine_memory", lambda: 1e5)
     with pytest.raises(es.InvalidParameterError, match="162 × 162 pairs of points"):
-        es.spectral.commute_time_distances(SPECTRUM)
+        es.spectral.spectral_distances(SPECTRUM)
 
 
 def test_bad_input_is_named():
@@ -171,14 +166,19 @@ def test_bad_input_is_named():
         es.spectral.spectral_embedding(SPECTRUM, power=np.inf)
     for t in (0.0, -1.0, np.nan):
         with pytest.raises(es.InvalidParameterError, match="t must be positive and finite"):
-            es.spectral.diffusion_distances(SPECTRUM, t)
+            es.spectral.spectral_distances(SPECTRUM, method="diffusion", t=t)
     with pytest.raises(es.InvalidParameterError, match="t must be one diffusion time"):
-        unwrap(es.spectral.diffusion_map)(SPECTRUM, [0.1, 0.2])
+        unwrap(es.spectral.spectral_embedding)(SPECTRUM, t=[0.1, 0.2])
+    for options in ({"method": "diffusion"}, {"t": 0.1}):
+        with pytest.raises(es.InvalidParameterError, match="and no others, take a time t"):
+            es.spectral.spectral_distances(SPECTRUM, **options)
+    with pytest.raises(es.InvalidParameterError, match="method must be one of biharmonic"):
+        unwrap(es.spectral.spectral_distances)(SPECTRUM, method="geodesic")
     with pytest.raises(es.InvalidParameterError, match=r"A point must lie in 0\.\.161; it is 162"):
-        es.spectral.commute_time_distances(SPECTRUM, [162])
+        es.spectral.spectral_distances(SPECTRUM, [162])
     constants = es.solve_spectrum(es.cotangent_laplacian(TWO), 2)
     with pytest.raises(es.InvalidParameterError, match="must have a mode that is not constant"):
-        es.spectral.biharmonic_distances(constants)
+        es.spectral.spectral_distances(constants)
     interval = es.solve_spectrum(es.cotangent_laplacian(BALL), above=1.0, below=7.0)
     with pytest.raises(es.InvalidParameterError, match="must begin with the lowest eigenvalue"):
         es.spectral.spectral_embedding(interval)

@@ -63,23 +63,30 @@ def test_the_plain_projection_is_the_eigen_skeleton():
     np.testing.assert_allclose(es.spectral.reconstruct(coefficients, spectrum), skeleton, atol=1e-9)
 
 
+def low_pass(cutoff):
+    return lambda eigenvalues: eigenvalues <= cutoff
+
+
+def heat_filter(t):
+    return lambda eigenvalues: np.exp(-t * eigenvalues)
+
+
 def test_filters_keep_what_they_name():
     cutoff = SPECTRUM.eigenvalues[20] * (1 + 1e-9)
-    low = es.spectral.filter_values(values(1), SPECTRUM, es.spectral.LowPass(cutoff))
+    low = es.spectral.filter_values(values(1), SPECTRUM, low_pass(cutoff))
     coefficients = es.spectral.project(low, SPECTRUM)
     kept = SPECTRUM.eigenvalues <= cutoff
     assert np.abs(coefficients[~kept]).max() < EXACT
     np.testing.assert_allclose(
         coefficients[kept], es.spectral.project(values(1), SPECTRUM)[kept], atol=EXACT
     )
-    rest = es.spectral.BandPass(np.nextafter(cutoff, np.inf), 1e9)
-    high = es.spectral.filter_values(values(1), SPECTRUM, rest)
-    everything = es.spectral.filter_values(values(1), SPECTRUM, es.spectral.BandPass(0, 1e9))
+    high = es.spectral.filter_values(values(1), SPECTRUM, lambda each: each > cutoff)
+    everything = es.spectral.filter_values(values(1), SPECTRUM, np.ones_like)
     np.testing.assert_allclose(low + high, everything, atol=EXACT)
 
 
 def test_heat_flows_on_where_it_stopped():
-    one, two, both = (es.spectral.HeatFilter(t) for t in (0.1, 0.3, 0.4))
+    one, two, both = (heat_filter(t) for t in (0.1, 0.3, 0.4))
     step = es.spectral.filter_values(values(2)[:, 0], SPECTRUM, one)
     again = es.spectral.filter_values(step, SPECTRUM, two)
     np.testing.assert_allclose(
@@ -98,7 +105,7 @@ def test_the_rest_is_kept_on_demand():
 def test_smoothing_keeps_the_volume_by_choice_whatever_the_unit(scale):
     mesh = es.TriangleMesh(TORUS.vertices * scale, TORUS.faces)
     spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 40)
-    heat = es.spectral.HeatFilter(0.05 * scale**2)
+    heat = heat_filter(0.05 * scale**2)
     shrunk = es.spectral.smooth_mesh(mesh, spectrum, heat)
     kept = es.spectral.smooth_mesh(mesh, spectrum, heat, keep_volume=True)
     volumes = [es.geometry.enclosed_volume(each) for each in (mesh, shrunk, kept)]
@@ -111,7 +118,7 @@ def test_smoothing_removes_noise():
     noise = 0.02 * np.random.default_rng(0).standard_normal(ball.vertices.shape)
     noisy = es.TriangleMesh(ball.vertices + noise, ball.faces)
     spectrum = es.solve_spectrum(es.cotangent_laplacian(ball), 16)
-    smooth = es.spectral.smooth_mesh(noisy, spectrum, es.spectral.LowPass(20.0))
+    smooth = es.spectral.smooth_mesh(noisy, spectrum, low_pass(20.0))
     away = np.abs(np.linalg.norm(smooth.vertices, axis=1) - 1).mean()
     assert away < np.abs(np.linalg.norm(noisy.vertices, axis=1) - 1).mean() / 3
 
@@ -129,7 +136,7 @@ def test_bad_values_are_named(bad, match):
     with pytest.raises(es.InvalidParameterError, match=match):
         es.spectral.project(bad, SPECTRUM)
     with pytest.raises(es.InvalidParameterError, match=match):
-        es.spectral.filter_values(bad, SPECTRUM, es.spectral.HeatFilter(1.0))
+        es.spectral.filter_values(bad, SPECTRUM, heat_filter(1.0))
 
 
 def test_other_bad_input_is_named():
@@ -139,12 +146,6 @@ def test_other_bad_input_is_named():
         es.spectral.reconstruct(np.zeros(41), SPECTRUM)
     with pytest.raises(es.InvalidParameterError, match="that of eigenvector 2 is nan"):
         es.spectral.reconstruct([0.0, 1.0, np.nan], SPECTRUM)
-    with pytest.raises(es.InvalidParameterError, match="t must be positive and finite"):
-        es.spectral.HeatFilter(0.0)
-    with pytest.raises(es.InvalidParameterError, match="cutoff must be positive and finite"):
-        es.spectral.LowPass(-1.0)
-    with pytest.raises(es.InvalidParameterError, match="A band must be 0 ≤ low ≤ high"):
-        es.spectral.BandPass(2.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -163,8 +164,8 @@ def test_a_response_of_another_form_is_named(response, match):
 def test_a_volume_that_cannot_be_kept_is_named():
     open_mesh = es.shapes.grid(5, 5)
     spectrum = es.solve_spectrum(es.cotangent_laplacian(open_mesh), 10)
-    heat = es.spectral.HeatFilter(0.01)
+    heat = heat_filter(0.01)
     with pytest.raises(es.InvalidShapeError, match="must be closed for its volume to be kept"):
         es.spectral.smooth_mesh(open_mesh, spectrum, heat, keep_volume=True)
     with pytest.raises(es.InvalidShapeError, match="leave some of the volume"):
-        es.spectral.smooth_mesh(TORUS, SPECTRUM, es.spectral.LowPass(1e-9), keep_volume=True)
+        es.spectral.smooth_mesh(TORUS, SPECTRUM, low_pass(1e-9), keep_volume=True)

@@ -53,7 +53,7 @@ def test_smoothing_leaves_the_mark_alone():
 
 def test_other_keys_and_unmarked_shapes_are_not_found():
     keys = [f"key {number}" for number in range(300)]
-    tests = es.spectral.detect_watermarks(BALL, MARKED, keys, k=40)
+    tests = es.spectral.detect_watermark(BALL, MARKED, keys, k=40)
     chances = [test.false_alarm for test in tests]
     assert min(chances) > 1e-5
     assert kstest(chances, "uniform").pvalue > 0.01

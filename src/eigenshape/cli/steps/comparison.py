@@ -1,6 +1,5 @@
 """What `stability` prints about two shapes, and the scale at which it compares them."""
 
-from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -11,13 +10,8 @@ from eigenshape.cli.console import out, print_table
 from eigenshape.cli.inputs import Scale
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.normalize import normalize_area, normalize_diameter
+from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.stability.report import StabilityReport
-
-SCALES: dict[str, Callable[[TriangleMesh], TriangleMesh]] = {
-    "area": normalize_area,
-    "diameter": normalize_diameter,
-}
 
 
 def scale_shape(shape: Shape, scale: Scale) -> Shape:
@@ -32,7 +26,7 @@ def scale_shape(shape: Shape, scale: Scale) -> Shape:
         return shape
     if not isinstance(shape, TriangleMesh):
         raise InvalidParameterError(f"--scale is for triangle meshes; the shape is {shape!r}.")
-    return SCALES[scale](shape)
+    return normalize_mesh(shape, scale)
 
 
 def stability_facts(report: StabilityReport) -> dict[str, Any]:

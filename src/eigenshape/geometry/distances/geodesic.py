@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from itertools import chain, islice
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -102,70 +103,29 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
     return found.minimum(found.T)
 
 
-def geodesic_distances(mesh: MeshLike, sources: ArrayLike) -> Float[np.ndarray, "k n"]:
-    """Compute the geodesic distances from some vertices to all vertices.
-
-    The method is that of `geodesic_balls`, in the direction from the sources only.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-        A surface, in any R^d.
-    sources : (k,) int
-        Vertices.
-
-    Returns
-    -------
-    (k, n) float
-        Distance from each source to each vertex, in length; infinite between components.
-
-    Raises
-    ------
-    InvalidShapeError
-        If the mesh does not have dimension 2.
-    InvalidParameterError
-        If a source is not a vertex.
-
-    See Also
-    --------
-    geodesic_distance_to_set : Distance to the nearest of several vertices.
-    geodesic_balls : Distances between all near vertices.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> grid = es.shapes.grid(2, 2, width=2, height=2)
-    >>> es.geometry.geodesic_distances(grid, [0]).round(4).tolist()
-    [[0.0, 1.0, 2.0, 1.0, 1.4142, 2.2361, 2.0, 2.2361, 2.8284]]
-    """
-    mesh = as_simplicial(mesh)
-    wave = geodesic_waves(mesh)
-    wanted = whole_numbers(sources, "A source", 0, mesh.n_points - 1)
-    return np.array([wave(source) for source in wanted]).reshape(-1, mesh.n_points)
-
-
-def geodesic_distance_to_set(
+def geodesic_distances(
     mesh: MeshLike, sources: ArrayLike, *, reach: float = np.inf
-) -> Float[np.ndarray, " n"]:
-    """Compute the geodesic distance from each vertex to the nearest of several sources.
+) -> Float[np.ndarray, "k n"]:
+    """Compute the geodesic distances from some vertices, or sets of vertices, to all vertices.
 
-    One wave starts from all sources at once. An edge between two sources is a source along its
-    whole length.
+    The method is that of `geodesic_balls`, in the direction from the sources only. From a set of
+    vertices one wave starts at all of them at once; an edge between two of them is a source along
+    its whole length.
 
     Parameters
     ----------
     mesh : MeshLike
         A surface, in any R^d.
-    sources : (k,) int
-        Vertices.
+    sources : (k,) int, or k lists of int
+        Vertices. The distance from a list of vertices is that to the nearest of them.
     reach : float
         Largest distance that is needed, in length. A smaller reach takes less time.
 
     Returns
     -------
-    (n,) float
-        Distance of each vertex, in length; infinite beyond `reach`, and on components without a
-        source.
+    (k, n) float
+        Distance from each source to each vertex, in length; infinite between components, and
+        beyond `reach`.
 
     Raises
     ------
@@ -176,26 +136,42 @@ def geodesic_distance_to_set(
 
     See Also
     --------
-    geodesic_distances : Distances from each source by itself.
+    geodesic_balls : Distances between all near vertices.
+    geodesic_waves : Distances from many sources, one after the other.
 
     Examples
     --------
-    The distance of each vertex of a grid from its left side.
+    From the first vertex of a grid, and from its left side:
 
     >>> import eigenshape as es
     >>> grid = es.shapes.grid(2, 2, width=2, height=2)
-    >>> es.geometry.geodesic_distance_to_set(grid, [0, 1, 2]).round(6).tolist()
-    [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+    >>> es.geometry.geodesic_distances(grid, [0]).round(4).tolist()
+    [[0.0, 1.0, 2.0, 1.0, 1.4142, 2.2361, 2.0, 2.2361, 2.8284]]
+    >>> es.geometry.geodesic_distances(grid, [[0, 1, 2]]).round(6).tolist()
+    [[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]]
     """
     mesh = as_simplicial(mesh)
     wave = geodesic_waves(mesh)
-    return wave(np.unique(whole_numbers(sources, "A source", 0, mesh.n_points - 1)), reach)
+    wanted = source_sets(sources, mesh.n_points)
+    return np.array([wave(source, reach) for source in wanted]).reshape(-1, mesh.n_points)
+
+
+def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]]:
+    """Return the points of each source, ascending: a source is a point, or a set of points.
+
+    Raises an error if one is not a point.
+    """
+    try:
+        entries: list[Any] = list(sources)  # type: ignore[arg-type]
+    except TypeError:  # one number
+        entries = [sources]
+    return [np.unique(whole_numbers(entry, "A source", 0, n_points - 1)) for entry in entries]
 
 
 def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
     """Return a function that computes geodesic distances on one mesh, many times.
 
-    What `geodesic_distance_to_set` prepares at each call is prepared once. On 25,000 vertices that
+    What `geodesic_distances` prepares at each call is prepared once. On 25,000 vertices that
     takes 60 ms, and a disc of a thousand vertices then takes less than 1 ms.
 
     Parameters
@@ -217,7 +193,7 @@ def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
 
     See Also
     --------
-    geodesic_distance_to_set : Distance to the nearest of several vertices, once.
+    geodesic_distances : Distances from some sources, once.
 
     Examples
     --------

@@ -7,7 +7,6 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Int
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.hole_loops import triangulate
 from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
@@ -34,47 +33,18 @@ class Fillings:
     n_open: int
 
 
-def fill_holes(mesh: MeshLike, *, most_edges: int = 1000) -> RepairedMesh[TriangleMesh]:
+def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[TriangleMesh]:
     """Fill every hole with faces between the vertices around it; no vertex is added.
 
     An open surface is closed along its rim too. A hole is left open, and the report says so, if it
     has too many edges, or if filling it would need a face without area, a face that exists already,
     or an edge with three faces.
 
-    Parameters
-    ----------
-    mesh : MeshLike
-    most_edges : int
-        Holes with more edges are left open. The time grows with the third power of the number of
-        edges; 1,000 edges take about a second.
-
-    Returns
-    -------
-    RepairedMesh
-
-    Raises
-    ------
-    InvalidParameterError
-        If `most_edges` is less than 3.
-
-    See Also
-    --------
-    boundary_loops : The holes.
-
-    Notes
-    -----
     Each boundary loop gets the triangulation with the least sum of areas (Barequet and Sharir,
     "Filling gaps in the boundary of a polyhedron", 1995), plus a small multiple of the squared
-    sides, which avoids slivers.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> sphere = es.icosphere(1)
-    >>> es.geometry.fill_holes((sphere.vertices, sphere.faces[1:])).report
-    ('fill_holes closed 1 hole with 1 face',)
+    sides, which avoids slivers. Raises an error
+    if `most_edges` is less than 3.
     """
-    mesh = as_mesh(mesh)
     if most_edges < 3:
         raise InvalidParameterError(
             f"most_edges must be at least 3, the edges of a triangle; it is {most_edges}."

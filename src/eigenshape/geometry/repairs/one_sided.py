@@ -5,40 +5,18 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import double_cover, face_neighbors, face_turns, turn_faces
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
 from eigenshape.geometry.topology import edge_table
 
 
-def cut_one_sided(mesh: MeshLike) -> RepairedMesh[TriangleMesh]:
+def cut_one_sided(mesh: TriangleMesh) -> RepairedMesh[TriangleMesh]:
     """Cut pieces with one side only, such as Möbius strips, so that their faces can be oriented.
 
     In each such piece, faces are turned alike outward from the first face, and edges where they
     meet turned against each other are cut. Vertices on a cut occur once for each side of it.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-
-    Returns
-    -------
-    RepairedMesh
-
-    See Also
-    --------
-    orient : Turn the faces of pieces with two sides.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> strip = [[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 0, 4], [4, 0, 1]]
-    >>> points = [[0, 0, 0], [1, 0, 1], [2, 0, 0], [2, 1, 1], [0, 1, 0]]
-    >>> es.geometry.cut_one_sided((points, strip)).report
-    ('cut_one_sided cut 1 piece with one side only along 1 edge, and added 2 vertices',)
     """
-    mesh = as_mesh(mesh)
     turns = face_turns(mesh)
     patches, roots = np.unique(turns.patches[~turns.orientable], return_index=True)
     roots = np.flatnonzero(~turns.orientable)[roots]

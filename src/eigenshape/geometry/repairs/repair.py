@@ -1,6 +1,7 @@
 """Repair a shape by names, choose repairs automatically, and suggest them."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, overload
 
 import numpy as np
@@ -97,10 +98,16 @@ def names_of_repairs(shape: Shape) -> tuple[str, ...]:
 @overload
 def repair(shape: PointCloud, names: Sequence[str]) -> RepairedCloud: ...
 @overload
-def repair(shape: MeshT, names: Sequence[str]) -> RepairedMesh[MeshT]: ...
+def repair(
+    shape: MeshT, names: Sequence[str], *, tolerance: float = ..., most_edges: int = ...
+) -> RepairedMesh[MeshT]: ...
 @overload
-def repair(shape: MeshLike, names: Sequence[str]) -> RepairedMesh[Any]: ...
-def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | RepairedCloud:
+def repair(
+    shape: MeshLike, names: Sequence[str], *, tolerance: float = ..., most_edges: int = ...
+) -> RepairedMesh[Any]: ...
+def repair(
+    shape: ShapeLike, names: Sequence[str], *, tolerance: float = 0.0, most_edges: int = 1000
+) -> RepairedMesh[Any] | RepairedCloud:
     """Apply named repairs to a shape, one after the other, and report what they changed.
 
     Parameters
@@ -114,6 +121,13 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
         `cut_one_sided`.
         For clouds: "auto", `drop_duplicate_points`. `drop_missing` acts when a file is read, as
         `read_mesh(path, drop_missing=True)`, and changes no shape that was read.
+    tolerance : float
+        Of `weld`: the largest distance between vertices at the same place, as a share of the
+        diagonal of the bounding box, 0 to 0.1. Vertices linked by a chain of such distances are all
+        joined. With 0, coordinates must be equal.
+    most_edges : int
+        Of `fill_holes`: holes with more edges are left open. The time grows with the third power of
+        the number of edges; 1,000 edges take about a second.
 
     Returns
     -------
@@ -124,7 +138,8 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
     Raises
     ------
     InvalidParameterError
-        If a name is not the name of a repair for this kind of shape.
+        If a name is not the name of a repair for this kind of shape, `tolerance` is not in 0..0.1,
+        or `most_edges` is less than 3.
     InvalidShapeError
         If no face would remain.
 
@@ -137,6 +152,16 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
     "auto" applies whichever of `drop_duplicate_faces`, `weld_seams`, `collapse_needles`,
     `drop_degenerate`, `drop_unreferenced` and, on surfaces, `orient` change the mesh, until none
     does. On a cloud it is `drop_duplicate_points`. It fills no hole and removes no component.
+
+    `weld` joins vertices at the same place, and so closed pieces that touch; `weld_seams` joins only
+    boundary edges that lie on each other. `collapse_needles` joins the ends of sides shorter than a
+    millionth of the longest side of their face, or a billionth of the longest side of the mesh.
+    `drop_degenerate` removes faces without area and splits the neighbor on their longest side, so
+    that no slit opens. `drop_duplicate_faces` and `drop_duplicate_points` keep the first of equal
+    ones. `orient` turns faces so that neighbors agree and closed pieces face outward; a piece that
+    has one side only is left, until `cut_one_sided` cuts it open. `largest_component` keeps the
+    component with the most area. `fill_holes` closes boundary loops by faces with the least sum of
+    areas (Barequet and Sharir 1995), without new vertices.
 
     Examples
     --------
@@ -159,9 +184,14 @@ def repair(shape: ShapeLike, names: Sequence[str]) -> RepairedMesh[Any] | Repair
             source = done.source_points[step.source_points]
             done = RepairedCloud(step.cloud, done.report + step.report, source)
         return done
+    steps: dict[str, Callable[[Any], RepairedMesh[Any]]] = {
+        **REPAIRS,
+        "weld": partial(weld, tolerance=tolerance),
+        "fill_holes": partial(fill_holes, most_edges=most_edges),
+    }
     result = _start_report(shape)
     for name in names:
-        result = _combine(result, REPAIRS[name](result.mesh))
+        result = _combine(result, steps[name](result.mesh))
     return result
 
 

@@ -4,14 +4,15 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
-from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.conversion import ShapeLike, as_shape
+from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.samples.cell_loops import cell_areas
 from eigenshape.geometry.samples.quadrature import Quadrature
-from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplices import dual_volumes, in_length, size_one
 
 # Neighbors of a point by dimension m, and 20 m² for larger m: enough to surround a random point on
 # all sides. More neighbors cost time and reach farther along a curved manifold.
@@ -23,20 +24,24 @@ FLATTEST = 1e-7
 POINTS_AT_ONCE = 4096
 
 
-def cloud_quadrature(cloud: PointCloud, *, n_neighbors: Integer | None = None) -> Quadrature:
-    """Compute the share of the manifold that each point of a cloud represents.
+def shape_quadrature(shape: ShapeLike, *, n_neighbors: Integer | None = None) -> Quadrature:
+    """Compute the share of a shape that each of its points represents.
 
-    The neighbors of a point are placed in the tangent plane that fits them best, each at its true
-    distance. The weight of the point is the volume of its Voronoi cell in that plane. At a boundary
-    the cell ends at the convex hull of the neighbors. On a curve the weight is half the distance
-    between the previous point and the next one. The density of the points may vary.
+    A point of a mesh has 1/(m+1) of the volume of its simplices, which is exact for functions that
+    are linear on each simplex.
+
+    The neighbors of a point of a cloud are placed in the tangent plane that fits them best, each at
+    its true distance. The weight of the point is the volume of its Voronoi cell in that plane. At a
+    boundary the cell ends at the convex hull of the neighbors. On a curve the weight is half the
+    distance between the previous point and the next one. The density of the points may vary.
 
     Parameters
     ----------
-    cloud : PointCloud
-        At least m + 2 different points.
+    shape : ShapeLike
+        A mesh of any dimension m, or a point cloud of at least m + 2 different points.
     n_neighbors : int, optional
-        Number of neighbors of each point; by default 20, 30 or 60 in dimension 1, 2 or 3.
+        Number of neighbors of each point of a cloud; by default 20, 30 or 60 in dimension 1, 2
+        or 3.
 
     Returns
     -------
@@ -46,15 +51,15 @@ def cloud_quadrature(cloud: PointCloud, *, n_neighbors: Integer | None = None) -
     Raises
     ------
     InvalidShapeError
-        If two points are equal, there are too few points, or the neighbors of a point do not span m
-        dimensions.
+        If a simplex has no volume, two simplices have the same corners, or a point has no simplex.
+        Of a cloud: if two points are equal, there are too few points, or the neighbors of a point
+        do not span m dimensions.
     InvalidParameterError
         If `n_neighbors` is less than m + 1 or not less than the number of points.
 
     See Also
     --------
-    mesh_quadrature : The same for a mesh.
-    uniform_quadrature : Equal weights, for points of a uniform sample.
+    dual_volumes : The weights of a mesh alone.
 
     Notes
     -----
@@ -66,13 +71,18 @@ def cloud_quadrature(cloud: PointCloud, *, n_neighbors: Integer | None = None) -
     --------
     >>> import numpy as np
     >>> import eigenshape as es
+    >>> es.geometry.shape_quadrature(es.shapes.interval(4)).weights.tolist()
+    [0.125, 0.25, 0.25, 0.25, 0.125]
     >>> angles = 2 * np.pi * np.arange(100) / 100
     >>> circle = es.PointCloud(np.column_stack([np.cos(angles), np.sin(angles)]), dim=1)
-    >>> weights = es.geometry.cloud_quadrature(circle).weights
+    >>> weights = es.geometry.shape_quadrature(circle).weights
     >>> bool(np.allclose(weights.sum(), 2 * np.pi, rtol=0.001))
     True
     """
-    require_type(cloud, PointCloud, "cloud")
+    cloud = as_shape(shape)
+    if not isinstance(cloud, PointCloud):
+        require_sound(cloud)
+        return Quadrature(cloud.points, dual_volumes(cloud), cloud.dim)
     dim = cloud.dim
     if cloud.n_points <= dim + 1:
         raise InvalidShapeError(

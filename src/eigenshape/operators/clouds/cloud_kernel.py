@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.samples.cloud_measure import cloud_quadrature
+from eigenshape.geometry.samples.cloud_measure import shape_quadrature
 from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.choices import Correction, Form
@@ -47,7 +47,7 @@ def point_cloud_laplacian(  # noqa: PLR0913 - as mesh_laplacian
     """Build the Laplacian of points that sample a manifold, evenly or not.
 
     This is the operator of `mesh_laplacian`, with the volume around each point taken from its
-    Voronoi cell in the tangent plane (`es.geometry.cloud_quadrature`; after Belkin, Sun, Wang
+    Voronoi cell in the tangent plane (`es.geometry.shape_quadrature`; after Belkin, Sun, Wang
     2009).
 
     The defaults are those that were measured to be most accurate, not those of the thesis: on 4,000
@@ -105,7 +105,7 @@ def point_cloud_laplacian(  # noqa: PLR0913 - as mesh_laplacian
     2.0
     """
     require_type(cloud, PointCloud, "cloud")
-    measure = cloud_quadrature(cloud)
+    measure = shape_quadrature(cloud)
     edge = neighbor_distance(cloud.points, cloud.dim)
     if t is None and h is None and edge_factor is None:
         edge_factor = _width_factor(measure, edge)
@@ -147,7 +147,7 @@ def cloud_width(cloud: PointCloud) -> float:
     Raises
     ------
     InvalidShapeError
-        As `cloud_quadrature`.
+        As `shape_quadrature`.
 
     See Also
     --------
@@ -166,7 +166,7 @@ def cloud_width(cloud: PointCloud) -> float:
     """
     require_type(cloud, PointCloud, "cloud")
     edge = neighbor_distance(cloud.points, cloud.dim)
-    return edge * _width_factor(cloud_quadrature(cloud), edge)
+    return edge * _width_factor(shape_quadrature(cloud), edge)
 
 
 def _width_factor(measure: Quadrature, edge: float) -> float:

@@ -12,7 +12,8 @@ from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.samples.quadrature import Quadrature, mesh_quadrature, uniform_quadrature
+from eigenshape.geometry.samples.cloud_measure import shape_quadrature
+from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components
@@ -131,7 +132,7 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
         )
     if isinstance(t, str) and t != "pointwise":
         raise InvalidParameterError(f"t must be a heat time or 'pointwise'; it is {t!r}.")
-    measure = mesh_quadrature(shape)
+    measure = shape_quadrature(shape)
     time = pointwise_time(shape) if t == "pointwise" else t
     kernel = choose_kernel(
         KernelOptions(time, h, edge_factor, correct, form, cutoff), mean_side_length(shape)
@@ -196,7 +197,7 @@ def pointwise_time(shape: MeshLike) -> float:
     points, scale = size_one(shape.points)
     unit = SimplicialMesh(points, shape.simplices)
     m = unit.dim
-    volume = float(mesh_quadrature(unit).weights.sum())
+    volume = float(shape_quadrature(unit).weights.sum())
     sphere = 2 * np.pi ** ((m + 1) / 2) / gamma((m + 1) / 2)  # volume of the unit m-sphere
     radius = (volume / sphere) ** (1 / m)
     edge = mean_side_length(unit)
@@ -259,7 +260,7 @@ def gaussian_laplacian(
             "by the unknown volume. Choose form='random-walk', or quadrature_laplacian with weights in length^m."
         )
     laplacian = quadrature_laplacian(
-        uniform_quadrature(points, dim), t, correct=correct, form=form, cutoff=cutoff
+        Quadrature(points, None, dim), t, correct=correct, form=form, cutoff=cutoff
     )
     return laplacian if form == "random-walk" else _over_volume(laplacian, int(dim))
 
@@ -307,7 +308,7 @@ def quadrature_laplacian(
     Examples
     --------
     >>> import eigenshape as es
-    >>> measure = es.geometry.mesh_quadrature(es.icosphere(3))
+    >>> measure = es.geometry.shape_quadrature(es.icosphere(3))
     >>> laplacian = es.operators.quadrature_laplacian(measure, 0.02, correct="log")
     >>> es.solve_spectrum(laplacian, 4).eigenvalues.round(1).tolist()
     [0.0, 2.0, 2.0, 2.0]
@@ -330,9 +331,8 @@ def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) 
     Parameters
     ----------
     measure : Quadrature
-        Of a known surface (`sphere_quadrature`, `torus_quadrature`) or of a mesh
-        (`mesh_quadrature`). On a mesh this is the mesh Laplacian without its matrix, for kernels
-        that are too dense to store.
+        Of a surface whose weights you know, or of a mesh (`shape_quadrature`). On a mesh this is
+        the mesh Laplacian without its matrix, for kernels that are too dense to store.
     t : float
         Heat time, in length².
     cutoff : float
@@ -357,7 +357,7 @@ def functional_laplacian(measure: Quadrature, t: float, *, cutoff: float = 6.0) 
 
     >>> import eigenshape as es
     >>> from numpy import median
-    >>> measure = es.geometry.mesh_quadrature(es.icosphere(4))
+    >>> measure = es.geometry.shape_quadrature(es.icosphere(4))
     >>> operator = es.operators.functional_laplacian(measure, 0.01)
     >>> z = measure.points[:, 2]
     >>> median((operator @ z)[z > 0.5] / z[z > 0.5]).round(1).item()

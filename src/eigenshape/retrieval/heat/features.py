@@ -18,7 +18,7 @@ from eigenshape.features.region_tree import MergeTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.repairs.fragments import fragment_vertices
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import boundary_edges, vertex_components
@@ -285,7 +285,7 @@ class _PreparedShape:
 def _prepare(mesh: TriangleMesh, recipe: HeatRecipe) -> _PreparedShape:
     """Scale a mesh as its recipe asks, build its operator, and find its boundary and fragments."""
     require_describable(mesh)
-    mesh = normalize_box(mesh) if recipe.unit == "box" else mesh
+    mesh = normalize_mesh(mesh, "box") if recipe.unit == "box" else mesh
     laplacian = cotangent_laplacian(mesh)
     fragments = fragment_vertices(mesh)
     _, labels = vertex_components(mesh)

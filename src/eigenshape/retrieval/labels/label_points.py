@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.smoothing import denoise
@@ -102,7 +102,7 @@ def _ball_radii(mesh: TriangleMesh, vertices: Int[np.ndarray, " m"]) -> Float[np
     R <= |p - q|² / (2 (p - q) · n). This is a thickness that needs no rays, and open surfaces have
     it too.
     """
-    unit = normalize_box(mesh)
+    unit = normalize_mesh(mesh, "box")
     normals = mean_normals(unit)
     radii = np.full((len(vertices), 2), LARGEST_RADIUS)
     for row, vertex in enumerate(vertices):

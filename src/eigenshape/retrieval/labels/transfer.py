@@ -17,11 +17,11 @@ from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.equations import heat_solver
+from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.orientation import orient_closed_outward
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import edge_table, face_pairs
@@ -315,10 +315,11 @@ def _spread_votes(
     target: TriangleMesh, votes: Float[np.ndarray, "n l"]
 ) -> Float[np.ndarray, "n l"]:
     """Spread votes by one implicit step of heat, and return the share of each label."""
-    mesh = normalize_box(orient_closed_outward(target))
+    mesh = normalize_mesh(orient_closed_outward(target), "box")
     laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
     area = float(face_areas(mesh).sum())
-    spread = heat_solver(laplacian, SPREAD_TIME * area).solve(votes / votes.sum())
+    step = laplacian.mass + SPREAD_TIME * area * laplacian.stiffness
+    spread = factor_definite(step).solve(votes / votes.sum())
     spread = np.maximum(spread, 0)
     total = spread.sum(axis=1)
 

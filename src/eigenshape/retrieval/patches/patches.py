@@ -16,7 +16,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.normalize import normalize_box
+from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.repairs.fragments import fragment_vertices
 from eigenshape.geometry.requirements import require_describable, require_oriented
@@ -191,7 +191,7 @@ def surface_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patche
         mesh, source = submesh(mesh, ~np.isin(mesh.faces[:, 0], fragments))
 
     # Without fragments there are fewer components than points, so each gets one.
-    mesh = normalize_box(mesh)
+    mesh = normalize_mesh(mesh, "box")
     areas = dual_volumes(mesh)
     if not areas.sum() > 0:
         raise InvalidShapeError(

@@ -208,29 +208,8 @@ def spectral_hausdorff_distance(one: ArrayLike, two: ArrayLike) -> float:
     max(max_λ dist(λ, Ω), max_ω dist(ω, Λ)), restricted to what two truncated spectra determine. An
     eigenvalue above the last known one of the other set is left out, because its nearest neighbor
     may be unknown. For all others the distance is exact: unknown eigenvalues of the other set are
-    at or above its last known one, and so no nearer than that.
-
-    Parameters
-    ----------
-    one : (k1,) float
-        All eigenvalues up to the last, in any order, in 1/length².
-    two : (k2,) float
-
-    Returns
-    -------
-    float
-        In 1/length²; at most the largest |λ_i - ω_i| if both have the same number.
-
-    Raises
-    ------
-    InvalidParameterError
-        If a value is not finite, or a set is empty.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> es.spectral.spectral_hausdorff_distance([0.0, 2.0, 6.0], [0.0, 2.5, 6.0])
-    0.5
+    at or above its last known one, and so no nearer than that. Raises an error
+    if a value is not finite, or a set is empty.
     """
     first, second = np.sort(finite_values(one, "one")), np.sort(finite_values(two, "two"))
     return max(_farthest(first, second), _farthest(second, first))

@@ -99,7 +99,7 @@ def require_one_constant(spectrum: Spectrum, name: str) -> None:
         raise InvalidParameterError(
             f"Shapes to be mapped must be connected; the {name} has the eigenvalues {spectrum.eigenvalues[0]:.3g} and "
             f"{spectrum.eigenvalues[1]:.3g}, which count as 0, so it has several components. "
-            f"Use es.geometry.largest_component."
+            'Use es.repair(mesh, ["largest_component"]).'
         )
     areas = point_areas(spectrum)
     lost = 1 - (spectrum.eigenvectors[:, 0] @ areas) ** 2 / areas.sum()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,10 +23,7 @@ from eigenshape.spectral.tools.clustering import (
     count_clusters,
     spectral_clusters,
 )
-from eigenshape.spectral.tools.embedding import (
-    diffusion_map,
-    spectral_embedding,
-)
+from eigenshape.spectral.tools.embedding import POWERS, spectral_embedding
 
 try:
     from sklearn.base import BaseEstimator, ClusterMixin
@@ -43,8 +40,6 @@ except ImportError as err:
 SPARE_PAIRS = 10
 
 EmbeddingMethod = Literal["spectral", "commute-time", "biharmonic", "diffusion"]
-# Exponents of the eigenvalues whose Euclidean distances give each method its name.
-POWERS = {"spectral": 0.0, "commute-time": -0.5, "biharmonic": -1.0}
 
 
 class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
@@ -52,8 +47,7 @@ class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
 
     The graph joins each point to its nearest neighbors, with weight 1 if each is a neighbor of the
     other and 1/2 otherwise. If it has several components, the number of neighbors is doubled until
-    it has one. The embedding is
-    `spectral_embedding` or `diffusion_map` of the normalized Laplacian of the graph.
+    it has one. The embedding is `spectral_embedding` of the normalized Laplacian of the graph.
 
     Parameters
     ----------
@@ -115,18 +109,20 @@ class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
         del y
         _require_data_points(X)
         points = validate_data(self, X, dtype=np.float64, ensure_min_samples=2)
-        if self.method not in (*POWERS, "diffusion"):
+        methods = get_args(EmbeddingMethod)
+        if self.method not in methods:
             raise InvalidParameterError(
-                f"method must be one of {', '.join([*POWERS, 'diffusion'])}; it is {self.method!r}."
+                f"method must be one of {', '.join(methods)}; it is {self.method!r}."
             )
         whole_number(self.n_components, "n_components", 1, len(points) - 1)
         n_pairs = self.n_components + 1
         self.spectrum_, self.n_neighbors_ = _graph_spectrum(points, self.n_neighbors, n_pairs, 1)
-        if self.method == "diffusion":
-            self.embedding_ = diffusion_map(self.spectrum_, self.t, self.n_components)
-        else:
-            power = POWERS[self.method]
-            self.embedding_ = spectral_embedding(self.spectrum_, self.n_components, power=power)
+        self.embedding_ = spectral_embedding(
+            self.spectrum_,
+            self.n_components,
+            power=POWERS.get(self.method, 0.0),
+            t=self.t if self.method == "diffusion" else None,
+        )
         return self
 
     def fit_transform(self, X: Any, y: object = None) -> Float[np.ndarray, "n d"]:

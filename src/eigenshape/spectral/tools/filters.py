@@ -1,15 +1,13 @@
 """Filters: functions whose frequencies are weakened or strengthened (thesis 1.2.3)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import describe_value, require_type
-from eigenshape._arrays import point_functions, positive_values, real_numbers
+from eigenshape._arrays import point_functions, real_numbers
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -17,7 +15,6 @@ from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import is_closed
-from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.tools.projection import project, reconstruct
 
@@ -26,123 +23,6 @@ Response = Callable[[Float[np.ndarray, " k"]], Float[np.ndarray, " k"]]
 # Share of the volume of a shape that must be left for the rest to be restored by scaling. Below it
 # the result would be a speck blown up, of which rounding is the largest part.
 LEAST_VOLUME = 1e-6
-
-
-@dataclass(frozen=True)
-class LowPass:
-    """A filter that keeps the frequencies up to a cutoff and removes the others.
-
-    Parameters
-    ----------
-    cutoff : float
-        Largest eigenvalue to keep, in 1/length², > 0. On a surface of area A about A·cutoff/4π
-        eigenvalues are kept (Weyl's law).
-
-    Raises
-    ------
-    InvalidParameterError
-        If the cutoff is not positive and finite.
-
-    See Also
-    --------
-    filter_values, smooth_mesh : Apply a filter.
-
-    Examples
-    --------
-    >>> import numpy as np, eigenshape as es
-    >>> es.spectral.LowPass(5.0)(np.array([0.0, 2.0, 6.0])).tolist()
-    [1.0, 1.0, 0.0]
-    """
-
-    cutoff: float
-
-    _repr_html_ = html_repr
-
-    def __post_init__(self) -> None:
-        positive_values(self.cutoff, "cutoff")
-
-    def __call__(self, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Return 1 for each eigenvalue up to the cutoff, and 0 beyond."""
-        return np.asarray(eigenvalues <= self.cutoff, dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class BandPass:
-    """A filter that keeps the frequencies of a band and removes the others.
-
-    Parameters
-    ----------
-    low, high : float
-        Smallest and largest eigenvalue to keep, in 1/length², 0 ≤ low ≤ high.
-
-    Raises
-    ------
-    InvalidParameterError
-        If the ends are not finite, negative, or in the wrong order.
-
-    See Also
-    --------
-    filter_values, smooth_mesh : Apply a filter.
-
-    Examples
-    --------
-    >>> import numpy as np, eigenshape as es
-    >>> es.spectral.BandPass(1.0, 5.0)(np.array([0.0, 2.0, 6.0])).tolist()
-    [0.0, 1.0, 0.0]
-    """
-
-    low: float
-    high: float
-
-    _repr_html_ = html_repr
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.low <= self.high < np.inf:
-            raise InvalidParameterError(
-                f"A band must be 0 ≤ low ≤ high, finite; it is {self.low} to {self.high}."
-            )
-
-    def __call__(self, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Return 1 for each eigenvalue in the band, and 0 outside."""
-        inside = (eigenvalues >= self.low) & (eigenvalues <= self.high)
-        return np.asarray(inside, dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class HeatFilter:
-    """A filter that lets heat flow for some time: the factor of eigenvalue λ is exp(-tλ).
-
-    Parameters
-    ----------
-    t : float
-        Diffusion time, in length², > 0.
-
-    Raises
-    ------
-    InvalidParameterError
-        If the time is not positive and finite.
-
-    See Also
-    --------
-    filter_values, smooth_mesh : Apply a filter.
-
-    Examples
-    --------
-    >>> import numpy as np, eigenshape as es
-    >>> es.spectral.HeatFilter(0.5)(np.array([0.0, 2.0])).round(3).tolist()
-    [1.0, 0.368]
-    """
-
-    t: float
-
-    _repr_html_ = html_repr
-
-    def __post_init__(self) -> None:
-        positive_values(self.t, "t")
-
-    def __call__(self, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Return exp(-tλ) for each eigenvalue λ."""
-        return exponential_decay(eigenvalues, self.t)[:, 0]
 
 
 @one_blas_thread()
@@ -161,8 +41,10 @@ def filter_values(
     spectrum : Spectrum
         k eigenpairs on n points.
     response : callable
-        r: takes the (k,) eigenvalues, in 1/length², and returns (k,) factors. `LowPass`, `BandPass`
-        and `HeatFilter` are such callables, and any function of yours may be one.
+        r: takes the (k,) eigenvalues, in 1/length², and returns (k,) factors, or True for what is
+        kept. A low-pass filter is lambda values: values <= cutoff, and the flow of heat for a time
+        t is lambda values: np.exp(-t * values). On a surface of area A about A·cutoff/4π
+        eigenvalues lie below a cutoff (Weyl's law).
     keep_rest : bool
         What lies outside the k eigenvectors is removed by default. If True it is kept as it is, so
         that a filter can change low frequencies without loss of detail.
@@ -190,7 +72,7 @@ def filter_values(
     >>> mesh = es.icosphere(3)
     >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 100)
     >>> noise = np.random.default_rng(0).standard_normal(mesh.n_vertices)
-    >>> slow = es.spectral.filter_values(noise, spectrum, es.spectral.LowPass(12.5))
+    >>> slow = es.spectral.filter_values(noise, spectrum, lambda values: values <= 12.5)
     >>> bool(np.ptp(slow) < np.ptp(noise) / 3)
     True
 
@@ -204,7 +86,7 @@ def filter_values(
     functions = point_functions(values, "values", len(spectrum.eigenvectors))
     if not callable(response):
         raise InvalidParameterError(
-            "response must be a function of the eigenvalues, such as es.spectral.LowPass(cutoff); "
+            "response must be a function of the eigenvalues, such as lambda values: values <= cutoff; "
             f"it is {describe_value(response)}."
         )
     factors = _factors(response, spectrum.eigenvalues)
@@ -288,8 +170,9 @@ def smooth_mesh(
     >>> import eigenshape as es
     >>> mesh = es.make_creature("quadruped", n_vertices=500)
     >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 100)
-    >>> heat = es.spectral.HeatFilter(0.002 * es.geometry.surface_area(mesh))
-    >>> smooth = es.spectral.smooth_mesh(mesh, spectrum, heat, keep_volume=True)
+    >>> smooth = es.spectral.smooth_mesh(
+    ...     mesh, spectrum, lambda values: values <= 20.0, keep_volume=True
+    ... )
     >>> volumes = [es.geometry.enclosed_volume(each) for each in (mesh, smooth)]
     >>> bool(abs(volumes[1] / volumes[0] - 1) < 1e-12)
     True

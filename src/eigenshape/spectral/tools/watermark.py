@@ -1,9 +1,9 @@
 """Watermarks in the low frequencies of a shape (after Ohbuchi, Mukaiyama and Takahashi 2002)."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import shake_256
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -146,14 +146,32 @@ def embed_watermark(
     return TriangleMesh((points + size * (basis @ pattern)) * scale, mesh.faces)
 
 
+@overload
 def detect_watermark(
     original: MeshLike,
     suspect: MeshLike,
     key: Key,
     *,
+    k: Integer = ...,
+    cache: str | Path | None = ...,
+) -> WatermarkTest: ...
+@overload
+def detect_watermark(
+    original: MeshLike,
+    suspect: MeshLike,
+    key: list[Key] | tuple[Key, ...],
+    *,
+    k: Integer = ...,
+    cache: str | Path | None = ...,
+) -> tuple[WatermarkTest, ...]: ...
+def detect_watermark(
+    original: MeshLike,
+    suspect: MeshLike,
+    key: Key | list[Key] | tuple[Key, ...],
+    *,
     k: Integer = DEFAULT_MODES,
     cache: str | Path | None = None,
-) -> WatermarkTest:
+) -> WatermarkTest | tuple[WatermarkTest, ...]:
     """Test whether a mesh carries the watermark of a key, with the unmarked original at hand.
 
     The suspect is moved, turned and scaled onto the original (Umeyama 1991). The score is the
@@ -174,13 +192,15 @@ def detect_watermark(
         The mesh that was given to `embed_watermark`.
     suspect : MeshLike
         A mesh with the same vertices in the same order; its faces do not matter.
-    key : str or bytes
+    key : str or bytes, or a list of them
+        With many keys, as to find who passed a copy on, multiply the false-alarm probability of the
+        best by their number.
     k, cache
         As given to `embed_watermark`.
 
     Returns
     -------
-    WatermarkTest
+    WatermarkTest, or a tuple with one for each key
         If the suspect is the original itself, the score is 0 and the false-alarm probability 1.
 
     Raises
@@ -192,55 +212,19 @@ def detect_watermark(
         If `robust_laplacian` cannot be built on the original, or all vertices of the suspect
         coincide.
 
-    See Also
-    --------
-    detect_watermarks : Test many keys at once.
-    """
-    return detect_watermarks(original, suspect, [key], k=k, cache=cache)[0]
-
-
-def detect_watermarks(
-    original: MeshLike,
-    suspect: MeshLike,
-    keys: Sequence[Key],
-    *,
-    k: Integer = DEFAULT_MODES,
-    cache: str | Path | None = None,
-) -> tuple[WatermarkTest, ...]:
-    """Test which of many keys a mesh carries, as to find who passed a copy on.
-
-    If q keys are tested, multiply the false-alarm probability of the best by q.
-
-    Parameters
-    ----------
-    original, suspect : MeshLike
-        As for `detect_watermark`.
-    keys : sequence of str or bytes
-    k, cache
-        As given to `embed_watermark`.
-
-    Returns
-    -------
-    tuple of WatermarkTest
-        One for each key.
-
-    Raises
-    ------
-    InvalidParameterError, InvalidShapeError
-        As for `detect_watermark`.
-
     Examples
     --------
     >>> import eigenshape as es
     >>> ball = es.icosphere(3)
     >>> copy = es.spectral.embed_watermark(ball, "copy 2", k=50)
     >>> keys = [f"copy {number}" for number in range(4)]
-    >>> tests = es.spectral.detect_watermarks(ball, copy, keys, k=50)
+    >>> tests = es.spectral.detect_watermark(ball, copy, keys, k=50)
     >>> [test.false_alarm < 1e-6 for test in tests]
     [False, False, True, False]
     """
     mesh, other = as_mesh(original, "original"), as_mesh(suspect, "suspect")
-    secrets = [_require_key(key) for key in keys]
+    keys = key if isinstance(key, list | tuple) else [key]
+    secrets = [_require_key(each) for each in keys]
     if other.n_vertices != mesh.n_vertices:
         raise InvalidParameterError(
             "The suspect must have the vertices of the original, in the same order; it has "
@@ -261,7 +245,7 @@ def detect_watermarks(
             score = float((pattern * found).sum() / (np.linalg.norm(pattern) * length))
         chance = _exceedance(score, dimension) if length > 0 else 1.0
         tests.append(WatermarkTest(score, chance, dimension))
-    return tuple(tests)
+    return tuple(tests) if isinstance(key, list | tuple) else tests[0]
 
 
 def _require_key(key: object) -> bytes:

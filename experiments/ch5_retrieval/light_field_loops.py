@@ -1,18 +1,14 @@
 """Compiled loops of `light_field`: silhouettes, moments, outlines, pairings of views."""
 
-from typing import no_type_check
-
 import numpy as np
-
-from eigenshape._compile import njit
+from numba import njit
 
 # The eight neighbors of a pixel, row and column, clockwise from the left
 ROW = np.array([0, -1, -1, -1, 0, 1, 1, 1])
 COLUMN = np.array([-1, -1, 0, 1, 1, 1, 0, -1])
 
 
-@njit
-@no_type_check
+@njit(nogil=True, cache=True)
 def silhouette(points, faces, size, slack, thinnest):
     """Return which pixel centers of a square picture lie in a face; points are in pixels."""
     image = np.zeros((size, size), dtype=np.bool_)
@@ -38,8 +34,7 @@ def silhouette(points, faces, size, slack, thinnest):
     return image
 
 
-@njit
-@no_type_check
+@njit(nogil=True, cache=True)
 def power_sums(x, y, order):
     """Return the sums of z^m |z|^2j over points z = x + iy, for m + 2j up to the order."""
     sums = np.zeros((order + 1, order // 2 + 1), dtype=np.complex128)
@@ -56,8 +51,7 @@ def power_sums(x, y, order):
     return sums
 
 
-@njit
-@no_type_check
+@njit(nogil=True, cache=True)
 def outline(image, row, column):
     """Return the rows and columns of the pixels passed by Moore's boundary tracing, clockwise.
 
@@ -90,8 +84,7 @@ def outline(image, row, column):
     return path[:length].copy()
 
 
-@njit
-@no_type_check
+@njit(nogil=True, cache=True)
 def least_difference(first, second, pairings):
     """Return the least sum of L1 distances of paired views, over light fields and pairings.
 

@@ -1,13 +1,21 @@
+"""Methods of deformation that chapter 6 compares with."""
+
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
-from bent_shapes import lump, lump_rig, tube, tube_rig
 
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.peers import as_rigid_as_possible, biharmonic_blend, spectral_rigid
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "experiments" / "ch6_deformation"), str(ROOT / "tests" / "deformation")]
+from bent_shapes import lump, lump_rig, tube, tube_rig  # noqa: E402
+from peers import as_rigid_as_possible, biharmonic_blend, spectral_rigid  # noqa: E402
 
 PEERS = [as_rigid_as_possible, biharmonic_blend, spectral_rigid]
 TURN, PULL = Rotation([0.6, 0, 0], [0, 1, 2], 0.8), Translation([0, 0.3, 0])

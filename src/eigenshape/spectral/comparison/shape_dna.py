@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -23,7 +22,7 @@ def shape_dna(mesh: MeshLike, n_values: SupportsIndex | None = None) -> Float[np
     normalizations in the paper this one keeps the first eigenvalue as a number of its own; a
     division by it would spread its error over all others. The division by the rank i is the
     authors' later advice: by Weyl's law A λ_i / i tends to 4π, and without it the highest, least
-    certain eigenvalues would dominate the distance.
+    certain eigenvalues would dominate the Euclidean distance, by which shapes are compared.
 
     Here i counts from 1 at the first eigenvalue above 0. LaPy's `reweight_ev` counts from 1 at the
     first of its list, which `compute_shapedna` begins with the eigenvalue 0, so it divides this λ_i
@@ -51,7 +50,7 @@ def shape_dna(mesh: MeshLike, n_values: SupportsIndex | None = None) -> Float[np
 
     See Also
     --------
-    shape_dna_distance, compare_spectra
+    compare_spectra : All eigenvalues of two spectra, side by side.
 
     References
     ----------
@@ -63,7 +62,7 @@ def shape_dna(mesh: MeshLike, n_values: SupportsIndex | None = None) -> Float[np
     The unit sphere has area 4π and eigenvalues 2, 2, 2, 6, ...
 
     >>> import eigenshape as es
-    >>> es.retrieval.baselines.shape_dna(es.icosphere(4), n_values=3).round(0)
+    >>> es.spectral.shape_dna(es.icosphere(4), n_values=3).round(0)
     array([25., 13.,  8.])
     """
     mesh = as_mesh(mesh)
@@ -73,45 +72,3 @@ def shape_dna(mesh: MeshLike, n_values: SupportsIndex | None = None) -> Float[np
     laplacian = cotangent_laplacian(mesh)
     values = solve_spectrum(laplacian, count + 1).eigenvalues[1:]
     return values * float(laplacian.mass.sum()) / np.arange(1, count + 1)
-
-
-def shape_dna_distance(first: Float[np.ndarray, " k"], second: Float[np.ndarray, " j"]) -> float:
-    """Return the Euclidean distance of two descriptors of `shape_dna`.
-
-    Parameters
-    ----------
-    first, second : (k,) float
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InvalidParameterError
-        If one has more numbers than the other.
-
-    See Also
-    --------
-    shape_dna
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> baselines = es.retrieval.baselines
-    >>> shapes = es.icosphere(2), es.shapes.torus(20, 10)
-    >>> one, two = (baselines.shape_dna(mesh) for mesh in shapes)
-    >>> baselines.shape_dna_distance(one, one), baselines.shape_dna_distance(one, two) > 5
-    (0.0, True)
-    """
-    require_same_length(first, second)
-    return float(np.linalg.norm(first - second))
-
-
-def require_same_length(first: Float[np.ndarray, " k"], second: Float[np.ndarray, " j"]) -> None:
-    """Raise an error if two lists of eigenvalues differ in length."""
-    if len(first) != len(second):
-        raise InvalidParameterError(
-            f"Only equal numbers of eigenvalues compare; the first shape has {len(first)}, the "
-            f"second {len(second)}. Pass the same n_values for both."
-        )

@@ -1,3 +1,8 @@
+"""LFD, a method that the thesis compares with."""
+
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -5,10 +10,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.retrieval.baselines import light_fields as lf
-from eigenshape.retrieval.baselines.light_field_loops import outline, power_sums, silhouette
 from eigenshape.scans.raster import EDGE_SLACK, LEAST_DOUBLED_AREA, rasterize
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[2] / "experiments" / "ch5_retrieval")]
+import light_fields as lf  # noqa: E402
+from light_field_loops import outline, power_sums, silhouette  # noqa: E402
 
 few = settings(deadline=None, max_examples=8)
 HAND, ANT = es.make_creature("hand", n_vertices=800), es.make_creature("quadruped", n_vertices=800)
@@ -119,12 +125,10 @@ def test_a_turn_of_the_dodecahedron_is_no_difference():
     turn = Rotation.from_rotvec(2 * np.pi / 3 * lf._axes()[4]).as_matrix()
     turned = es.TriangleMesh(HAND.vertices @ turn.T, HAND.faces)
     one, two, other = (lf.light_field(mesh, n_fields=1) for mesh in (HAND, turned, ANT))
-    assert es.retrieval.baselines.light_field_distance(one, one) == 0
-    assert es.retrieval.baselines.light_field_distance(
-        one, two
-    ) < 0.05 * es.retrieval.baselines.light_field_distance(one, other)
-    assert es.retrieval.baselines.light_field_distance(one, other) == pytest.approx(
-        es.retrieval.baselines.light_field_distance(other, one), rel=1e-12
+    assert lf.light_field_distance(one, one) == 0
+    assert lf.light_field_distance(one, two) < 0.05 * lf.light_field_distance(one, other)
+    assert lf.light_field_distance(one, other) == pytest.approx(
+        lf.light_field_distance(other, one), rel=1e-12
     )
 
 
@@ -133,44 +137,22 @@ def test_a_turn_of_the_dodecahedron_is_no_difference():
 def test_any_turn_is_less_than_another_shape(seed):
     turn = Rotation.random(random_state=seed).as_matrix()
     turned = es.TriangleMesh(HAND.vertices @ turn.T, HAND.faces)
-    one, two, other = (
-        es.retrieval.baselines.light_field(mesh, n_fields=4, size=96)
-        for mesh in (HAND, turned, ANT)
-    )
-    assert es.retrieval.baselines.light_field_distance(
-        one, two
-    ) < 0.5 * es.retrieval.baselines.light_field_distance(one, other)
+    one, two, other = (lf.light_field(mesh, n_fields=4, size=96) for mesh in (HAND, turned, ANT))
+    assert lf.light_field_distance(one, two) < 0.5 * lf.light_field_distance(one, other)
 
 
 @few
-@given(st.floats(-100, 100), st.integers(0, 2**32 - 1))
+@given(st.floats(-30, 30), st.integers(0, 2**32 - 1))
 def test_size_and_place_drop_out(power, seed):
     place = np.random.default_rng(seed).standard_normal(3)
     moved = es.TriangleMesh(10.0**power * (HAND.vertices + place), HAND.faces)
-    one, two = (
-        es.retrieval.baselines.light_field(mesh, n_fields=1, size=96) for mesh in (HAND, moved)
-    )
+    one, two = (lf.light_field(mesh, n_fields=1, size=96) for mesh in (HAND, moved))
     # A pixel at the very edge may fall to the other side by rounding.
     np.testing.assert_allclose(two, one, atol=0.01)
 
 
 def test_a_flat_shape_may_show_nothing():
-    found = es.retrieval.baselines.light_field(
+    found = lf.light_field(
         es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), n_fields=1, size=32
     )
     assert np.isfinite(found).all()
-
-
-def test_bad_input_is_named():
-    with pytest.raises(
-        InvalidShapeError, match="A shape must have area to be seen; all 1 faces have none"
-    ):
-        es.retrieval.baselines.light_field(
-            es.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
-        )
-    with pytest.raises(InvalidParameterError, match=r"n_fields must lie in 1\.\.100; it is 0"):
-        es.retrieval.baselines.light_field(HAND, n_fields=0)
-    with pytest.raises(InvalidParameterError, match=r"size must lie in 16\.\.4096; it is 8"):
-        es.retrieval.baselines.light_field(HAND, size=8)
-    with pytest.raises(InvalidParameterError, match="A light field must have shape"):
-        es.retrieval.baselines.light_field_distance(np.zeros((1, 10, 45)), np.zeros((1, 10, 44)))
