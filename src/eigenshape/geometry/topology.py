@@ -93,6 +93,13 @@ def face_pairs(table: EdgeTable) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray
     return np.column_stack([order[first], order[first + 1]]) // 3, at_edge[order[first]]
 
 
+def neighbor_links(mesh: TriangleMesh) -> sp.csr_array:
+    """Return the symmetric matrix with a 1 for each two vertices that an edge connects."""
+    edges = edge_table(mesh).edges
+    links = sp.coo_array((np.ones(len(edges)), edges.T), shape=(mesh.n_vertices,) * 2).tocsr()
+    return links + links.T
+
+
 def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:
     """Return the directed edges of all faces: those opposite to corner 0 first, then 1, then 2."""
     a, b, c = mesh.faces.T

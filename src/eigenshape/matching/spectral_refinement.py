@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.matching.refinement_loops import nearest_face_points
+from eigenshape.matching.match_loops import nearest_face_points
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.solve import solve_spectrum
 
@@ -58,9 +58,22 @@ def refine_places(
         if wanted >= len(whole.eigenvalues):
             break
     theirs = np.ascontiguousarray(whole.functions[:, : smooth.shape[1]])
+    return places_in_faces(mesh, theirs, smooth, places)
+
+
+def places_in_faces(
+    mesh: TriangleMesh,
+    corners: Float[np.ndarray, "n k"],
+    points: Float[np.ndarray, "p k"],
+    vertices: Int[np.ndarray, " p"],
+) -> tuple[Int[np.ndarray, " p"], Float[np.ndarray, "p 3"]]:
+    """Return the face at a given vertex that is nearest to each point, and the weights in it.
+
+    Points and vertices are compared in k dimensions, whichever they are.
+    """
     order = np.argsort(mesh.faces.ravel(), kind="stable")
     starts = np.searchsorted(mesh.faces.ravel()[order], np.arange(mesh.n_vertices + 1))
-    return nearest_face_points(smooth, theirs, mesh.faces, starts, order // 3, places)
+    return nearest_face_points(points, corners, mesh.faces, starts, order // 3, vertices)
 
 
 def smooth_places(
