@@ -6,17 +6,18 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation import graded_bend
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend, deform, require_mode
-from eigenshape.deformation.details import (
-    blend_details,
-    frame_details,
-    turn_by_frames,
-    turn_by_handles,
-)
 from eigenshape.deformation.graded_bend import move_by_shares
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import region_boundary
 from eigenshape.deformation.rig import eigen_skeleton, rig_shape
-from eigenshape.deformation.skeleton import move_skeleton, skeleton_response
+from eigenshape.deformation.thesis import (
+    blend_details,
+    frame_details,
+    move_skeleton,
+    skeleton_response,
+    turn_by_frames,
+    turn_by_handles,
+)
 from eigenshape.geometry.distances.crossings import self_intersections
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh

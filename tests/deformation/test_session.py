@@ -13,7 +13,7 @@ from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import BoxRegion, BrushRegion
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import DeformationSession, replay
-from eigenshape.deformation.skeleton import move_skeleton
+from eigenshape.deformation.thesis import move_skeleton
 from eigenshape.geometry.resolution.subdivision import subdivide
 
 HEAD = np.flatnonzero(lump().vertices[:, 0] > 0.6)
