@@ -7,7 +7,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.plot import fields, poses, sheet, stability
+from eigenshape.plot import fields, poses, shape_pairs, sheet
 from eigenshape.plot.camera import aim_camera, in_picture, three_quarter_view
 from eigenshape.plot.fields import figure_field, figure_segments
 from eigenshape.plot.poses import figure_poses
@@ -114,7 +114,7 @@ def test_every_picture_of_a_classic_shape_shows_it_upright(data, name, down, mon
     """Whichever figure draws it, and without being told which axis is up."""
     mesh = read_mesh(data / "classics" / name)
     views = []
-    for module in (fields, poses, sheet, stability):
+    for module in (fields, poses, sheet, shape_pairs):
         monkeypatch.setattr(
             module,
             "draw",

@@ -1,7 +1,7 @@
 """The direction of the view, and where the points of a shape lie in the picture."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -37,7 +37,7 @@ View = TypeAliasType(
     ]
     | ArrayLike,
 )
-UP_NAMES = ("auto", "x", "y", "z", "-x", "-y", "-z")
+UP_NAMES = get_args(get_args(Up)[0])
 # The parts of front, left and up in the direction to the viewer, for each name of a view. Views of
 # two words are a little from above.
 VIEWS = {
@@ -269,66 +269,27 @@ def _guess_front(
     mesh: TriangleMesh, upward: Float[np.ndarray, "3"]
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """Return the level direction of the front, and the direction to the viewer of the usual view."""
-    # The axis after the upward one, made level where the upward direction is oblique.
+    # An open surface that mostly faces one way is a scan, and its front is where the scanner stood.
+    points = scale_to_unit(mesh)[0]
+    vectors = area_vectors(points[mesh.faces])
+    areas, tiny = np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny
+    facing = vectors.sum(axis=0) / max(areas.sum(), tiny)
+    is_scan = np.linalg.norm(facing) > ONE_WAY
+    if is_scan and np.linalg.norm(np.cross(upward, facing)) > 0.1:
+        level = facing - (facing @ upward) * upward
+        return level / np.linalg.norm(level), facing
+
+    # Else the axis after the upward one, made level where the upward direction is oblique; or the
+    # opposite side, if a viewer sees clearly more bending there.
     front = np.eye(3)[(int(np.abs(upward).argmax()) + 1) % 3]
     front = front - (front @ upward) * upward
     front = front / np.linalg.norm(front)
-    facing = _facing(mesh)
-    if facing is not None and np.linalg.norm(np.cross(upward, facing)) > 0.1:
-        level = facing - (facing @ upward) * upward
-        return level / np.linalg.norm(level), facing
-    parts = np.array(VIEWS["front-left"])
-    towards = parts @ [front, np.cross(upward, front), upward]
-    behind = parts @ [-front, -np.cross(upward, front), upward]
-    before, after = _sum_visible_bending(mesh, np.stack([towards, behind]))
-    if before < LESS * after:
-        return -front, behind
-    return front, towards
-
-
-def _upright_axis(mesh: TriangleMesh) -> Literal["y", "z"]:
-    points = scale_to_unit(mesh)[0]
-    areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
-    weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
-    center = weights @ points[mesh.faces].mean(axis=1)
-    along_y, along_z = (_base(points - center, axis) for axis in (1, 2))
-    falls_along_y = not _surrounds_origin(along_y)
-    wider_along_z = _hull_area(along_z) > WIDER * _hull_area(along_y)
-    return "z" if falls_along_y and _surrounds_origin(along_z) and wider_along_z else "y"
-
-
-def _base(points: Float[np.ndarray, "n 3"], axis: int) -> Float[np.ndarray, "k 2"]:
-    """Return where the lowest points would touch the ground."""
-    height = points[:, axis] - points[:, axis].min()
-    return np.delete(points, axis, axis=1)[height <= SOLE * np.ptp(points, axis=0).max()]
-
-
-def _surrounds_origin(points: Float[np.ndarray, "k 2"]) -> bool:
-    """Say whether the origin lies inside the convex hull: what stands on these points does not fall over."""
-    around = np.sort(np.arctan2(points[:, 1], points[:, 0]))
-    gaps = np.diff(around, append=around[0] + 2 * np.pi)
-    return bool(gaps.max() < np.pi)
-
-
-def _hull_area(points: Float[np.ndarray, "k 2"]) -> float:
-    try:
-        return float(ConvexHull(points).volume)
-    except QhullError:  # fewer than three points, or all on a line
-        return 0.0
-
-
-def _sum_visible_bending(
-    mesh: TriangleMesh, directions: Float[np.ndarray, "d 3"]
-) -> Float[np.ndarray, " d"]:
-    """Sum the bending that a viewer sees, for each direction towards a viewer.
-
-    The bending of an edge is its angle times its length, weighted by how far it faces the viewer.
-    """
-    points = scale_to_unit(mesh)[0]
-    vectors = area_vectors(points[mesh.faces])
-    normals = (
-        vectors / np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny)[:, None]
+    left = np.cross(upward, front)
+    towards, behind = (
+        np.array(VIEWS["front-left"]) @ [side * front, side * left, upward] for side in (1, -1)
     )
+    # The bending of an edge is its angle times its length, weighted by how far it faces the viewer.
+    normals = vectors / np.maximum(areas, tiny)[:, None]
     if np.einsum("ij,ij->", vectors, points[mesh.faces].mean(axis=1)) < 0:
         normals = -normals  # the faces look inward
     table = edge_table(mesh)
@@ -336,17 +297,32 @@ def _sum_visible_bending(
     one, two = normals[pairs].transpose(1, 0, 2)
     angles = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1, 1))
     begin, end = points[table.edges[edges]].transpose(1, 0, 2)
-    lengths = np.linalg.norm(end - begin, axis=1)
-    return (angles * lengths) @ np.maximum((one + two) @ directions.T, 0)
+    bending = angles * np.linalg.norm(end - begin, axis=1)
+    viewers = np.stack([towards, behind])
+    before, after = bending @ np.maximum((one + two) @ viewers.T, 0)
+    return (-front, behind) if before < LESS * after else (front, towards)
 
 
-def _facing(mesh: TriangleMesh) -> Float[np.ndarray, "3"] | None:
-    """Return the mean normal of an open surface that mostly faces one way."""
-    vectors = area_vectors(scale_to_unit(mesh)[0][mesh.faces])
-    mean = vectors.sum(axis=0) / max(
-        np.linalg.norm(vectors, axis=1).sum(), np.finfo(np.float64).tiny
-    )
-    return mean if np.linalg.norm(mean) > ONE_WAY else None
+def _upright_axis(mesh: TriangleMesh) -> Literal["y", "z"]:
+    """Return z if a shape would fall over along y and would stand on a much larger base along z."""
+    points = scale_to_unit(mesh)[0]
+    areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
+    weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
+    points = points - weights @ points[mesh.faces].mean(axis=1)
+    stands, sizes = [], []
+    for axis in (1, 2):
+        # Where the lowest points would touch the ground
+        height = points[:, axis] - points[:, axis].min()
+        lowest = height <= SOLE * np.ptp(points, axis=0).max()
+        base = np.delete(points, axis, axis=1)[lowest]
+        # What stands on points around its center does not fall over.
+        around = np.sort(np.arctan2(base[:, 1], base[:, 0]))
+        stands.append(np.diff(around, append=around[0] + 2 * np.pi).max() < np.pi)
+        try:
+            sizes.append(float(ConvexHull(base).volume))
+        except QhullError:  # fewer than three points, or all on a line
+            sizes.append(0.0)
+    return "z" if stands[1] and not stands[0] and sizes[1] > WIDER * sizes[0] else "y"
 
 
 def in_picture(mesh: TriangleMesh, camera: Camera) -> Float[np.ndarray, "n 3"]:

@@ -12,7 +12,7 @@ from eigenshape.cli.console import err, escape_text, print_written
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.mesh_files import WITH_ATTRIBUTES, WRITTEN, read_mesh, save_mesh
-from eigenshape.plot.save import require_picture_path, save_figure
+from eigenshape.plot.figure import require_picture_path, save_figure
 
 
 def require_picture(path: Path | None) -> None:

@@ -18,8 +18,8 @@ from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.catalog import default_operator
 from eigenshape.operators.fem import fem_boundary_nodes
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.plot.eigenvalues import figure_spectrum
 from eigenshape.plot.fields import figure_eigenfunctions
-from eigenshape.plot.spectra import figure_spectrum
 from eigenshape.spectral.bounds.brackets import Brackets
 from eigenshape.spectral.spectrum import Spectrum
 

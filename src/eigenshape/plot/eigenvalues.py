@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from eigenshape._arguments import require_type
@@ -69,26 +68,13 @@ def figure_spectrum(
     number = proof.first + np.arange(len(spectrum.eigenvalues))
     if brackets is not None:
         lower, upper = brackets.lower[number], brackets.upper[number]
-        axes.vlines(
-            number, lower, upper, color="#f2b36b", lw=3, label="bracket of the shape's eigenvalue"
-        )
-    axes.plot(
-        number,
-        spectrum.eigenvalues,
-        ".",
-        color="#1f77b4",
-        markersize=5,
-        label="eigenvalues of the operator",
-    )
+        label = "bracket of the shape's eigenvalue"
+        axes.vlines(number, lower, upper, color="#f2b36b", lw=3, label=label)
+    label = "eigenvalues of the operator"
+    axes.plot(number, spectrum.eigenvalues, ".", color="#1f77b4", markersize=5, label=label)
     if area is not None:
-        axes.plot(
-            number,
-            4 * np.pi * number / area,
-            "-",
-            color="#999999",
-            lw=1,
-            label="Weyl's law, 4π i / area",
-        )
+        weyl, label = 4 * np.pi * number / area, "Weyl's law, 4π i / area"
+        axes.plot(number, weyl, "-", color="#999999", lw=1, label=label)
     ends = [end for end in (proof.floor, proof.shift) if np.isfinite(end)]
     if proof.complete and ends:
         label = "none is missing below" if len(ends) == 1 else "none is missing between"
@@ -173,13 +159,38 @@ def draw_comparison(
 
 
 def _draw_rows(panels: np.ndarray, rows: list[_Row], unit: str) -> None:
+    """Draw eigenvalues by number, and below them relative differences from the first row."""
     above, below = panels
     colors = palette(np.arange(len(rows)))
     for row, color in zip(rows, colors, strict=True):
-        _draw_spectrum(above, row, color)
-    _draw_differences(below, rows, colors)
+        number = np.arange(len(row.values))
+        if row.intervals is not None:
+            width, label = (3, f"{row.title}: bracket") if row.bracketed else (1, "_")
+            bars = above.vlines(number, *row.intervals.T, color=color, lw=width, label=label)
+            bars.set_alpha(0.35)
+        above.plot(number, row.values, ".-", color=color, markersize=3.5, lw=0.8, label=row.title)
     above.set_ylabel(f"eigenvalue λ, {unit}")
     above.legend(frameon=False, loc="upper left", fontsize=9)
+
+    changes = []
+    for other in rows[1:]:
+        k = min(len(rows[0].values), len(other.values))
+        values, zero = zip(
+            *((row.values[:k], row.zero[:k]) for row in (rows[0], other)), strict=True
+        )
+        change = relative_change(*values, zero=zero)
+        changes.append(np.where(np.isfinite(change), change, np.nan))
+    # On a logarithmic axis where they span decades
+    seen = np.concatenate([change[change > FAINT] for change in changes])
+    logarithmic = seen.size and np.ptp(np.log10(seen)) > DECADES
+    for change, color in zip(changes, colors[1:], strict=True):
+        drawn = np.where(change > FAINT, change, np.nan) if logarithmic else change
+        below.plot(np.arange(len(drawn)), drawn, ".-", color=color, markersize=3.5, lw=0.8)
+    if logarithmic:
+        below.set_yscale("log")
+    else:
+        below.set_ylim(bottom=0)
+    below.set_ylabel(f"relative difference\nfrom {rows[0].title}")
     below.set_xlabel("number i")
     for axes in (above, below):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -202,56 +213,18 @@ def _rows(
         raise InvalidParameterError(
             f"The titles of brackets must be titles of spectra, {list(spectra)}; one is {unknown[0]!r}."
         )
-    return [_row(title, spectrum, brackets.get(title)) for title, spectrum in spectra.items()]
-
-
-def _row(title: str, spectrum: Spectrum | ArrayLike, brackets: Brackets | None) -> _Row:
-    if isinstance(spectrum, Spectrum):
-        require_lowest(spectrum, title)
-        values = spectrum.eigenvalues
-        intervals = within_residuals(spectrum, len(values))
-        zero = intervals[:, 0] <= 0
-    else:
-        values, intervals = finite_values(spectrum, title), None
-        zero = count_as_zero(values)
-    if brackets is not None:
-        intervals = within_brackets(brackets, len(values), title)
-    return _Row(title, values, zero, intervals, brackets is not None)
-
-
-def _draw_spectrum(axes: Axes, row: _Row, color: Float[np.ndarray, "3"]) -> None:
-    number = np.arange(len(row.values))
-    if row.intervals is not None:
-        bars = f"{row.title}: bracket" if row.bracketed else "_"
-        axes.vlines(
-            number,
-            *row.intervals.T,
-            color=color,
-            lw=3 if row.bracketed else 1,
-            alpha=0.35,
-            label=bars,
-        )
-    axes.plot(number, row.values, ".-", color=color, markersize=3.5, lw=0.8, label=row.title)
-
-
-def _draw_differences(axes: Axes, rows: list[_Row], colors: Float[np.ndarray, "r 3"]) -> None:
-    """Draw relative differences from the first row, on a logarithmic axis where they span decades."""
-    changes = [_differences(rows[0], row) for row in rows[1:]]
-    seen = np.concatenate([change[change > FAINT] for change in changes])
-    logarithmic = seen.size and np.ptp(np.log10(seen)) > DECADES
-    for change, color in zip(changes, colors[1:], strict=True):
-        drawn = np.where(change > FAINT, change, np.nan) if logarithmic else change
-        axes.plot(np.arange(len(drawn)), drawn, ".-", color=color, markersize=3.5, lw=0.8)
-    if logarithmic:
-        axes.set_yscale("log")
-    else:
-        axes.set_ylim(bottom=0)
-    axes.set_ylabel(f"relative difference\nfrom {rows[0].title}")
-
-
-def _differences(first: _Row, other: _Row) -> Float[np.ndarray, " k"]:
-    k = min(len(first.values), len(other.values))
-    change = relative_change(
-        first.values[:k], other.values[:k], zero=(first.zero[:k], other.zero[:k])
-    )
-    return np.where(np.isfinite(change), change, np.nan)
+    rows = []
+    for title, spectrum in spectra.items():
+        intervals: Float[np.ndarray, "k 2"] | None = None
+        if isinstance(spectrum, Spectrum):
+            require_lowest(spectrum, title)
+            values = spectrum.eigenvalues
+            intervals = within_residuals(spectrum, len(values))
+            zero = intervals[:, 0] <= 0
+        else:
+            values = finite_values(spectrum, title)
+            zero = count_as_zero(values)
+        if title in brackets:
+            intervals = within_brackets(brackets[title], len(values), title)
+        rows.append(_Row(title, values, zero, intervals, title in brackets))
+    return rows

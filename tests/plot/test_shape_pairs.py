@@ -4,7 +4,7 @@ import pytest
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.matching.match import match_shapes
-from eigenshape.plot.matches import figure_match, place_colors
+from eigenshape.plot.shape_pairs import figure_match, place_colors
 
 pytestmark = pytest.mark.long
 
