@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Int
-from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
-from eigenshape.geometry.facets import boundary_facets, facet_table
+from eigenshape.geometry.facet_lists import label_components, shared_facets
+from eigenshape.geometry.facets import boundary_facets, corner_fans, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
 
@@ -87,10 +87,8 @@ def face_pairs(table: EdgeTable) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray
 
     More than two faces at one edge give the pairs of a chain through all of them.
     """
-    at_edge = table.face_edges.ravel()
-    order = np.argsort(at_edge, kind="stable")
-    first = np.flatnonzero(at_edge[order][1:] == at_edge[order][:-1])
-    return np.column_stack([order[first], order[first + 1]]) // 3, at_edge[order[first]]
+    one, two = shared_facets(table.face_edges)
+    return np.column_stack([one, two]) // 3, table.face_edges.ravel()[one]
 
 
 def neighbor_links(mesh: TriangleMesh) -> sp.csr_array:
@@ -134,11 +132,9 @@ def vertex_components(mesh: MeshLike) -> tuple[int, Int[np.ndarray, " n"]]:
     (2, [0, 0, 0, 0, 1, 1, 1, 1])
     """
     mesh = as_simplicial(mesh)
-    corners = mesh.simplices
-    ends = np.column_stack([np.repeat(corners[:, 0], mesh.dim), corners[:, 1:].ravel()])
-    graph = sp.coo_array((np.ones(len(ends), dtype=np.int8), ends.T), shape=(mesh.n_points,) * 2)
-    count, labels = connected_components(graph, directed=False)
-    return int(count), labels.astype(np.int64)
+    # A simplex is connected if its first corner is linked to each other one.
+    first, others = mesh.simplices[:, 0], mesh.simplices[:, 1:]
+    return label_components(mesh.n_points, np.repeat(first, mesh.dim), others.ravel())
 
 
 def unreferenced_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
@@ -337,34 +333,8 @@ def non_manifold_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
 
 def non_manifold_vertices(mesh: TriangleMesh) -> Int[np.ndarray, " k"]:
     """Return the vertices whose faces form more than one fan."""
-    n_fans = np.bincount(_corner_fans(mesh)[1], minlength=mesh.n_vertices)
+    n_fans = np.bincount(corner_fans(mesh)[0], minlength=mesh.n_vertices)
     return np.flatnonzero(n_fans > 1)
-
-
-def _corner_fans(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " k"]]:
-    """Group the corners of faces into fans; return the fan of each corner, and each fan's vertex.
-
-    A fan consists of faces at one vertex that are connected through edges at that vertex.
-    """
-    table, f = edge_table(mesh), mesh.n_faces
-    corners = np.arange(3 * f).reshape(f, 3)
-    at_edge = table.face_edges.ravel()
-    order = np.argsort(at_edge, kind="stable")
-    neighbors = at_edge[order][1:] == at_edge[order][:-1]
-    one, two = order[:-1][neighbors], order[1:][neighbors]
-    links = []
-    for shift_one in (1, 2):
-        for shift_two in (1, 2):
-            a = corners[one // 3, (one + shift_one) % 3]
-            b = corners[two // 3, (two + shift_two) % 3]
-            same = mesh.faces.ravel()[a] == mesh.faces.ravel()[b]
-            links.append(np.stack([a[same], b[same]]))
-    pairs = np.concatenate(links, axis=1)
-    graph = sp.coo_array((np.ones(pairs.shape[1], dtype=np.int8), pairs), shape=(3 * f, 3 * f))
-    count, fan = connected_components(graph, directed=False)
-    vertex = np.empty(count, dtype=np.int64)
-    vertex[fan] = mesh.faces.ravel()
-    return fan.astype(np.int64), vertex
 
 
 def euler_characteristic(mesh: MeshLike) -> int:

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Bool, Complex64, Float, Int
-from scipy.sparse.csgraph import connected_components
 
+from eigenshape.geometry.facet_lists import label_components
 from eigenshape.matching.match_loops import couple_pairs, nearest_rows, place_by_distances
 from eigenshape.matching.surface import Surface, View
 
@@ -223,7 +222,6 @@ def _continuous(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
     agree &= np.isfinite(longest)
     good = 2 * np.bincount(one, weights=agree, minlength=n) >= near.shape[1]
     links = agree & good[one] & good[two]
-    graph = sp.coo_array((np.ones(links.sum()), (one[links], two[links])), shape=(n, n))
-    labels = connected_components(graph, directed=False)[1]
+    _, labels = label_components(n, one[links], two[links])
     sizes = np.bincount(labels[good], minlength=n)
     return pairs.select(good & (labels == sizes.argmax()))

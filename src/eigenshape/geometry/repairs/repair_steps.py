@@ -3,14 +3,13 @@
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.face_turns import turn_faces
+from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import faces_to_turn
@@ -59,9 +58,8 @@ def weld(mesh: MeshT, *, tolerance: float = 0.0) -> RepairedMesh[MeshT]:
         points, _ = size_one(mesh.points)
         points, _ = size_one(points - points.mean(axis=0))
         radius = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
-        group = _group_numbers(
-            cKDTree(points).query_pairs(radius, output_type="ndarray"), mesh.n_points
-        )
+        near = cKDTree(points).query_pairs(radius, output_type="ndarray")
+        _, group = label_components(mesh.n_points, *near.T)
     return _merge_vertices(mesh, group, "weld joined {} to others at the same place")
 
 
@@ -72,7 +70,7 @@ def weld_seams(mesh: MeshT) -> RepairedMesh[MeshT]:
     closed pieces do, stay apart. Only edges on the boundary change: they get two faces or more.
     """
     one, two = seams(mesh).transpose(1, 0, 2).reshape(2, -1)
-    group = _group_numbers(np.column_stack([one, two]), mesh.n_points)
+    _, group = label_components(mesh.n_points, one, two)
     return _merge_vertices(mesh, group, "weld_seams joined {} along seams")
 
 
@@ -81,12 +79,6 @@ def _place_numbers(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
     # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
     _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
     return place.ravel().astype(np.int64)
-
-
-def _group_numbers(pairs: Int[np.ndarray, "k 2"], n: int) -> Int[np.ndarray, " n"]:
-    """Group n points that are linked by pairs; return the number of each point's group."""
-    graph = sp.coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _merge_vertices(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> RepairedMesh[MeshT]:
@@ -139,14 +131,9 @@ def collapse_needles(mesh: MeshT) -> RepairedMesh[MeshT]:
     in_simplex, side = np.nonzero(short)
     if short.any(axis=1).all():
         in_simplex, side = in_simplex[:0], side[:0]
-    ends = np.column_stack(
-        [mesh.simplices[in_simplex, one[side]], mesh.simplices[in_simplex, two[side]]]
-    )
-    joined = _merge_vertices(
-        mesh,
-        _group_numbers(ends, mesh.n_points),
-        "collapse_needles joined {} to others beside them",
-    )
+    starts, ends = mesh.simplices[in_simplex, one[side]], mesh.simplices[in_simplex, two[side]]
+    _, group = label_components(mesh.n_points, starts, ends)
+    joined = _merge_vertices(mesh, group, "collapse_needles joined {} to others beside them")
     ordered = np.sort(joined.mesh.simplices, axis=1)
     collapsed = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1) & short.any(axis=1)
     report = (
