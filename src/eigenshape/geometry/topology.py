@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidShapeError, try_auto
@@ -192,6 +192,13 @@ def repeated_simplices(mesh: Mesh) -> Int[np.ndarray, "k 2"]:
     return pairs[np.argsort(pairs[:, 1])]
 
 
+def number_places(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
+    """Return for each point the number of its place; equal points have the same place."""
+    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
+    _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
+    return place.ravel().astype(np.int64)
+
+
 def seams(mesh: Mesh) -> Int[np.ndarray, "k 2 m"]:
     """Return pairs of boundary facets with corners at the same places but different vertices.
 
@@ -199,9 +206,7 @@ def seams(mesh: Mesh) -> Int[np.ndarray, "k 2 m"]:
     """
     facets = boundary_facets(mesh)
     used, numbers = np.unique(facets, return_inverse=True)
-    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
-    _, place = np.unique(mesh.points[used] + 0.0, axis=0, return_inverse=True)
-    places = place.ravel()[numbers.reshape(facets.shape)]
+    places = number_places(mesh.points[used])[numbers.reshape(facets.shape)]
     by_place = np.argsort(places, axis=1, kind="stable")
     facets, places = (np.take_along_axis(rows, by_place, axis=1) for rows in (facets, places))
     order, _, repeats = sorted_rows(places)

@@ -1,4 +1,6 @@
-"""Nearest points on a surface, winding numbers around points, and signed distance in space."""
+"""Nearest points on a surface, winding numbers around points, and distances in space."""
+
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
@@ -146,13 +148,49 @@ def signed_distance(mesh: MeshLike, points: ArrayLike) -> Float[np.ndarray, " p"
     """
     mesh = as_mesh(mesh)
     corners, places, scale = _scale_both(mesh, points)
-    _require_outward(mesh)
+    # A closed piece, or an open mesh as a whole, must not look inward.
+    require_oriented(mesh)
+    turned, _, _ = faces_to_turn(mesh)
+    if turned.any():
+        raise InvalidShapeError(
+            "Faces must look outward, or inside and outside change places; face "
+            f"{np.argmax(turned)} looks inward ({np.count_nonzero(turned)} such). "
+            'Try repair(mesh, ["orient"]).'
+        )
+    if not is_closed(mesh) and orient_outward(mesh) is not mesh:
+        raise InvalidShapeError(
+            "Faces must look outward, or inside and outside change places; those of the convex "
+            "hull look inward. Try orient_outward(mesh)."
+        )
     _, distances = _search(mesh, corners, places)
     lowest, highest = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     boxed = ((places > lowest) & (places < highest)).all(axis=1) & (distances > 0)
     inside = np.flatnonzero(boxed)[windings(places[boxed], corners) > INSIDE]
     distances[inside] *= -1
     return in_length(distances, scale, 1)
+
+
+def squared_distances(
+    points: Float[np.ndarray, "p d"], corners: Float[np.ndarray, "s corners d"]
+) -> Float[np.ndarray, "p s"]:
+    """Return the squared distance of each point to each simplex, in length².
+
+    The nearest point of a simplex lies in the interior of one of its sides: the simplex itself, a
+    facet, and so on down to a corner. There it is the foot of the perpendicular to the flat of that
+    side. So the least distance over all sides that contain their foot is returned.
+    """
+    least = np.full((len(points), len(corners)), np.inf)
+    numbers = range(corners.shape[1])
+    for size in range(1, corners.shape[1] + 1):
+        for side in combinations(numbers, size):
+            origin, others = corners[:, side[0]], corners[:, side[1:]]
+            sides, ways = others - origin[:, None], points[:, None] - origin
+            weights = np.einsum("sda,psd->psa", np.linalg.pinv(sides), ways)
+            inside = (weights >= 0).all(axis=2) & (weights.sum(axis=2) <= 1)
+            left = ways - np.einsum("psa,sad->psd", weights, sides)
+            squares = np.where(inside, np.einsum("psd,psd->ps", left, left), np.inf)
+            np.minimum(least, squares, out=least)
+    return least
 
 
 def _scale_both(
@@ -182,20 +220,3 @@ def _search(
     order = np.argsort(curve_places(boxes), kind="stable")
     found, weights, squares = nearest_faces(places, corners[order], *box_tree(boxes[order]))
     return place_points(mesh, order[found], weights), np.sqrt(squares)
-
-
-def _require_outward(mesh: TriangleMesh) -> None:
-    """Raise an error if a closed piece, or an open mesh as a whole, looks inward."""
-    require_oriented(mesh)
-    turned, _, _ = faces_to_turn(mesh)
-    if turned.any():
-        raise InvalidShapeError(
-            "Faces must look outward, or inside and outside change places; face "
-            f"{np.argmax(turned)} looks inward ({np.count_nonzero(turned)} such). "
-            'Try repair(mesh, ["orient"]).'
-        )
-    if not is_closed(mesh) and orient_outward(mesh) is not mesh:
-        raise InvalidShapeError(
-            "Faces must look outward, or inside and outside change places; those of the convex "
-            "hull look inward. Try orient_outward(mesh)."
-        )

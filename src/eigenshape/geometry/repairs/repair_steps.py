@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidParameterError
@@ -13,7 +13,6 @@ from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import faces_to_turn
-from eigenshape.geometry.repairs.flat_faces import flip_flat_faces
 from eigenshape.geometry.repairs.repair_report import (
     MeshT,
     RepairedCloud,
@@ -24,6 +23,8 @@ from eigenshape.geometry.repairs.repair_report import (
 from eigenshape.geometry.simplices import MEASURES, degenerate_simplices, scaled_corners, size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
+    edge_table,
+    number_places,
     repeated_simplices,
     seams,
     submesh,
@@ -53,7 +54,7 @@ def weld(mesh: MeshT, *, tolerance: float = 0.0) -> RepairedMesh[MeshT]:
             f"tolerance must lie in 0..0.1 of the diagonal of the bounding box; it is {tolerance}."
         )
     if tolerance == 0:
-        group = _place_numbers(mesh.points)
+        group = number_places(mesh.points)
     else:
         points, _ = size_one(mesh.points)
         points, _ = size_one(points - points.mean(axis=0))
@@ -72,13 +73,6 @@ def weld_seams(mesh: MeshT) -> RepairedMesh[MeshT]:
     one, two = seams(mesh).transpose(1, 0, 2).reshape(2, -1)
     _, group = label_components(mesh.n_points, one, two)
     return _merge_vertices(mesh, group, "weld_seams joined {} along seams")
-
-
-def _place_numbers(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
-    """Return for each point the number of its place; equal points have the same place."""
-    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
-    _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
-    return place.ravel().astype(np.int64)
 
 
 def _merge_vertices(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> RepairedMesh[MeshT]:
@@ -111,6 +105,56 @@ def drop_degenerate(mesh: Mesh) -> RepairedMesh[Any]:
     if n_split:
         report += f", and split {count_nouns(n_split, 'neighbor')} at their vertices"
     return _keep_simplices(mesh, keep, report)
+
+
+def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+    """Flip the longest edge of each face without area; return the mesh and the number of flips.
+
+    A face (a, b, m) without area has its vertex m on the edge (a, b). If the face were only
+    removed, the edges (a, m) and (m, b) would separate from (a, b): heat would not cross there, and
+    a closed surface would become open. So the face (a, b, d) on the other side of the edge is split
+    at m into (a, m, d) and (m, b, d). The surface stays the same set of points.
+
+    An edge is left alone if it does not have exactly two faces, if the edge (m, d) exists already,
+    or if the flip would create another face without area, as where m coincides with a.
+    """
+    n_flips = 0
+    while True:
+        table = edge_table(mesh)
+        is_flat = np.zeros(mesh.n_faces, dtype=bool)
+        is_flat[degenerate_simplices(mesh)] = True
+        flat = np.flatnonzero(is_flat)
+        points, _ = size_one(mesh.vertices)
+        sides = np.stack([np.roll(mesh.faces[flat], -turn, axis=1) for turn in (1, 2)], axis=2)
+        lengths = np.linalg.norm(points[sides[..., 0]] - points[sides[..., 1]], axis=2)
+        corner = lengths.argmax(axis=1)  # opposite to the longest side
+        (a, b), m = sides[np.arange(len(flat)), corner].T, mesh.faces[flat, corner]
+        edge = table.face_edges[flat, corner]
+        # The other face at the edge, or the flat one itself if it is alone
+        order = np.argsort(table.face_edges.ravel(), kind="stable")
+        ordered = table.face_edges.ravel()[order]
+        first = order[np.searchsorted(ordered, edge)] // 3
+        last = order[np.searchsorted(ordered, edge, side="right") - 1] // 3
+        neighbor = np.where(first == flat, last, first)
+        between = mesh.faces[neighbor]
+        d = between.sum(axis=1) - a - b
+        one = np.where(between == b[:, None], m[:, None], between)
+        two = np.where(between == a[:, None], m[:, None], between)
+        keys = np.minimum(m, d) * mesh.n_vertices + np.maximum(m, d)
+        known = table.edges[:, 0] * mesh.n_vertices + table.edges[:, 1]
+        good = (table.n_faces[edge] == 2) & ~is_flat[neighbor] & ~np.isin(keys, known)
+        for halves in (one, two):
+            if len(halves):
+                good[degenerate_simplices(TriangleMesh(mesh.vertices, halves))] = False
+        # No two flips share a face or create the same edge, so all can be done at once.
+        chosen = np.flatnonzero(good)
+        chosen = chosen[np.unique(neighbor[chosen], return_index=True)[1]]
+        chosen = chosen[np.unique(keys[chosen], return_index=True)[1]]
+        if not len(chosen):
+            return mesh, n_flips
+        faces = mesh.faces.copy()
+        faces[flat[chosen]], faces[neighbor[chosen]] = one[chosen], two[chosen]
+        mesh, n_flips = TriangleMesh(mesh.vertices, faces), n_flips + len(chosen)
 
 
 def collapse_needles(mesh: MeshT) -> RepairedMesh[MeshT]:
@@ -215,7 +259,7 @@ def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
 
 def drop_duplicate_points(cloud: PointCloud) -> RepairedCloud:
     """Keep the first of all points of a cloud at the same place."""
-    _, source = np.unique(_place_numbers(cloud.points), return_index=True)
+    _, source = np.unique(number_places(cloud.points), return_index=True)
     source = np.sort(source)
     removed = count_nouns(cloud.n_points - len(source), "point")
     report = f"drop_duplicate_points removed {removed} at the places of others"

@@ -95,7 +95,13 @@ def shape_quadrature(shape: ShapeLike, *, n_neighbors: Integer | None = None) ->
     )
     points, scale = size_one(cloud.points)
     distances, neighbors = cKDTree(points).query(points, near + 1)
-    _require_different(cloud, distances, neighbors)
+    equal = np.flatnonzero(distances[:, 1] == 0)
+    if equal.size:
+        other = next(int(index) for index in neighbors[equal[0]] if index != equal[0])
+        raise InvalidShapeError(
+            f"Points must differ; points {equal[0]} and {other} are both "
+            f"{cloud.points[equal[0]].tolist()} ({equal.size} such). {try_auto('cloud')}"
+        )
     weights = np.empty(cloud.n_points)
     for first in range(0, cloud.n_points, POINTS_AT_ONCE):
         rows = slice(first, first + POINTS_AT_ONCE)
@@ -109,16 +115,6 @@ def shape_quadrature(shape: ShapeLike, *, n_neighbors: Integer | None = None) ->
             f"Check dim, which is {dim}, or pass a larger n_neighbors."
         )
     return Quadrature(cloud.points, in_length(weights, scale, dim), dim)
-
-
-def _require_different(cloud: PointCloud, distances: np.ndarray, neighbors: np.ndarray) -> None:
-    equal = np.flatnonzero(distances[:, 1] == 0)
-    if equal.size:
-        other = next(int(index) for index in neighbors[equal[0]] if index != equal[0])
-        raise InvalidShapeError(
-            f"Points must differ; points {equal[0]} and {other} are both "
-            f"{cloud.points[equal[0]].tolist()} ({equal.size} such). {try_auto('cloud')}"
-        )
 
 
 def _tangent_coordinates(
@@ -145,10 +141,9 @@ def _cell_volumes(neighbors: Float[np.ndarray, "r k m"]) -> Float[np.ndarray, " 
     dim = neighbors.shape[2]
     if dim == 1:
         places = neighbors[:, :, 0]
-        ahead = np.min(np.where(places > 0, places, np.inf), axis=1)
-        behind = np.min(np.where(places < 0, -places, np.inf), axis=1)
-        ahead = np.where(np.isfinite(ahead), ahead, 0)
-        behind = np.where(np.isfinite(behind), behind, 0)
+        # On a side without a neighbor, such as behind the end of a curve, the cell ends at 0.
+        gaps = [np.min(np.where(way > 0, way, np.inf), axis=1) for way in (places, -places)]
+        ahead, behind = (np.where(np.isfinite(gap), gap, 0) for gap in gaps)
         return (ahead + behind) / 2
     if dim == 2:
         places = np.concatenate([neighbors, np.zeros_like(neighbors[:, :1])], axis=1)
