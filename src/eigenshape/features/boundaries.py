@@ -14,7 +14,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, face_pairs
+from eigenshape.geometry.topology import adjacency_matrix, edge_table, face_pairs
 from eigenshape.operators.anisotropic import curvature_tensors
 
 # α of `curvature_tensors`, without unit: the strength of creases. The best of 1, 5, 10, 20, 40 and
@@ -171,7 +171,7 @@ def _move_boundary(
 
     # The band: faces near the boundary, measured along the graph.
     areas = network.areas[faces]
-    graph = _symmetric_graph(pairs, network.lengths[inside], len(faces))
+    graph = adjacency_matrix(pairs, network.lengths[inside], len(faces))
     depth = dijkstra(graph, indices=np.unique(pairs[crossing]), min_only=True)
     reach = share * min(areas[side].sum(), areas[~side].sum()) ** 0.5
     deepest = np.where(side, depth[side].max(), depth[~side].max())
@@ -195,11 +195,6 @@ def _move_boundary(
     )
     if n_after <= n_before:
         labels[faces] = np.where(cut, *parts)
-
-
-def _symmetric_graph(pairs: Int[np.ndarray, "p 2"], weights: np.ndarray, n: int) -> sp.csr_array:
-    both = np.concatenate([pairs, pairs[:, ::-1]]).T
-    return sp.coo_array((np.concatenate([weights, weights]), both), shape=(n, n)).tocsr()
 
 
 def _cheapest_cut(
@@ -232,7 +227,7 @@ def _cheapest_cut(
         if not crossing.any():
             return cut
         near = np.unique(network.pairs[crossing])
-        graph = _symmetric_graph(network.pairs, network.lengths, len(side))
+        graph = adjacency_matrix(network.pairs, network.lengths, len(side))
         reach = CELLS_AROUND * length
         depth = dijkstra(graph, indices=near, min_only=True, limit=reach)
         narrow = band & (depth <= reach)
@@ -259,7 +254,7 @@ def _minimum_cut(
     kept = ends[:, 0] != ends[:, 1]
     capacities = np.int64(1) + np.floor(CAPACITY * costs[kept] / costs[kept].sum()).astype(np.int64)
     capacities[(ends[kept] < 2).all(axis=1)] = 0
-    graph = sp.csr_matrix(_symmetric_graph(ends[kept], capacities, n_nodes).astype(np.int32))
+    graph = sp.csr_matrix(adjacency_matrix(ends[kept], capacities, n_nodes).astype(np.int32))
     # Maximum flow, minimum cut: the first side is what the source reaches in the residual graph.
     residual = graph - maximum_flow(graph, 0, 1).flow
     residual.data = (residual.data > 0).astype(np.int8)

@@ -84,7 +84,7 @@ def state_without_facets(mesh: object) -> dict[str, Any]:
 
 
 def shared_facets(
-    simplex_facets: Int[np.ndarray, "s corners"],
+    simplex_facets: Int[np.ndarray, "..."],
 ) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
     """Return pairs of sides that lie on one facet; they chain all sides of the facet.
 

@@ -12,6 +12,7 @@ from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     is_manifold,
     require_simplices_everywhere,
+    unique_edges,
     vertex_components,
 )
 
@@ -88,6 +89,4 @@ def betti_numbers(mesh: MeshLike) -> tuple[int, ...]:
 def edges_of(mesh: Mesh) -> Int[np.ndarray, "e 2"]:
     """Return the edges of a mesh of any dimension, the lower point first, in lexicographic order."""
     first, second = np.triu_indices(mesh.dim + 1, 1)
-    ends = np.sort(mesh.simplices, axis=1)
-    keys = np.unique(ends[:, first] * mesh.n_points + ends[:, second])
-    return np.column_stack(np.divmod(keys, mesh.n_points))
+    return unique_edges(mesh.simplices[:, first], mesh.simplices[:, second], mesh.n_points)

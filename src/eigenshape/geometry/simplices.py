@@ -218,9 +218,14 @@ def mean_side_length(mesh: MeshLike) -> float:
     """
     mesh = as_simplicial(mesh)
     corners, scale = scaled_corners(mesh)
-    first, second = np.triu_indices(corners.shape[1], 1)
-    lengths = np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
+    lengths = side_lengths(corners)
     return float(in_length(lengths.mean(keepdims=True), scale, 1)[0, 0])
+
+
+def side_lengths(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, "s sides"]:
+    """Return the lengths of the sides of each simplex, in the order of `np.triu_indices`."""
+    first, second = np.triu_indices(corners.shape[1], 1)
+    return np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
 
 
 def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:

@@ -94,8 +94,21 @@ def face_pairs(table: EdgeTable) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray
 def neighbor_links(mesh: TriangleMesh) -> sp.csr_array:
     """Return the symmetric matrix with a 1 for each two vertices that an edge connects."""
     edges = edge_table(mesh).edges
-    links = sp.coo_array((np.ones(len(edges)), edges.T), shape=(mesh.n_vertices,) * 2).tocsr()
-    return links + links.T
+    return adjacency_matrix(edges, np.ones(len(edges)), mesh.n_vertices)
+
+
+def adjacency_matrix(edges: Int[np.ndarray, "e 2"], values: np.ndarray, n: int) -> sp.csr_array:
+    """Return the symmetric matrix of weighted edges, each given once."""
+    both = np.concatenate([edges, edges[:, ::-1]]).T
+    return sp.coo_array((np.tile(values, 2), both), shape=(n, n)).tocsr()
+
+
+def unique_edges(
+    one: Int[np.ndarray, "..."], two: Int[np.ndarray, "..."], n: int
+) -> Int[np.ndarray, "e 2"]:
+    """Return pairs of n points without duplicates, the lower first, in lexicographic order."""
+    keys = np.unique(np.minimum(one, two) * n + np.maximum(one, two))
+    return np.column_stack(np.divmod(keys, n))
 
 
 def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:

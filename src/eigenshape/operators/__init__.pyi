@@ -16,8 +16,8 @@ from .clouds.neighbors import neighbor_graph as neighbor_graph
 from .connection import connection_laplacian as connection_laplacian
 from .connection import tangent_frames as tangent_frames
 from .cotangent import cotangent_laplacian as cotangent_laplacian
+from .cotangent import mean_curvature as mean_curvature
 from .crouzeix_raviart import crouzeix_raviart_laplacian as crouzeix_raviart_laplacian
-from .curvature import mean_curvature as mean_curvature
 from .fem import fem_boundary_nodes as fem_boundary_nodes
 from .fem import fem_laplacian as fem_laplacian
 from .fem import fem_nodes as fem_nodes

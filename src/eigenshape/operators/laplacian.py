@@ -1,6 +1,7 @@
 """The one form that every discretization of the Laplace operator takes."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -168,27 +169,19 @@ def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:
         )
 
 
-def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
-    _require_square(name, value)
-    matrix = freeze_sparse(sp.csr_array(value, dtype=np.float64))
-    _require_finite(name, matrix)
-    _require_symmetric(name, matrix)
-    return matrix
-
-
-def _require_square(name: str, matrix: sp.sparray) -> None:
-    if (
-        not sp.issparse(matrix)
-        or matrix.ndim != 2
-        or matrix.shape[0] != matrix.shape[1]
-        or not matrix.shape[0]
-    ):
+def require_square(matrix: Any, name: str, wanted: str = "a square sparse matrix") -> None:
+    """Raise an error if a value is not a square sparse matrix with rows."""
+    shape = np.shape(matrix)
+    if not sp.issparse(matrix) or len(shape) != 2 or shape[0] != shape[1] or not shape[0]:
         raise InvalidParameterError(
-            f"{name} must be a square sparse matrix; it is a {type(matrix).__name__} of shape {np.shape(matrix)}."
+            f"{name} must be {wanted}; it is a {type(matrix).__name__} of shape {shape}."
         )
 
 
-def _require_finite(name: str, matrix: sp.csr_array) -> None:
+def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
+    """Return a read-only copy of a matrix, or raise an error if it is not finite and symmetric."""
+    require_square(value, name)
+    matrix = freeze_sparse(sp.csr_array(value, dtype=np.float64))
     bad = np.flatnonzero(~np.isfinite(matrix.data))
     if bad.size:
         entries = matrix.tocoo()
@@ -196,16 +189,12 @@ def _require_finite(name: str, matrix: sp.csr_array) -> None:
         raise InvalidParameterError(
             f"{name} must be finite; entry ({row}, {column}) is {entries.data[bad[0]]} ({bad.size} such)."
         )
-
-
-def _require_symmetric(name: str, matrix: sp.csr_array) -> None:
     differences = abs(matrix - matrix.T).tocoo()
-    if not differences.nnz:
-        return
-    worst = differences.data.argmax()
-    if differences.data[worst] > ASYMMETRY * abs(matrix.data).max():
+    worst = differences.data.argmax() if differences.nnz else 0
+    if differences.nnz and differences.data[worst] > ASYMMETRY * abs(matrix.data).max():
         row, column = differences.row[worst], differences.col[worst]
         raise InvalidParameterError(
             f"{name} must be symmetric; entry ({row}, {column}) is {matrix[row, column]} "
             f"and entry ({column}, {row}) is {matrix[column, row]}."
         )
+    return matrix

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from pencils import cycle, dense_eigenvalues, graph, path, wild
 
 from eigenshape.geometry.union import disjoint_union
-from eigenshape.operators.clouds.csr_loops import component_labels
+from eigenshape.operators.clouds.pair_loops import component_labels
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import icosphere

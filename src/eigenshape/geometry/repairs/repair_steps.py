@@ -20,7 +20,13 @@ from eigenshape.geometry.repairs.repair_report import (
     count_nouns,
     simplex_noun,
 )
-from eigenshape.geometry.simplices import MEASURES, degenerate_simplices, scaled_corners, size_one
+from eigenshape.geometry.simplices import (
+    MEASURES,
+    degenerate_simplices,
+    scaled_corners,
+    side_lengths,
+    size_one,
+)
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     edge_table,
@@ -167,14 +173,14 @@ def collapse_needles(mesh: MeshT) -> RepairedMesh[MeshT]:
     needle is left as it is.
     """
     corners, _ = scaled_corners(mesh)
-    one, two = np.triu_indices(mesh.dim + 1, 1)
-    lengths = np.linalg.norm(corners[:, one] - corners[:, two], axis=2)
+    lengths = side_lengths(corners)
     # Sides of length 0 belong to faces without area, which `drop_degenerate` removes.
     least = np.maximum(NEEDLE * lengths.max(axis=1, keepdims=True), TINY * lengths.max())
     short = (lengths > 0) & (lengths < least)
     in_simplex, side = np.nonzero(short)
     if short.any(axis=1).all():
         in_simplex, side = in_simplex[:0], side[:0]
+    one, two = np.triu_indices(mesh.dim + 1, 1)
     starts, ends = mesh.simplices[in_simplex, one[side]], mesh.simplices[in_simplex, two[side]]
     _, group = label_components(mesh.n_points, starts, ends)
     joined = _merge_vertices(mesh, group, "collapse_needles joined {} to others beside them")

@@ -1,7 +1,7 @@
 """Quadrature weights of a point cloud: the share of the manifold that each point represents."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
 from eigenshape._arrays import whole_number
@@ -95,13 +95,7 @@ def shape_quadrature(shape: ShapeLike, *, n_neighbors: Integer | None = None) ->
     )
     points, scale = size_one(cloud.points)
     distances, neighbors = cKDTree(points).query(points, near + 1)
-    equal = np.flatnonzero(distances[:, 1] == 0)
-    if equal.size:
-        other = next(int(index) for index in neighbors[equal[0]] if index != equal[0])
-        raise InvalidShapeError(
-            f"Points must differ; points {equal[0]} and {other} are both "
-            f"{cloud.points[equal[0]].tolist()} ({equal.size} such). {try_auto('cloud')}"
-        )
+    require_different_points(cloud, distances, neighbors)
     weights = np.empty(cloud.n_points)
     for first in range(0, cloud.n_points, POINTS_AT_ONCE):
         rows = slice(first, first + POINTS_AT_ONCE)
@@ -115,6 +109,19 @@ def shape_quadrature(shape: ShapeLike, *, n_neighbors: Integer | None = None) ->
             f"Check dim, which is {dim}, or pass a larger n_neighbors."
         )
     return Quadrature(cloud.points, in_length(weights, scale, dim), dim)
+
+
+def require_different_points(
+    cloud: PointCloud, distances: Float[np.ndarray, "n k"], neighbors: Int[np.ndarray, "n k"]
+) -> None:
+    """Raise an error if two points are equal, given the nearest of each, itself among them."""
+    equal = np.flatnonzero(distances[:, 1] == 0)
+    if equal.size:
+        other = next(int(index) for index in neighbors[equal[0]] if index != equal[0])
+        raise InvalidShapeError(
+            f"Points must differ; points {equal[0]} and {other} are both "
+            f"{cloud.points[equal[0]].tolist()} ({equal.size} such). {try_auto('cloud')}"
+        )
 
 
 def _tangent_coordinates(

@@ -22,7 +22,7 @@ from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.clouds.cells import CellGrid, cell_grid, count_partners, gaussian_rows
-from eigenshape.operators.clouds.csr_loops import component_labels
+from eigenshape.operators.clouds.pair_loops import component_labels
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 
 # Width of a kernel by default, h / e; t = e².
@@ -69,26 +69,8 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
         If more than one is given, one is not positive, another option is unknown, or the kernel is
         narrower than the points lie.
     """
-    _require_options(options)
-    width = options.h or (options.edge_factor or EDGE_FACTOR) * edge
-    t = options.t or width**2 / 4
-    factor = 2 * t**0.5 / edge
-    if factor < NARROWEST:
-        raise InvalidParameterError(
-            f"A kernel must reach the neighbors, h ≥ e; h = 2√t is {factor:.3g} of the mean edge length "
-            f"e = {edge:.4g}, t = {t:.4g}. Choose t ≥ {edge**2 / 4:.4g}; t = e² is the default."
-        )
-    return GaussianKernel(
-        t, factor, corrected=options.correct == "log", form=options.form, cutoff=options.cutoff
-    )
-
-
-def _require_options(options: KernelOptions) -> None:
-    given = {
-        name: value
-        for name in ("t", "h", "edge_factor")
-        if (value := getattr(options, name)) is not None
-    }
+    scales = {"t": options.t, "h": options.h, "edge_factor": options.edge_factor}
+    given = {name: value for name, value in scales.items() if value is not None}
     if len(given) > 1:
         raise InvalidParameterError(
             f"At most one of t, h and edge_factor must be given; given are {given}."
@@ -101,6 +83,17 @@ def _require_options(options: KernelOptions) -> None:
         raise InvalidParameterError(
             f"form must be 'literal' or 'random-walk'; it is {options.form!r}."
         )
+    width = options.h or (options.edge_factor or EDGE_FACTOR) * edge
+    t = options.t or width**2 / 4
+    factor = 2 * t**0.5 / edge
+    if factor < NARROWEST:
+        raise InvalidParameterError(
+            f"A kernel must reach the neighbors, h ≥ e; h = 2√t is {factor:.3g} of the mean edge length "
+            f"e = {edge:.4g}, t = {t:.4g}. Choose t ≥ {edge**2 / 4:.4g}; t = e² is the default."
+        )
+    return GaussianKernel(
+        t, factor, corrected=options.correct == "log", form=options.form, cutoff=options.cutoff
+    )
 
 
 def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
@@ -158,9 +151,8 @@ def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) 
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)
     radius = kernel.cutoff * kernel.width
-    _require_matrix_fits(
-        cell_grid(points, radius / scale)
-    )  # no ball along the surface holds more than one through space
+    # No ball along the surface holds more than one through space.
+    _require_matrix_fits(cell_grid(points, radius / scale))
     matrix = geodesic_balls(mesh, radius)
     _require_partners(measure, np.diff(matrix.indptr), kernel)
     rows = np.repeat(np.arange(measure.n_points), np.diff(matrix.indptr))
