@@ -112,21 +112,7 @@ def move_boundaries(
     share: float = WIDTH,
 ) -> Segmentation:
     """Do what `smooth_boundaries` does, with tensors that are there already."""
-    labels = segmentation.labels.copy()
-    points, _ = scale_to_unit(mesh)
-    unit = TriangleMesh(points, mesh.faces)
-    table = edge_table(unit)
-    pairs, edges = face_pairs(table)
-    centers = points[mesh.faces].mean(axis=1)
-    across = centers[pairs[:, 1]] - centers[pairs[:, 0]]
-    lengths = np.linalg.norm(across, axis=1)
-    # Conductivity in the direction across the edge: the mean of the two faces' tensors.
-    between = tensors[pairs].mean(axis=1)
-    squares = np.einsum("pi,pij,pj->p", across, between, across)
-    conductivity = np.divide(squares, lengths**2, out=np.ones_like(lengths), where=lengths > 0)
-    sides = np.linalg.norm(np.diff(points[table.edges[edges]], axis=1)[:, 0], axis=1)
-    costs, areas = sides * conductivity, face_areas(unit)
-    network = _Network(pairs, lengths, costs, areas, centers, conductivity)
+    labels, network = segmentation.labels.copy(), build_network(mesh, tensors)
     tips = segmentation.features.vertices[segmentation.labels]
     fixed = (mesh.faces == tips[:, None]).any(axis=1)
     for one, two in adjacent_parts(mesh, labels).tolist():
@@ -148,6 +134,24 @@ class _Network:
     areas: Float[np.ndarray, " f"]
     centers: Float[np.ndarray, "f 3"]
     conductivity: Float[np.ndarray, " p"]
+
+
+def build_network(mesh: TriangleMesh, tensors: Float[np.ndarray, "f 3 3"]) -> _Network:
+    """Measure the graph of the faces, with the cost of a cut along each inner edge."""
+    points, _ = scale_to_unit(mesh)
+    unit = TriangleMesh(points, mesh.faces)
+    table = edge_table(unit)
+    pairs, edges = face_pairs(table)
+    centers = points[mesh.faces].mean(axis=1)
+    across = centers[pairs[:, 1]] - centers[pairs[:, 0]]
+    lengths = np.linalg.norm(across, axis=1)
+    # Conductivity in the direction across the edge: the mean of the two faces' tensors.
+    between = tensors[pairs].mean(axis=1)
+    squares = np.einsum("pi,pij,pj->p", across, between, across)
+    conductivity = np.divide(squares, lengths**2, out=np.ones_like(lengths), where=lengths > 0)
+    sides = np.linalg.norm(np.diff(points[table.edges[edges]], axis=1)[:, 0], axis=1)
+    costs, areas = sides * conductivity, face_areas(unit)
+    return _Network(pairs, lengths, costs, areas, centers, conductivity)
 
 
 def _move_boundary(
