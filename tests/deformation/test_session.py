@@ -6,9 +6,8 @@ import pytest
 from bent_shapes import lump, lump_rig
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.deformation.deform import deform
+from eigenshape.deformation.deform import deform, move_by_shares
 from eigenshape.deformation.edits import Edit, Move
-from eigenshape.deformation.graded_bend import move_by_shares
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import BoxRegion, BrushRegion
 from eigenshape.deformation.rig import rig_shape

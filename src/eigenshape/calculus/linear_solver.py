@@ -13,8 +13,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.boundary import require_points
-from eigenshape.operators.laplacian import ASYMMETRY, find_zero_row_sums
+from eigenshape.operators.laplacian import ASYMMETRY, find_zero_row_sums, require_points
 from eigenshape.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 
 # Loads on a component where nothing is fixed may sum to this share of their absolute sum. Sums of a

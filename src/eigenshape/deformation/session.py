@@ -14,9 +14,8 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._typing import Integer
 from eigenshape.deformation.binding import Binding, bind
-from eigenshape.deformation.deform import bend
+from eigenshape.deformation.deform import bend, move_by_shares
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
-from eigenshape.deformation.graded_bend import move_by_shares
 from eigenshape.deformation.handles import Handle, require_handle
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region, region_mask

@@ -12,7 +12,7 @@ from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.least_matching import least_distance, least_perfect
 from eigenshape.features.loops import extended_loops
-from eigenshape.features.union_loops import join_points
+from eigenshape.features.merge_loops import join_points
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.operators.clouds.neighbors import neighbor_graph

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape._memory import available_memory, require_memory
-from eigenshape.features.matching_loops import match_rows
+from eigenshape.features.bipartite_loops import match_rows
 
 Points = Float[np.ndarray, "_ d"]
 Reach = Float[np.ndarray, " _"]
@@ -21,10 +21,10 @@ Partners = Int[np.ndarray, " n"]
 FINE = 1e-4
 # Relative margin for the rounding of a distance that is computed in two ways; 1e7 times the
 # rounding itself.
-SLACK = 1e-9
+DISTANCE_ROUNDING = 1e-9
 # Factor by which the search distance grows. A larger one lists more pairs in the last round, a
 # smaller one takes more rounds.
-GROWTH = 1.5
+DISTANCE_GROWTH = 1.5
 # Peak bytes of memory per pair while pairs are listed.
 BYTES_OF_PAIR = 150
 SHARE_OF_PAIRS = 0.5  # of the memory; the matching needs the rest
@@ -55,14 +55,14 @@ def least_perfect(one: Points, two: Points, norm: float) -> tuple[float, Int[np.
     # Just below the distance at which each point has a neighbor in the other set
     sides = (one, two), (two, one)
     to_nearest = max(cKDTree(those).query(these, p=norm)[0].max() for these, those in sides)
-    low, top = float(to_nearest) * (1 - SLACK), float(_lengths(one - two, norm).max())
-    distance = max(GROWTH * low, COARSE * top)
+    low, top = float(to_nearest) * (1 - DISTANCE_ROUNDING), float(_lengths(one - two, norm).max())
+    distance = max(DISTANCE_GROWTH * low, COARSE * top)
     while True:
         near = near_pairs(one, two, min(distance, top), norm)
         found = _match_pairs(near, partners, len(two))
         if (found >= 0).all():
             break
-        low, distance, partners = distance, GROWTH * distance, found
+        low, distance, partners = distance, DISTANCE_GROWTH * distance, found
     # The last of these distances allows a perfect matching, `found`.
     distances = np.unique(near.distances[near.distances > low])
     first, last = 0, len(distances) - 1
@@ -142,7 +142,7 @@ def near_pairs(some: Points, others: Points, distance: float, norm: float) -> Pa
         return Pairs(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
     # The tree compares powers of distances, with a rounding of its own: it returns a few more, and
     # the comparison below decides.
-    reach = distance * (1 + SLACK)
+    reach = distance * (1 + DISTANCE_ROUNDING)
     trees = cKDTree(some), cKDTree(others)
     # If all pairs fit, there is no need to count them.
     if len(some) * len(others) * BYTES_OF_PAIR > available_memory(SHARE_OF_PAIRS):

@@ -57,7 +57,7 @@ LEAST_SINE = 0.02
 SIGHT_PRIOR = 0.05
 # Cosine of the widest angle between the normal and the chord of an inscribed ball. Beyond it, the
 # ball touches the same side of the surface, where noise decides its radius.
-LEAST_COSINE = 0.3
+LEAST_CHORD_COSINE = 0.3
 # A ball that shrinks by less than this share holds no further point; radii are not needed to more
 # digits.
 SHRINKAGE = 1e-6
@@ -205,7 +205,7 @@ def inscribed_radii(
         chords = points[nearest[inside]] - here[inside]
         heights = np.einsum("mi,mi->m", chords, inward[inside])
         squares = np.einsum("mi,mi->m", chords, chords)
-        facing = heights > LEAST_COSINE * np.sqrt(squares)
+        facing = heights > LEAST_CHORD_COSINE * np.sqrt(squares)
         live = live[facing]
         if not len(live):
             break

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 
 # The corners of a facet are packed into one integer while that stays below this bound: sorting
@@ -72,7 +72,7 @@ def list_facets(simplices: Int[np.ndarray, "s corners"], n_points: int) -> Facet
     else:
         facets, inverse, counts = np.unique(ends.T, axis=0, return_inverse=True, return_counts=True)
     of_simplices = inverse.reshape(dim + 1, -1).T
-    return FacetTable(freeze(facets), freeze(of_simplices), freeze(counts))
+    return FacetTable(facets, of_simplices, counts)
 
 
 def state_without_facets(mesh: object) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from eigenshape.matching.pairs import Pairs, couplings, place_points
 from eigenshape.matching.surface import Surface
 
 SMOOTHING = 10  # means over neighbors: local evidence is that of a disc of about three edges
-FARTHEST = 0.3  # units: longer distances say no more
+FARTHEST_SPREAD = 0.3  # units: longer distances say no more
 MOST_STRETCH = 5.0  # the same, for ratios of lengths
 N_OTHERS = 2  # maps of other starts that are compared
 LEAST_MISFIT = 1e-4  # a pair of equal shapes has less, which says no more
@@ -121,10 +121,10 @@ def vertex_evidence(
     spread = np.zeros(n)
     for other in others:
         gap = whole.mesh.vertices[places] - whole.mesh.vertices[other.places]
-        spread += np.minimum(np.linalg.norm(gap, axis=1), FARTHEST) / len(others)
+        spread += np.minimum(np.linalg.norm(gap, axis=1), FARTHEST_SPREAD) / len(others)
     links = neighbor_links(part.mesh) + sp.eye_array(n)
     mean = sp.csr_array(sp.diags_array(1 / links.sum(axis=1)) @ links)
-    columns = [local, misfits, np.minimum(away, FARTHEST), spread, stretch, fit.gaps]
+    columns = [local, misfits, np.minimum(away, FARTHEST_SPREAD), spread, stretch, fit.gaps]
     for _ in range(SMOOTHING):
         columns = [mean @ column for column in columns]
     rim = part.weights.min(axis=1)[part.nearest]

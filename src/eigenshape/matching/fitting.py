@@ -34,12 +34,12 @@ N_FIRST, N_NEXT = 12, 2  # turns of the frames in the first step, and in each la
 SLIDING_STIFFNESS = (
     (1.0,) * 6 + (0.5,) * 4 + (0.3,) * 4 + (0.1,) * 4 + (0.05, 0.03, 0.02, 0.02, 0.02)
 )
-SIZES = 0.8, 1.25  # least and most stretch of a frame that costs nothing
-FACING = 0.08  # length, in units, that a difference of normals counts for
+FREE_SIZES = 0.8, 1.25  # least and most stretch of a frame that costs nothing
+NORMAL_LENGTH = 0.08  # length, in units, that a difference of normals counts for
 SOFT = 0.03  # units from the whole at which the pull on a point is halved
 # Share of a step along the surface; the rest is towards its plane
 ALONG, SLIDING_ALONG = 0.5, 0.1
-FARTHEST = 0.2  # units: longer gaps say no more
+LARGEST_GAP = 0.2  # units: longer gaps say no more
 TINY = np.finfo(float).tiny
 
 
@@ -136,7 +136,7 @@ def _plan(
     return FitPlan(
         part,
         whole,
-        cKDTree(np.hstack([whole.mesh.vertices, FACING * whole.normals])),
+        cKDTree(np.hstack([whole.mesh.vertices, NORMAL_LENGTH * whole.normals])),
         frames,
         samples,
         areas / areas.sum(),
@@ -188,7 +188,7 @@ def _fit(
         if step >= N_GIVEN:
             # The nearest points of the whole that face the same way pull, the more the nearer.
             points, normals = _carry(plan, pose, plan.samples)
-            nearest = plan.tree.query(np.hstack([points, FACING * normals]))[1]
+            nearest = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))[1]
             planes = whole.normals[nearest]
             steps = whole.mesh.vertices[nearest] - points
             flat = np.einsum("si,si->s", steps, planes)[:, None] * planes
@@ -198,8 +198,8 @@ def _fit(
         pose = _bend(plan, pose, targets, pull, stiffness, N_FIRST if step == 0 else N_NEXT)
 
     points, normals = _carry(plan, pose, plan.compared)
-    gaps, found = plan.tree.query(np.hstack([points, FACING * normals]))
-    gaps = np.minimum(gaps, FARTHEST)
+    gaps, found = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))
+    gaps = np.minimum(gaps, LARGEST_GAP)
     # Strain: how far edges are from what their frames make of them, as a share of squares
     moved = pose.places[plan.two] - pose.places[plan.one]
     wrong = np.einsum("eij,ej->ei", pose.turns[plan.one], plan.links) - moved
@@ -231,7 +231,7 @@ def _bend(
         add_pulls(turns, carriers, portions, plan.arms, pull, targets, right)
         add_tensions(turns, plan.one, plan.two, plan.links, weight, right)
         places = cho_solve(factor, right, check_finite=False)
-        turn_frames(places, plan.one, plan.two, plan.links, *SIZES, turns)
+        turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
     return _Pose(turns, places)
 
 

@@ -10,7 +10,7 @@ from eigenshape.geometry.measure import edge_lengths
 from eigenshape.matching.assignment import N_FAR, assign_far_points
 from eigenshape.matching.evidence import FittedMap
 from eigenshape.matching.fitting import (
-    FARTHEST,
+    LARGEST_GAP,
     Fit,
     FitPlan,
     fit_part,
@@ -46,9 +46,9 @@ MOST_SMOOTHINGS = 2  # it ends earlier if a bend is no better
 # vertices 14e-3 and more. So the confidence of such pairs is what it would be without rivals.
 EQUALLY_GOOD, EQUALLY_GOOD_IN_EDGES = 4.5e-3, 0.12
 # Two places differ if they are farther apart, in units: 0.05 √area, as in the confidence.
-DIFFERENT = 0.06
+OTHER_PLACE = 0.06
 MOST_OF_AREA = 0.5  # two maps differ if they do over this share of the part
-NEAR = 0.12  # places this near to the image of a point are taken by the best map
+TAKEN = 0.12  # places this near to the image of a point are taken by the best map
 
 
 def first_support(part: Surface, whole: Surface, *, turned: bool) -> float:
@@ -142,7 +142,7 @@ def _grow_again(plan: FitPlan, costs: Float[np.ndarray, "m k"], fits: list[Fit])
 
     def grow(fit: Fit) -> Pairs:
         # Points with a small gap are better supported.
-        support = np.maximum(1 - fit.gaps / FARTHEST, 1e-3)
+        support = np.maximum(1 - fit.gaps / LARGEST_GAP, 1e-3)
         partners = plan.whole.nearest[fit.places]
         return grow_pairs(
             plan.part, plan.whole, costs, Pairs(np.arange(len(partners)), partners, support)
@@ -166,12 +166,12 @@ def equally_good_maps(
 
     def elsewhere(one: FittedMap, other: FittedMap) -> Float[np.ndarray, " n"]:
         gaps = np.linalg.norm(vertices[one.fit.places] - vertices[other.fit.places], axis=1)
-        return (gaps > DIFFERENT).astype(np.float64)
+        return (gaps > OTHER_PLACE).astype(np.float64)
 
     # Starts of a search all lead to one map if that fits perfectly. So the search is repeated with
     # patches that are less alike where the first map places them.
     ends = plan.whole.nearest[best.fit.places[plan.part.points]]
-    taken = plan.whole.between[ends] < NEAR
+    taken = plan.whole.between[ends] < TAKEN
     others = grow_maps(plan, differences + np.median(differences) * taken)
     for one in [*maps[1:], *others]:
         differs = (plan.shares @ elsewhere(one, other) > MOST_OF_AREA for other in found)

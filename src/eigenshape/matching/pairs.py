@@ -15,7 +15,7 @@ N_CANDIDATES = 5  # partners that are tried for each point; ten found nothing mo
 # many times. Near a rim both discs are cut alike, and weigh more than the product of their weights.
 FOREIGN, RIM_SHARE = 1.2, 0.5
 # Share of a distance by which two pairs may disagree and still support each other
-SLACK = 0.4
+DISTANCE_SLACK = 0.4
 # The same, for starts. What a wide one finds a narrow one misses and the other way round: of 15 hard
 # pairs of the tuning half each has maps that are nearest to the truth, and the best fit is taken.
 START_SLACKS = 0.4, 0.3, 0.2
@@ -105,7 +105,7 @@ def couplings(
     whole: Surface,
     points: Int[np.ndarray, " c"],
     partners: Int[np.ndarray, " c"],
-    slack: float = SLACK,
+    slack: float = DISTANCE_SLACK,
 ) -> Complex64[np.ndarray, "c c"]:
     """Return how candidate pairs support each other; see `couple_pairs`."""
     found = np.empty((len(points),) * 2, dtype=np.complex64)

@@ -37,7 +37,7 @@ TORN = 0.1
 # Length, in √area, that a difference of normals counts for when the nearest point is looked for: enough
 # to keep the two sides of a wall of 0.02 apart. With 0.08, as in fits, noisy normals move the points of
 # skulls by 0.15 mm; 0.003 is as good.
-FACING = 0.01
+NORMAL_SHARE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ def carry_map(
 
 def _with_normals(mesh: TriangleMesh, copy: WorkingCopy) -> Float[np.ndarray, "n 6"]:
     """Return places of vertices, and normals of a length that suits the size of the original."""
-    length = FACING * np.sqrt(surface_area(copy.original))
+    length = NORMAL_SHARE * np.sqrt(surface_area(copy.original))
     return np.hstack([mesh.vertices, length * mean_normals(mesh)])
 
 

@@ -34,16 +34,16 @@ N_RATED, N_REFINED = 60, 12  # motions that are rated, and those of them that ar
 # the angles between normals, and between normals and the line, differ by at most ANGLE_SLACK.
 LENGTH_SLACK, LEAST_LENGTH = 0.03, 0.08
 ANGLE_SLACK = 0.35  # radians
-FACING = 0.6  # least cosine of two normals of one place
+FACING_COSINE = 0.6  # least cosine of two normals of one place
 PAIR_REACH = 0.05  # distance of the two ends of a pair that a motion explains
 # Distance at which points lie on each other: for a rough motion, and for a refined one. The noise
 # of a depth camera is about 0.003.
-ROUGH, EXACT = 0.02, 0.008
+ROUGH, PRECISE = 0.02, 0.008
 # A point this far in front of what the other camera saw, in the middle of its picture, contradicts
 # the motion: that camera would have seen it.
 IN_FRONT = 0.04
 SAME_PIXEL = 1.5  # edges in the picture between such a point and what was seen
-ROUNDS, FIRST_REACH, LAST_REACH, SHRINK = 25, 0.08, 0.012, 0.85  # of point to plane
+N_STEPS, FIRST_REACH, LAST_REACH, SHRINK = 25, 0.08, 0.012, 0.85  # of point to plane
 FEWEST_POINTS = 20  # that determine a motion
 # Motions closer than this count as one before they are refined.
 SAME_TURN, SAME_PLACE = 0.2, 0.1  # radians, and sides of the box
@@ -222,7 +222,7 @@ def register_described(first: Scan, second: Scan) -> Registration:
     best = NO_MOTION
     for motion in different:
         refined = _refine(first, second, motion, unit)
-        score = _rate(first, second, refined, unit, EXACT)
+        score = _rate(first, second, refined, unit, PRECISE)
         if score > best.score:
             best = replace(refined, score=score)
     # Both scans lie with their middles at the origin: the motion goes from middle to middle.
@@ -283,7 +283,7 @@ def _find_motions(first: Scan, second: Scan, unit: float) -> list[Registration]:
             motion = _fit_motion(starts[members], ends[members])
             near = np.linalg.norm(motion.move(starts) - ends, axis=1) < PAIR_REACH * unit
             turned = start_normals @ motion.rotation.T
-            near &= np.einsum("pi,pi->p", turned, end_normals) > FACING
+            near &= np.einsum("pi,pi->p", turned, end_normals) > FACING_COSINE
             if near.sum() < 4:
                 break
             members = np.flatnonzero(near)
@@ -308,7 +308,7 @@ def _rate(first: Scan, second: Scan, motion: Registration, unit: float, reach: f
         points = way.move(one.mesh.vertices[one.samples])
         normals = one.normals[one.samples] @ way.rotation.T
         distances, nearest = other.tree.query(points)
-        facing = np.einsum("si,si->s", normals, other.normals[nearest]) > FACING
+        facing = np.einsum("si,si->s", normals, other.normals[nearest]) > FACING_COSINE
         lying.append(((distances < reach * unit) & facing).mean())
         # What the other camera saw behind a point, it could not have seen through it.
         axes, tree, spacing = other.picture
@@ -324,13 +324,13 @@ def _refine(first: Scan, second: Scan, motion: Registration, unit: float) -> Reg
     points, normals = first.mesh.vertices[first.samples], first.normals[first.samples]
     # What the planes leave free, such as a ball turning in its socket, stays as it is.
     weights = 1e-3 * np.concatenate([np.full(3, unit**2), np.ones(3)])
-    for number in range(ROUNDS):
+    for number in range(N_STEPS):
         # Far points come first, to find the way; later ones are partners that are known.
         reach = max(FIRST_REACH * SHRINK**number, LAST_REACH) * unit
         moved, turned = motion.move(points), normals @ motion.rotation.T
         distances, nearest = second.tree.query(moved)
         planes = second.normals[nearest]
-        near = (distances < reach) & (np.einsum("si,si->s", turned, planes) > FACING)
+        near = (distances < reach) & (np.einsum("si,si->s", turned, planes) > FACING_COSINE)
         if near.sum() < FEWEST_POINTS:
             return motion
         # One step of Gauss and Newton: a small turn and a shift that close the gaps to the planes

@@ -1,6 +1,5 @@
 from .anisotropic import anisotropic_laplacian as anisotropic_laplacian
 from .anisotropic import curvature_tensors as curvature_tensors
-from .boundary import dirichlet_laplacian as dirichlet_laplacian
 from .catalog import OPERATORS as OPERATORS
 from .catalog import Operator as Operator
 from .catalog import build_laplacian as build_laplacian
@@ -25,6 +24,7 @@ from .graph import edge_graph as edge_graph
 from .graph import graph_laplacian as graph_laplacian
 from .laplacian import GaussianKernel as GaussianKernel
 from .laplacian import Laplacian as Laplacian
+from .laplacian import dirichlet_laplacian as dirichlet_laplacian
 from .robust import robust_laplacian as robust_laplacian
 from .smoothing import denoise as denoise
 from .smoothing import noise_level as noise_level

@@ -1,15 +1,21 @@
-"""The one form that every discretization of the Laplace operator takes."""
+"""The one form that every discretization of the Laplace operator takes, and its boundary conditions.
 
-from dataclasses import dataclass
+Every operator has the Neumann condition by default: points that are not fixed are free. Fixing the
+whole boundary gives the Dirichlet condition, fixing a part of it the mixed one.
+"""
+
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arguments import require_type
+from eigenshape._arrays import ReadOnly, as_array
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
+from eigenshape._typing import ArrayLike
 from eigenshape.sparse.frozen import freeze_sparse
 
 # Largest difference of W_ij and W_ji, relative to the largest entry, that is accepted as rounding.
@@ -149,6 +155,79 @@ def find_zero_row_sums(matrix: sp.sparray) -> Bool[np.ndarray, " n"]:
     """
     sums, sizes = np.abs(matrix.sum(axis=1)), abs(matrix).sum(axis=1)
     return np.asarray(sums <= ZERO_ROW_SUM * sizes)
+
+
+def dirichlet_laplacian(
+    laplacian: Laplacian, fixed: ArrayLike
+) -> tuple[Laplacian, Int[np.ndarray, " free"]]:
+    """Restrict an operator to functions that are zero at some points.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+    fixed : (c,) int
+        Points where functions are zero; duplicates are allowed.
+        `es.geometry.boundary_vertices(mesh)` is the whole boundary of a mesh.
+
+    Returns
+    -------
+    inner : Laplacian
+        On the free points. Rows of W no longer sum to zero, and W is positive definite on each
+        component that has a fixed point.
+    free : (n - c,) int
+        The free points, ascending: row i of `inner` is point free[i].
+
+    Raises
+    ------
+    InvalidParameterError
+        If a fixed point is out of range, or no point is free.
+
+    See Also
+    --------
+    solve_spectrum : Its argument `fixed` solves this operator and returns all points.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(3, 3)
+    >>> rim = es.geometry.boundary_vertices(square)
+    >>> inner, free = es.operators.dirichlet_laplacian(es.cotangent_laplacian(square), rim)
+    >>> inner.n_points, free.tolist()
+    (4, [5, 6, 9, 10])
+    """
+    require_type(laplacian, Laplacian, "laplacian")
+    points = require_points(fixed, laplacian.n_points)
+    if not points.size:  # a copy of a million rows takes a second
+        return laplacian, np.arange(laplacian.n_points)
+    free = np.setdiff1d(np.arange(laplacian.n_points), points)
+    if not free.size:
+        raise InvalidParameterError(
+            f"At least one point must be free; all {laplacian.n_points} are fixed."
+        )
+    cut = {name: getattr(laplacian, name)[free][:, free] for name in ("stiffness", "mass")}
+    return replace(laplacian, **cut), free
+
+
+def require_points(fixed: ArrayLike, n_points: int) -> Int[np.ndarray, " c"]:
+    """Return `fixed` as an array of points, in its order and with its duplicates.
+
+    Raises
+    ------
+    InvalidParameterError
+        If an entry is no point number, or out of range.
+    """
+    points = np.atleast_1d(as_array(fixed, "fixed"))
+    if points.size and points.dtype.kind not in "iu":
+        raise InvalidParameterError(
+            f"fixed must be a list of point numbers; the type of its entries is {points.dtype}. "
+            f"Pass np.flatnonzero(mask) for a mask."
+        )
+    bad = np.flatnonzero((points < 0) | (points >= n_points))
+    if bad.size:
+        raise InvalidParameterError(
+            f"fixed must hold points 0..{n_points - 1}; entry {bad[0]} is {points[bad[0]]}."
+        )
+    return points.astype(np.int64)
 
 
 def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:

@@ -11,7 +11,6 @@ from .fields import value_colors as value_colors
 from .figure import save_figure as save_figure
 from .persistence import figure_diagram as figure_diagram
 from .persistence import figure_merge_tree as figure_merge_tree
-from .poses import figure_poses as figure_poses
 from .render import Drawing as Drawing
 from .render import draw as draw
 from .shape_pairs import figure_match as figure_match
@@ -19,4 +18,5 @@ from .shape_pairs import figure_stability as figure_stability
 from .sheet import Panel as Panel
 from .sheet import figure_contact_sheet as figure_contact_sheet
 from .sheet import figure_label_transfer as figure_label_transfer
+from .sheet import figure_poses as figure_poses
 from .view import view as view

@@ -58,7 +58,7 @@ ALONG_UP = 1e-6
 # Length of the mean normal above which a surface counts as a scan. A closed surface has 0, a flat
 # piece 1.
 ONE_WAY = 0.3
-MARGIN = 0.04  # share of the picture that is left free on each side
+FREE_BORDER = 0.04  # share of the picture that is left free on each side
 # Points at most this share of the longest side of the box above the lowest point carry the shape.
 SOLE = 0.02
 # z is up only if the base along z is this many times larger: a smaller factor turns over many
@@ -330,5 +330,5 @@ def in_picture(mesh: TriangleMesh, camera: Camera) -> Float[np.ndarray, "n 3"]:
     points = scale_to_unit(mesh)[0] @ camera.rotation.T
     low, high = points.min(axis=0), points.max(axis=0)
     span = max(float((high - low)[:2].max()), np.finfo(np.float64).tiny)
-    scale = camera.size * (1 - 2 * MARGIN) / span
+    scale = camera.size * (1 - 2 * FREE_BORDER) / span
     return (points - (low + high) / 2) * scale + [camera.size / 2, camera.size / 2, 0.0]

@@ -18,7 +18,7 @@ KINDS = {  # color, marker and text of each kind of pair
     "loops": ("#9467bd", "o", "loops that nothing fills"),
 }
 HEADROOM = 1.12  # height of stems that never merge, in units of the highest merge
-QUIET = "#b0b0b0"
+GUIDE = "#b0b0b0"
 
 
 def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> Figure:
@@ -64,7 +64,7 @@ def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> F
     low, high = float(diagram.components.births.min()), float(diagram.components.deaths.max())
     margin = 0.05 * (high - low) or 0.5 * max(abs(high), np.finfo(np.float64).tiny)
     low, high = low - margin, high + margin
-    axes.plot([low, high], [low, high], color=QUIET, lw=1, zorder=1)
+    axes.plot([low, high], [low, high], color=GUIDE, lw=1, zorder=1)
     axes.set(xlim=(low, high), ylim=(low, high), aspect="equal")
     axes.set_xlabel(f"birth: {label}")
     axes.set_ylabel(f"death: {label}")
@@ -127,7 +127,7 @@ def figure_merge_tree(
     for number in np.flatnonzero(~merging):  # an arrow: upward for ever
         x, y, color = place[number], height[number], colors[number]
         axes.plot(x, y, "^", color=color, markersize=8, clip_on=False, zorder=5)
-    axes.hlines(height[merging], place[into[merging]], place[merging], colors=QUIET, lw=1, zorder=2)
+    axes.hlines(height[merging], place[into[merging]], place[merging], colors=GUIDE, lw=1, zorder=2)
     axes.set_xticks(place, [str(number) for number in range(shown)], fontsize=7)
     axes.set(ylim=(0, top), xlim=(-0.8, shown - 0.2))
     more = len(tree.maxima) - shown

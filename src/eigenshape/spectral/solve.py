@@ -14,8 +14,7 @@ from eigenshape._files import as_path
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
-from eigenshape.operators.boundary import dirichlet_laplacian
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.spectral.multilevel.approximate import approximate_pairs
 from eigenshape.spectral.multilevel.start import require_accuracy, require_lumped
 from eigenshape.spectral.solver.cache import content_key, keep, load_kept, require_writable

@@ -20,7 +20,7 @@ from eigenshape.geometry.topology import is_closed
 
 # Points may be this many sizes of the mesh away: products of three distances stay below 1e200, and
 # floats end at 1e308.
-FARTHEST = 1e50
+FARTHEST_SIZES = 1e50
 # Winding numbers above this are inside: those of a closed surface are 1 there and 0 outside, and a
 # small hole changes them by little.
 INSIDE = 0.5
@@ -203,10 +203,10 @@ def _scale_both(
     corners, scale = size_one(corners - middle)
     with np.errstate(over="ignore"):
         scaled = (places - middle) / scale
-    far = np.flatnonzero((np.abs(scaled) > FARTHEST).any(axis=1))
+    far = np.flatnonzero((np.abs(scaled) > FARTHEST_SIZES).any(axis=1))
     if far.size:
         raise InvalidParameterError(
-            f"Points must lie within {FARTHEST:.0e} sizes of the mesh; point {far[0]} is at "
+            f"Points must lie within {FARTHEST_SIZES:.0e} sizes of the mesh; point {far[0]} is at "
             f"{places[far[0]].tolist()} ({far.size} such). Seen from there the mesh is a point."
         )
     return corners, scaled, scale

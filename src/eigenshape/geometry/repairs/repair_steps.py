@@ -45,7 +45,7 @@ NEEDLE = 1e-6
 # A side shorter than this share of the longest side of the whole mesh is collapsed too: the area
 # there is below 1e-18 of others, and rounding hides one beside the other. Surfaces graded by tens
 # from side to side are solved down to 1e-9, and no longer at 1e-10.
-TINY = 1e-9
+TINY_SIDE = 1e-9
 
 
 def weld(mesh: MeshT, *, tolerance: float = 0.0) -> RepairedMesh[MeshT]:
@@ -175,7 +175,7 @@ def collapse_needles(mesh: MeshT) -> RepairedMesh[MeshT]:
     corners, _ = scaled_corners(mesh)
     lengths = side_lengths(corners)
     # Sides of length 0 belong to faces without area, which `drop_degenerate` removes.
-    least = np.maximum(NEEDLE * lengths.max(axis=1, keepdims=True), TINY * lengths.max())
+    least = np.maximum(NEEDLE * lengths.max(axis=1, keepdims=True), TINY_SIDE * lengths.max())
     short = (lengths > 0) & (lengths < least)
     in_simplex, side = np.nonzero(short)
     if short.any(axis=1).all():
