@@ -1,7 +1,7 @@
 """The direction of the view, and where the points of a shape lie in the picture."""
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -37,7 +37,7 @@ View = TypeAliasType(
     ]
     | ArrayLike,
 )
-UP_NAMES = get_args(get_args(Up)[0])
+UP_NAMES = ("auto", "x", "y", "z", "-x", "-y", "-z")
 # The parts of front, left and up in the direction to the viewer, for each name of a view. Views of
 # two words are a little from above.
 VIEWS = {
