@@ -15,8 +15,8 @@ from tetrahedra import TETRAHEDRON
 
 from eigenshape import FileFormatError, read_shape
 from eigenshape.io import parsing
+from eigenshape.io.formats.unpacking import LZMA, ZLIB, unpack_block
 from eigenshape.io.mesh_files import read_mesh, write_mesh
-from eigenshape.io.unpacking import LZMA, ZLIB, unpack_block
 
 GIGABYTES = 2**32 - 2**24
 BLOCK = 2**24
@@ -26,7 +26,7 @@ PACK = {ZLIB: lambda data: zlib.compress(data, 9), LZMA: lzma.compress}
 MEASURE = """
 import resource, sys
 from eigenshape import EigenshapeError, read_shape
-from eigenshape.io.lzf_loops import decompress
+from eigenshape.io.formats.lzf_loops import decompress
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 for path in sys.argv[1:]:
     try:

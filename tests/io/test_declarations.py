@@ -10,7 +10,7 @@ from test_shape_files import CUBE, CURVE, POLYDATA
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.io.pcd import parse as parse_pcd
+from eigenshape.io.formats.pcd import parse as parse_pcd
 from eigenshape.io.shape_files import read_shape
 
 PLACES = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n"

@@ -17,7 +17,7 @@ from test_ply import HEADER, TEXT_ROWS, binary_rows, simple
 from tetrahedra import FILES
 
 from eigenshape import EigenshapeError, FileFormatError, TriangleMesh, read_mesh
-from eigenshape.io import glb, obj, ply
+from eigenshape.io.formats import glb, obj, ply
 from eigenshape.io.parsing import PARSERS
 
 MANY = 2**31

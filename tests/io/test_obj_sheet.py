@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from eigenshape import FileFormatError, TriangleMesh
 from eigenshape.geometry.repairs.repair import REPAIRS, repair
 from eigenshape.io.attributes import plain_attributes
-from eigenshape.io.obj import parse
-from eigenshape.io.obj_sheet import format_sheet, read_sheet
+from eigenshape.io.formats.obj import parse
+from eigenshape.io.formats.obj_sheet import format_sheet, read_sheet
 
 CUBE = b"""# a cube, its last vertex twice, and one that nothing uses
 mtllib cube#1.mtl

@@ -14,7 +14,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.io.lzf_loops import decompress
+from eigenshape.io.formats.lzf_loops import decompress
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.shape_files import read_points, read_shape, write_points
 from eigenshape.shapes.domains import box, disc

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io import glb, glb_attributes, obj, obj_attributes, off, ply, stl
 from eigenshape.io.attributes import plain_attributes
+from eigenshape.io.formats import glb, glb_attributes, obj, obj_attributes, off, ply, stl
 
 VERTICES = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]

@@ -18,8 +18,8 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.io import npz, vtk_legacy, vtu
 from eigenshape.io.attributes import MeshAttributes, plain_attributes
+from eigenshape.io.formats import npz, vtk, vtu
 from eigenshape.io.parsing import naming, suffix_of
 
 FIELD_FORMATS = (".vtu", ".vtk", ".npz")
@@ -226,7 +226,7 @@ def _parse_fields(data: bytes, suffix: str) -> Fields:
             for begin in (VERTEX_FIELD, FACE_FIELD)
         ]
     else:
-        parse = vtu.parse_fields if suffix == ".vtu" else vtk_legacy.parse_fields
+        parse = vtu.parse_fields if suffix == ".vtu" else vtk.parse_fields
         tables = [*parse(data)]
     of_vertices, of_faces = tables
     found = dict(of_vertices)

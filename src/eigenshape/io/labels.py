@@ -9,8 +9,8 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular, replace_file
-from eigenshape.io.ply import parse_labels
-from eigenshape.io.text import INT64, Line, lines_of, quote_line, whole, whole_table
+from eigenshape.io.formats.ply import parse_labels
+from eigenshape.io.formats.text import INT64, Line, lines_of, quote_line, whole, whole_table
 
 KEY = "face_labels"
 LABEL = ("A label", "the label of one face")

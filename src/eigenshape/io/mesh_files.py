@@ -13,7 +13,6 @@ from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import as_path, read_regular, replace_file
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io import glb_attributes, obj_attributes, off, ply, ply_attributes, stl
 from eigenshape.io.attributes import (
     MeshAttributes,
     SourceFile,
@@ -22,9 +21,10 @@ from eigenshape.io.attributes import (
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.cells import require_kind
 from eigenshape.io.fields import FIELD_FORMATS, format_fields, read_field_attributes
+from eigenshape.io.formats import glb_attributes, obj_attributes, off, ply, ply_attributes, stl
+from eigenshape.io.formats.cell_kinds import CellKind
+from eigenshape.io.formats.cells import require_kind
 from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, require_finite, suffix_of
 
 TEXT: dict[str, Callable[..., bytes]] = {

@@ -10,10 +10,10 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape._files import require_regular
-from eigenshape.geometry.repairs.repair_report import PLURALS, count_nouns
-from eigenshape.io import glb, gmsh, medit, npz, obj, off, ply, stl, vtk_legacy, vtu
-from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.cells import SEGMENTS, Blocks, select_cells, split_sentence
+from eigenshape.geometry.repair_report import PLURALS, count_nouns
+from eigenshape.io.formats import glb, gmsh, medit, npz, obj, off, ply, stl, vtk, vtu
+from eigenshape.io.formats.cell_kinds import CellKind
+from eigenshape.io.formats.cells import SEGMENTS, Blocks, select_cells, split_sentence
 
 # Formats that are parsed to vertices, and triangles or segments.
 PARSERS = {
@@ -146,4 +146,4 @@ def _blocks(
     if suffix == ".gltf":
         points, simplices = glb.parse(data, path.parent)
         return points, {"triangles": simplices}
-    return vtk_legacy.parse(data, cells) if suffix == ".vtk" else GRIDS[suffix](data)
+    return vtk.parse(data, cells) if suffix == ".vtk" else GRIDS[suffix](data)

@@ -11,9 +11,9 @@ from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.io import pcd, ply, points
-from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.cells import require_kind
+from eigenshape.io.formats import pcd, ply, points
+from eigenshape.io.formats.cell_kinds import CellKind
+from eigenshape.io.formats.cells import require_kind
 from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, require_finite, suffix_of
 
 POINTS = {".pts": points.parse, ".xyz": points.parse, ".pcd": pcd.parse}

@@ -12,7 +12,7 @@ from eigenshape.geometry.repairs.repair import repair, suggest_repairs
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
-from eigenshape.io import pcd
+from eigenshape.io.formats import pcd
 from eigenshape.io.mesh_files import require_surface
 from eigenshape.io.parsing import naming, parse_mesh, require_finite, suffix_of
 from eigenshape.io.shape_files import POINTS, SHAPE_FORMATS

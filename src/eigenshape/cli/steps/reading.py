@@ -18,7 +18,7 @@ from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io import mesh_files, shape_files
-from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.formats.cell_kinds import CellKind
 from eigenshape.io.labeled_shapes import (
     find_labeled_shapes,
     read_label_names,

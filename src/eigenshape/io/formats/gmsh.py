@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.cells import SEGMENTS, require_splittable
-from eigenshape.io.text import numbers_of, quote_line, wholes
+from eigenshape.io.formats.cells import SEGMENTS, require_splittable
+from eigenshape.io.formats.text import numbers_of, quote_line, wholes
 
 VERSIONS = {b"2": 2, b"2.1": 2, b"2.2": 2, b"4": 4, b"4.1": 4}
 POINT = 15  # elements of one node, which are ignored

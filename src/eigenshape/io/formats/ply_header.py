@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.text import quote_line
+from eigenshape.io.formats.text import quote_line
 
 TYPES = {
     "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",

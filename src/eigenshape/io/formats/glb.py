@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.gltf import Gltf, Scene, decode_buffers, place_triangles
-from eigenshape.io.text import quote_line
+from eigenshape.io.formats.gltf import Gltf, Scene, decode_buffers, place_triangles
+from eigenshape.io.formats.text import quote_line
 
 JSON_CHUNK = b"JSON"
 BINARY_CHUNK = b"BIN\0"

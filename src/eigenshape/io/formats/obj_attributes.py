@@ -17,8 +17,8 @@ from eigenshape.io.attributes import (
     corner_normals,
     plain_attributes,
 )
-from eigenshape.io.obj_sheet import ObjSheet, format_sheet, read_sheet
-from eigenshape.io.text import rows_text
+from eigenshape.io.formats.obj_sheet import ObjSheet, format_sheet, read_sheet
+from eigenshape.io.formats.text import rows_text
 
 MAP = re.compile(r"(?im)^([ \t]*(?:map_\w+|bump|disp|decal|norm|refl)[ \t]+)(.+?)[ \t\r]*$")
 PLAIN_MATERIAL = {"newmtl", "kd", "d", "tr", "map_kd", "ka", "ke", "ks", "ns", "ni", "illum"}

@@ -8,8 +8,8 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.geometry.solids import N_TETRAHEDRA, split_solids
-from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.text import fans
+from eigenshape.io.formats.cell_kinds import CellKind
+from eigenshape.io.formats.text import fans
 
 SEGMENTS = "segments"
 SOLIDS = ("hexahedra", "wedges", "pyramids")

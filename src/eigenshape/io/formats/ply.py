@@ -10,8 +10,8 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.ply_header import TEXT, Column, Element, parse_header
-from eigenshape.io.text import (
+from eigenshape.io.formats.ply_header import TEXT, Column, Element, parse_header
+from eigenshape.io.formats.text import (
     Line,
     fans,
     lines_of,

@@ -5,7 +5,7 @@ from io import BytesIO
 import numpy as np
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.unpacking import require_reasonable
+from eigenshape.io.formats.unpacking import require_reasonable
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.cells import SEGMENTS
+from eigenshape.io.formats.cells import SEGMENTS
 
 VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, QUAD, TETRAHEDRON = 1, 2, 3, 4, 5, 9, 10
 HEXAHEDRON, WEDGE, PYRAMID = 12, 13, 14

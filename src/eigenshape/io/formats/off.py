@@ -7,7 +7,7 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.text import (
+from eigenshape.io.formats.text import (
     Line,
     coordinates,
     fans,

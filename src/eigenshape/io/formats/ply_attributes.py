@@ -19,10 +19,10 @@ from eigenshape.io.attributes import (
     corner_normals,
     plain_attributes,
 )
-from eigenshape.io.obj_attributes import find_beside
-from eigenshape.io.ply import AXES, CORNERS, LABEL, Table, read_lists, read_tables
-from eigenshape.io.ply_header import Column, parse_header
-from eigenshape.io.text import fans
+from eigenshape.io.formats.obj_attributes import find_beside
+from eigenshape.io.formats.ply import AXES, CORNERS, LABEL, Table, read_lists, read_tables
+from eigenshape.io.formats.ply_header import Column, parse_header
+from eigenshape.io.formats.text import fans
 
 IMAGE = re.compile(rb"(?m)^comment TextureFile[ \t]+(.+?)[ \t\r]*$")  # as MeshLab writes it
 TINTS = ("red", "green", "blue")

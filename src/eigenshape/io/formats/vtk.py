@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.cells import SEGMENTS, four_cornered
-from eigenshape.io.text import fans, numbers_of, quote_line, strip_triangles, wholes
-from eigenshape.io.vtk_cells import CellLists, cells_of_types
+from eigenshape.io.formats.cell_kinds import CellKind
+from eigenshape.io.formats.cells import SEGMENTS, four_cornered
+from eigenshape.io.formats.text import fans, numbers_of, quote_line, strip_triangles, wholes
+from eigenshape.io.formats.vtk_cells import CellLists, cells_of_types
 
 KINDS = {
     b"float": ">f4", b"double": ">f8", b"char": ">i1", b"unsigned_char": ">u1", b"int": ">i4",

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.text import coordinates, lines_of, quote_line, rows_text, whole
+from eigenshape.io.formats.text import coordinates, lines_of, quote_line, rows_text, whole
 
 EXPE = b"[Expe/PointSet/Binary/"
 

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.lzf_loops import decompress
-from eigenshape.io.text import Line, coordinates, lines_of, number_table, quote_line, whole
-from eigenshape.io.unpacking import require_reasonable
+from eigenshape.io.formats.lzf_loops import decompress
+from eigenshape.io.formats.text import Line, coordinates, lines_of, number_table, quote_line, whole
+from eigenshape.io.formats.unpacking import require_reasonable
 
 AXES = (b"x", b"y", b"z")
 KINDS = {(b"F", 4): "<f4", (b"F", 8): "<f8"}

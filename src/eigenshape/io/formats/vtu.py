@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.text import numbers_of, wholes
-from eigenshape.io.unpacking import COMPRESSORS, require_reasonable, unpack_block
-from eigenshape.io.vtk_cells import CellLists, cells_of_types
+from eigenshape.io.formats.text import numbers_of, wholes
+from eigenshape.io.formats.unpacking import COMPRESSORS, require_reasonable, unpack_block
+from eigenshape.io.formats.vtk_cells import CellLists, cells_of_types
 
 HEADER_TYPES = {"UInt32": "u4", "UInt64": "u8"}
 ORDERS = {"LittleEndian": "<", "BigEndian": ">"}

@@ -26,8 +26,8 @@ from eigenshape.io.attributes import (
     unit_rows,
 )
 from eigenshape.io.carrying import interpolate
-from eigenshape.io.glb import pack, read_gltf, read_scene
-from eigenshape.io.gltf import (
+from eigenshape.io.formats.glb import pack, read_gltf, read_scene
+from eigenshape.io.formats.gltf import (
     SURFACES,
     Gltf,
     Scene,
@@ -36,7 +36,7 @@ from eigenshape.io.gltf import (
     raw_accessor,
     read_accessor,
 )
-from eigenshape.io.stl import single_precision
+from eigenshape.io.formats.stl import single_precision
 
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.text import (
+from eigenshape.io.formats.text import (
     Line,
     coordinates,
     fans,
