@@ -9,7 +9,7 @@ import typer
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
-from eigenshape.io.formats.cell_kinds import CellKind
+from eigenshape.io.formats.registry import CellKind
 from eigenshape.retrieval.heat.recipe import PRESETS
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]

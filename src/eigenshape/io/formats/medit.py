@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.cells import SEGMENTS, require_splittable
+from eigenshape.io.formats.cursor import Cursor
 from eigenshape.io.formats.text import numbers_of, quote_line, wholes
 
 CELLS = {
@@ -57,14 +58,19 @@ POLYTOPES = {46, 47}
 Found = tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarray, "_ _"]]]
 
 
-def parse_text(data: bytes) -> Found:
-    """Return the points, and the cells by kind, of a text file.
+def parse(data: bytes) -> Found:
+    """Return the points, and the cells by kind; only binary files hold zero bytes.
 
     Raises
     ------
     FileFormatError
-        If a keyword is unknown, or a section does not hold what it declares.
+        If a keyword is unknown, a section does not hold what it declares, or a cell has curved sides
+        or any number of corners.
     """
+    return _parse_binary(data) if b"\0" in data[:8] else _parse_text(data)
+
+
+def _parse_text(data: bytes) -> Found:
     text = NO_NUMBERS.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n"))
     keywords = list(KEYWORD.finditer(text))
     before = text[: keywords[0].start()] if keywords else text
@@ -143,18 +149,11 @@ def _blocks(tables: dict[str, list[np.ndarray]]) -> dict[str, Int[np.ndarray, "_
     }
 
 
-def parse_binary(data: bytes) -> Found:
-    """Return the points, and the cells by kind, of a binary file of version 1 to 4.
-
-    Both byte orders are read.
-
-    Raises
-    ------
-    FileFormatError
-        If the file ends early, or a cell has curved sides or any number of corners.
-    """
+def _parse_binary(data: bytes) -> Found:
+    """Read a file of version 1 to 4, of either byte order."""
     order = {1: "<", 2**24: ">"}.get(int.from_bytes(data[:4], "little"), "")
-    version = int(_read_items(data, 4, order + "i4", 1)[0]) if order else 0
+    cursor = Cursor(data, "A binary Medit file", place=4)
+    version = int(cursor.take(order + "i4", 1)[0]) if order else 0
     if not 1 <= version <= 4:
         raise FileFormatError(
             f"A binary Medit file must begin with 1 and a version of 1 to 4; it has {data[:8]!r}."
@@ -164,51 +163,32 @@ def parse_binary(data: bytes) -> Found:
     real = order + ("f4" if version == 1 else "f8")
     dimension, points = 0, np.empty((0, 0))
     tables: dict[str, list[np.ndarray]] = {}
-    place = 8
-    while (code := int(_read_items(data, place, order + "i4", 1)[0])) != END:
-        following = int(_read_items(data, place + 4, position, 1)[0])
-        place += 4 + np.dtype(position).itemsize
+    while (code := int(cursor.take(order + "i4", 1)[0])) != END:
+        following = int(cursor.take(position, 1)[0])
         if code == DIMENSION:
-            dimension = int(_read_items(data, place, order + "i4", 1)[0])
-            place += 4
+            dimension = int(cursor.take(order + "i4", 1)[0])
             if dimension not in (2, 3):
                 raise FileFormatError(
                     f"Dimension of a Medit file must be 2 or 3; it is {dimension}."
                 )
-        elif code == VERTICES or code in CODES:
-            name = CODES.get(code, "Vertices")
-            count = int(_read_items(data, place, whole, 1)[0])
-            place += np.dtype(whole).itemsize
-            width = CELLS.get(name, 0) + 1
-            row = np.dtype(
-                [("point", real, (dimension,)), ("label", whole)]
-                if code == VERTICES
-                else (whole, (width,))
-            )
-            rows = _read_items(data, place, row, count)
-            place += count * row.itemsize
-            if code == VERTICES:
-                points = rows["point"].astype(np.float64)
-            else:
-                tables.setdefault(name, []).append(rows)
+        elif code == VERTICES:
+            row = np.dtype([("point", real, (dimension,)), ("label", whole)])
+            count = int(cursor.take(whole, 1)[0])
+            points = cursor.take(row, count)["point"].astype(np.float64)
+        elif code in CODES:
+            name = CODES[code]
+            width = CELLS[name] + 1
+            count = int(cursor.take(whole, 1)[0])
+            rows = cursor.take(whole, count * width).reshape(count, width)
+            tables.setdefault(name, []).append(rows)
         else:
             require_splittable(
                 ["curved cells"] if code in CURVED else ["polytopes"] if code in POLYTOPES else []
             )
-            if not (0 < code <= LAST and place < following <= len(data)):
+            if not (0 < code <= LAST and cursor.place < following <= len(data)):
                 raise FileFormatError(
                     f"Sections of a binary Medit file must have a keyword of 1 to {LAST} and the "
                     f"place of the next section; one has keyword {code} and place {following} of {len(data)}."
                 )
-            place = following
+            cursor.place = following
     return points, _blocks(tables)
-
-
-def _read_items(data: bytes, place: int, kind: str | np.dtype, count: int) -> np.ndarray:
-    size = count * np.dtype(kind).itemsize
-    if not 0 <= size <= len(data) - place:
-        raise FileFormatError(
-            f"A binary Medit file must hold what it declares; {count} items of "
-            f"{np.dtype(kind).itemsize} bytes at byte {place} do not fit into its {len(data)} bytes."
-        )
-    return np.frombuffer(data, kind, count, place)

@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from eigenshape._errors import FileFormatError
+from eigenshape.io.formats.cells import fans
 from eigenshape.io.formats.text import (
     Line,
     coordinates,
-    fans,
     lines_of,
     quote_line,
     whole,

@@ -13,12 +13,13 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
+    WriteJob,
     corner_normals,
     plain_attributes,
 )
 from eigenshape.io.formats.obj_sheet import ObjSheet, format_sheet, read_sheet
 from eigenshape.io.formats.text import rows_text
+from eigenshape.io.sources import SourceFile
 
 MAP = re.compile(r"(?im)^([ \t]*(?:map_\w+|bump|disp|decal|norm|refl)[ \t]+)(.+?)[ \t\r]*$")
 PLAIN_MATERIAL = {"newmtl", "kd", "d", "tr", "map_kd", "ka", "ke", "ks", "ns", "ni", "illum"}
@@ -173,6 +174,17 @@ def _material_blocks(text: str) -> Iterator[tuple[str, list[tuple[str, str]]]]:
             row.strip().split(None, 1) for row in rows if row.strip() and row.strip()[0] != "#"
         ]
         yield name.strip(), [(pair[0].lower(), pair[1] if len(pair) > 1 else "") for pair in words]
+
+
+def write(job: WriteJob) -> Files:
+    """Write an OBJ file with its materials and images beside it: that of the source, or a new one."""
+    held, source = job.attributes, job.attributes.source
+    if source and source.suffix == ".obj" and held.from_file.mean() > 0.5:
+        files, lost = rewrite(source, held, job.mesh, job.path)
+        job.lost.extend(lost)
+        return files
+    job.lose(["fields"])
+    return write_new(held, job.mesh, job.path)
 
 
 def rewrite(

@@ -11,8 +11,14 @@ from jaxtyping import Float, Int
 
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.io.attributes import MeshAttributes, unit_rows
+from eigenshape.io.formats.cells import fans
 from eigenshape.io.formats.obj import corner_index, join_lines
-from eigenshape.io.formats.text import Line, coordinates, fans, rows_text, whole
+from eigenshape.io.formats.text import (
+    Line,
+    coordinates,
+    rows_text,
+    whole,
+)
 
 KEPT = (b"vt", b"o", b"g", b"s", b"usemtl", b"mtllib")
 OTHER_LINES = {"l": "polylines", "p": "points"}

@@ -7,10 +7,10 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.formats.cells import fans
 from eigenshape.io.formats.text import (
     Line,
     coordinates,
-    fans,
     lines_of,
     number,
     quote_line,
@@ -171,7 +171,7 @@ def _corners(row: Line) -> list[int]:
     return [whole(word, row, "A corner") for word in words[1 : 1 + count]]
 
 
-def format_mesh(mesh: TriangleMesh) -> bytes:
+def format_text(mesh: TriangleMesh) -> bytes:
     """Write a mesh so that it reads back exactly."""
     lines = [
         f"OFF\n{mesh.n_vertices} {mesh.n_faces} 0",

@@ -10,16 +10,15 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.formats.cells import fans, strip_triangles
 from eigenshape.io.formats.ply_header import TEXT, Column, Element, parse_header
 from eigenshape.io.formats.text import (
     Line,
-    fans,
     lines_of,
     number,
     number_table,
     quote_line,
     rows_text,
-    strip_triangles,
     whole,
     whole_table,
 )
@@ -303,7 +302,7 @@ def _columns(
     return {"vertex": places | (of_vertices or {}), "face": corners | (of_faces or {})}
 
 
-def format_points(points: np.ndarray) -> bytes:
+def format_points(points: np.ndarray, _suffix: str) -> bytes:
     """Write points without faces, in binary."""
     lines = [
         "ply", "format binary_little_endian 1.0",

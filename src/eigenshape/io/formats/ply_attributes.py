@@ -4,10 +4,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
@@ -15,14 +16,24 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
+    WriteJob,
     corner_normals,
     plain_attributes,
 )
+from eigenshape.io.formats.cells import fans
 from eigenshape.io.formats.obj_attributes import find_beside
-from eigenshape.io.formats.ply import AXES, CORNERS, LABEL, Table, read_lists, read_tables
+from eigenshape.io.formats.ply import (
+    AXES,
+    CORNERS,
+    LABEL,
+    Table,
+    format_binary,
+    format_text,
+    read_lists,
+    read_tables,
+)
 from eigenshape.io.formats.ply_header import Column, parse_header
-from eigenshape.io.formats.text import fans
+from eigenshape.io.sources import SourceFile
 
 IMAGE = re.compile(rb"(?m)^comment TextureFile[ \t]+(.+?)[ \t\r]*$")  # as MeshLab writes it
 TINTS = ("red", "green", "blue")
@@ -132,13 +143,10 @@ def _typed(values: Any, column: Column) -> np.ndarray:
     return _numbers(values).ravel().astype(kinds.get(column.kind, np.float64))
 
 
-def columns(
-    held: MeshAttributes,
-    mesh: TriangleMesh,
-    labels: Int[np.ndarray, " f"] | None,
-    lost: list[str],
-) -> tuple[Table, Table]:
-    """Return the columns of vertices and faces to write, and add to `lost` what they do not keep."""
+def write(job: WriteJob) -> dict[Path, bytes]:
+    """Write a PLY file with columns of vertices and faces."""
+    mesh, held, labels, lost = job.mesh, job.attributes, job.face_labels, job.lost
+    job.lose([])
     of_vertices: Table = {}
     of_faces: Table = {}
     if held.colors is not None:
@@ -172,7 +180,8 @@ def columns(
     lost += [name for name in ("materials", "images") if held.contents[name]]
     if held.contents["names of groups"] and not (numbered and labels is None):
         lost.append("names of groups")
-    return of_vertices, of_faces
+    format_columns = format_binary if job.binary else format_text
+    return {job.path: format_columns(mesh, of_vertices, of_faces)}
 
 
 def _kind(values: np.ndarray) -> type[np.generic]:

@@ -1,15 +1,23 @@
 """Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID, and functions on them."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.cell_kinds import CellKind
-from eigenshape.io.formats.cells import SEGMENTS, four_cornered
-from eigenshape.io.formats.text import fans, numbers_of, quote_line, strip_triangles, wholes
-from eigenshape.io.formats.vtk_cells import CellLists, cells_of_types
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.formats.cells import (
+    FOUR_CORNERED,
+    SEGMENTS,
+    CellLists,
+    cells_of_types,
+    fans,
+    strip_triangles,
+)
+from eigenshape.io.formats.cursor import Cursor
+from eigenshape.io.formats.text import quote_line, wholes
 
 KINDS = {
     b"float": ">f4", b"double": ">f8", b"char": ">i1", b"unsigned_char": ">u1", b"int": ">i4",
@@ -20,30 +28,27 @@ SECTIONS = {b"VERTICES": 1, b"LINES": 2, b"POLYGONS": 3, b"TRIANGLE_STRIPS": 3, 
 DATA_SECTIONS = (b"POINT_DATA", b"CELL_DATA")
 WIDTHS = {b"VECTORS": 3, b"NORMALS": 3, b"TENSORS": 9}  # numbers a row
 DATASETS = (b"POLYDATA", b"UNSTRUCTURED_GRID")
+LEGACY_TYPES = {
+    "f8": "double", "f4": "float", "i8": "vtktypeint64", "i4": "int", "u1": "unsigned_char",
+}  # fmt: skip
+Arrays = dict[str, np.ndarray]
 
 
-class _Cursor:
-    """A position in the file, and the encoding of its numbers."""
+class _File(Cursor):
+    """A cursor that knows names of types of numbers, and skips blank lines."""
 
     def __init__(self, data: bytes) -> None:
-        self.data, self.place = data, 0
-        self._raw_line()  # version
-        self._raw_line()  # title, which may be blank
-        self.binary = self._raw_line().upper() == b"BINARY"
-
-    def _raw_line(self) -> bytes:
-        end = self.data.find(b"\n", self.place)
-        end = len(self.data) if end < 0 else end
-        text, self.place = self.data[self.place : end].strip(), end + 1
-        return text
+        super().__init__(data, "A VTK file")
+        super().line()  # version
+        super().line()  # title, which may be blank
+        self.is_text = super().line().upper() != b"BINARY"
 
     def line(self) -> bytes:
         """Return the next line that is not blank, or an empty one at the end."""
-        while self.place < len(self.data):
-            text = self._raw_line()
-            if text:
-                return text
-        return b""
+        text = b""
+        while not text and self.place < len(self.data):
+            text = super().line()
+        return text
 
     def numbers(self, count: int, kind: bytes) -> np.ndarray:
         """Return the next `count` numbers; raise an error if there are fewer."""
@@ -51,61 +56,22 @@ class _Cursor:
             raise FileFormatError(
                 f"Numbers of a VTK file must be {b', '.join(KINDS).decode()}; they are {kind!r}."
             )
-        if not 0 <= count <= len(self.data):
-            raise FileFormatError(
-                f"A VTK file must hold what it declares; {count} numbers do not fit into it."
-            )
-        return (
-            self._binary_numbers(count, KINDS[kind]) if self.binary else self._text_numbers(count)
-        )
-
-    def _binary_numbers(self, count: int, kind: str) -> np.ndarray:
-        size = count * np.dtype(kind).itemsize
-        if self.place + size > len(self.data):
-            raise FileFormatError(
-                f"A VTK file must hold what it declares; it ends within {count} numbers."
-            )
-        found = np.frombuffer(self.data, kind, count, self.place)
-        self.place += size
-        return found
-
-    def _text_numbers(self, count: int) -> np.ndarray:
-        words = self.data[self.place :].split(None, count)
-        try:
-            found = numbers_of(words[:count])
-        except ValueError as err:
-            raise FileFormatError(
-                f"A VTK file must hold {count} numbers at byte {self.place}; it does not."
-            ) from err
-        if len(found) < count:
-            raise FileFormatError(
-                f"A VTK file must hold what it declares; it ends within {count} numbers."
-            )
-        if count and len(words) == count and not self.data[-1:].isspace():
-            raise FileFormatError(
-                "A VTK file must be whole; its last number has no line break after it."
-            )
-        self.place = len(self.data) - len(words[count]) if len(words) > count else len(self.data)
-        return found
+        return self.take(KINDS[kind], count)
 
     def wholes(self, count: int, kind: bytes) -> Int[np.ndarray, " k"]:
         """Return the next numbers, all of them whole."""
         return wholes(self.numbers(count, kind), "Cells of a VTK file")
 
 
-def parse(
-    data: bytes, cells: CellKind | None = None
-) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarray, "_ _"]]]:
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarray, "_ _"]]]:
     """Return points and cells by kind.
-
-    `cells` is the kind of polygons of four corners if the file does not determine it.
 
     Raises
     ------
     FileFormatError
-        If the content differs from the header, or polygons could be quads or tetrahedra.
+        If the content differs from the header.
     """
-    cursor = _Cursor(data)
+    cursor = _File(data)
     dataset = cursor.line().split()
     if dataset[:1] != [b"DATASET"] or dataset[-1].upper() not in DATASETS:
         raise FileFormatError(
@@ -114,7 +80,7 @@ def parse(
         )
     points, types, lists = _sections(cursor)
     if dataset[-1].upper() == b"POLYDATA":
-        return points, _polydata_cells(points, lists, cells)
+        return points, _polydata_cells(lists)
     if types is None or b"CELLS" not in lists:
         raise FileFormatError(
             "An unstructured grid of a VTK file must have CELLS and CELL_TYPES; one is missing."
@@ -127,7 +93,7 @@ def parse(
     return points, cells_of_types(lists[b"CELLS"], types)
 
 
-def _sections(cursor: _Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[bytes, CellLists]]:
+def _sections(cursor: _File) -> tuple[np.ndarray, np.ndarray | None, dict[bytes, CellLists]]:
     """Read points, types of cells, and lists of cells by the name of their section."""
     points, types = None, None
     lists: dict[bytes, CellLists] = {}
@@ -160,7 +126,7 @@ def _sections(cursor: _Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[byte
     return points, types, lists
 
 
-def parse_fields(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     """Return the functions on points and those on cells, by name; see `parse`.
 
     Raises
@@ -168,7 +134,7 @@ def parse_fields(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, np.ndarr
     FileFormatError
         If the content differs from the header.
     """
-    cursor = _Cursor(data)
+    cursor = _File(data)
     cursor.line()
     _sections(cursor)
     fields: dict[bytes, dict[str, np.ndarray]] = {name: {} for name in DATA_SECTIONS}
@@ -203,9 +169,7 @@ def parse_fields(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, np.ndarr
     return of_points, of_cells
 
 
-def _polydata_cells(
-    points: np.ndarray, lists: dict[bytes, CellLists], cells: CellKind | None
-) -> dict[str, Int[np.ndarray, "_ _"]]:
+def _polydata_cells(lists: dict[bytes, CellLists]) -> dict[str, Int[np.ndarray, "_ _"]]:
     blocks = {}
     if b"LINES" in lists:
         blocks[SEGMENTS] = lists[b"LINES"].pairs(np.arange(len(lists[b"LINES"].lengths)))
@@ -220,8 +184,7 @@ def _polydata_cells(
         lengths = polygons.lengths
         everyone = np.arange(len(lengths))
         if not len(triangles) and (lengths == 4).all():
-            four = polygons.rows(everyone, 4)
-            return blocks | {_four_cornered_kind(points, four, cells): four}
+            return blocks | {FOUR_CORNERED: polygons.rows(everyone, 4)}
         if (lengths == lengths[0]).all():
             fanned = fans(polygons.rows(everyone, int(lengths[0])))
         else:
@@ -230,22 +193,6 @@ def _polydata_cells(
             )
         triangles = np.concatenate([triangles, fanned])
     return blocks | {"triangles": triangles} if len(triangles) else blocks
-
-
-def _four_cornered_kind(
-    points: np.ndarray, four: Int[np.ndarray, "c 4"], cells: CellKind | None
-) -> CellKind:
-    """Return the kind of polygons of four corners: LaPy, for example, writes tetrahedra as such."""
-    if cells is not None:
-        return "tetrahedra" if cells == "tetrahedra" else "quads"
-    kind = four_cornered(points, four)
-    if kind is None:
-        raise FileFormatError(
-            f"Polygons of four corners must be known to be quads or tetrahedra; these {len(four)} could be either; "
-            f'the first is {four[0].tolist()}. cells="quads" or cells="tetrahedra" says which in read_shape and '
-            "read_mesh, and --cells in the commands info, spectrum and repair."
-        )
-    return kind
 
 
 def _count(word: bytes) -> int:
@@ -257,7 +204,7 @@ def _count(word: bytes) -> int:
         ) from err
 
 
-def _cells(cursor: _Cursor, name: bytes, count: int, size: int) -> CellLists:
+def _cells(cursor: _File, name: bytes, count: int, size: int) -> CellLists:
     """Read lists of points; version 5 has offsets and connectivity instead of counts per cell."""
     start = cursor.place
     words = cursor.line().split()
@@ -275,7 +222,7 @@ def _cells(cursor: _Cursor, name: bytes, count: int, size: int) -> CellLists:
     return cells
 
 
-def _cells_by_offsets(cursor: _Cursor, words: Sequence[bytes], count: int, size: int) -> CellLists:
+def _cells_by_offsets(cursor: _File, words: Sequence[bytes], count: int, size: int) -> CellLists:
     offsets = cursor.wholes(count, _kind(words))
     corners = cursor.wholes(size, _kind(cursor.line().split()))
     if not count or offsets[0] != 0 or offsets[-1] != size or (np.diff(offsets) < 0).any():
@@ -312,3 +259,30 @@ def _cells_by_counts(flat: Int[np.ndarray, " k"], count: int) -> CellLists:
     at_counts = np.array(places, dtype=np.int64)
     starts = np.concatenate([[0], np.cumsum(flat[at_counts])])
     return CellLists(starts, np.delete(flat, at_counts))
+
+
+def format_fields(mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:
+    """Write a mesh and functions on its vertices and faces."""
+
+    def big_endian(values: np.ndarray) -> bytes:
+        return values.astype(values.dtype.newbyteorder(">")).tobytes() + b"\n"
+
+    cells = np.column_stack([np.full(mesh.n_faces, 3), mesh.faces]).astype(np.int32)
+    pieces = [
+        b"# vtk DataFile Version 3.0\neigenshape\nBINARY\nDATASET POLYDATA\n",
+        f"POINTS {mesh.n_vertices} double\n".encode(), big_endian(mesh.vertices),
+        f"POLYGONS {mesh.n_faces} {cells.size}\n".encode(), big_endian(cells),
+    ]  # fmt: skip
+    for section, count, fields in (
+        ("POINT_DATA", mesh.n_vertices, of_vertices),
+        ("CELL_DATA", mesh.n_faces, of_faces),
+    ):
+        if not fields:
+            continue
+        pieces.append(f"{section} {count}\nFIELD FieldData {len(fields)}\n".encode())
+        for name, values in fields.items():
+            word = re.sub(r"\s", "_", name)  # names in legacy files have no spaces
+            width = values.shape[1] if values.ndim == 2 else 1
+            kind = LEGACY_TYPES[values.dtype.str[1:]]
+            pieces += [f"{word} {width} {count} {kind}\n".encode(), big_endian(values)]
+    return b"".join(pieces)

@@ -18,7 +18,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
+    WriteJob,
     corner_normals,
     linear_colors,
     plain_attributes,
@@ -26,17 +26,20 @@ from eigenshape.io.attributes import (
     unit_rows,
 )
 from eigenshape.io.carrying import interpolate
-from eigenshape.io.formats.glb import pack, read_gltf, read_scene
 from eigenshape.io.formats.gltf import (
     SURFACES,
     Gltf,
     Scene,
     decode_buffers,
     file_beside,
+    pack,
     raw_accessor,
     read_accessor,
+    read_gltf,
+    read_scene,
 )
 from eigenshape.io.formats.stl import single_precision
+from eigenshape.io.sources import SourceFile
 
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -272,16 +275,24 @@ def _view_users(value: Any) -> Iterator[dict[str, Any]]:
             yield from _view_users(part)
 
 
-def rewrite(
-    source: SourceFile, attributes: MeshAttributes, mesh: TriangleMesh
-) -> tuple[bytes, list[str]]:
+def write(job: WriteJob) -> dict[Path, bytes]:
+    """Write a GLB file: that of the source with other positions and triangles, or a new one."""
+    source = job.attributes.source
+    if source and source.suffix in (".glb", ".gltf"):
+        return {job.path: _rewrite(source, job.attributes, job.mesh, job.lost)}
+    job.lose(["fields"])
+    return {job.path: write_new(job.attributes, job.mesh)}
+
+
+def _rewrite(
+    source: SourceFile, attributes: MeshAttributes, mesh: TriangleMesh, lost: list[str]
+) -> bytes:
     """Write a glTF file again as GLB with other positions and triangles, and name what is lost.
 
     Everything else in the file stays as it is: nodes, materials, images, skins, animations and
     extensions. Every attribute of vertices is carried, whatever it means, but tangents.
     """
     gltf, scene = _open(source)
-    lost: list[str] = []
     document = _copy_document(gltf, source, lost)
     file_rows = scene.piece.rows[scene.piece.faces.ravel()]
     parts = [(node, number) for node, number, _, _ in _placed_primitives(gltf, scene)]
@@ -348,7 +359,7 @@ def rewrite(
                     entry["targets"] = targets
                 written[node].append(entry)
     _replace_meshes(document, written, old_entries)
-    return document.pack(), lost
+    return document.pack()
 
 
 def _sharing(primitives: list[dict[str, Any]]) -> list[list[int]]:
