@@ -14,7 +14,7 @@ import eigenshape as es
 from eigenshape import FileFormatError, InvalidParameterError
 from eigenshape.io.attributes import linear_colors, plain_attributes, screen_colors
 from eigenshape.io.formats.gltf import pack, read_gltf
-from eigenshape.io.formats.obj_sheet import read_sheet
+from eigenshape.io.formats.obj import read_sheet
 from eigenshape.io.mesh_files import save_mesh
 
 PNG = io.BytesIO()

@@ -192,7 +192,7 @@ def test_broken_polydata_is_named(tmp_path, change, match):
 
 def test_binary_polydata_that_ends_early(tmp_path):
     (tmp_path / "a.vtk").write_bytes(POLYDATA["binary"][:120])
-    with pytest.raises(FileFormatError, match="12 items at byte .* do not fit into its"):
+    with pytest.raises(FileFormatError, match=r"12 items at byte .* do not fit into its"):
         read_shape(tmp_path / "a.vtk")
 
 

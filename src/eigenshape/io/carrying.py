@@ -17,6 +17,7 @@ from eigenshape.io.attributes import MeshAttributes, unit_rows
 
 # Faces are searched this many times as far from the middle of a new face as its corners are.
 REACH = 1.5
+MOST_COPIES = 8  # faces at one place and of one side that keep their own attributes
 # Values on both sides of an edge differ by more than this where there is a seam. Interpolation
 # rounds coordinates, and colors to whole numbers.
 SEAMS = {"texture_coordinates": 1e-6, "colors": 1}
@@ -128,10 +129,15 @@ def _nearest_faces(
     # Whether a face goes around its places in their order, or the other way around
     turned = np.argsort(places, axis=1, kind="stable")
     sides = 2 * keys + np.isin(turned @ [9, 3, 1], [5, 15, 19])  # 012, 120 and 201 in base 3
-    first = np.full(sides.max() + 2, -1)
-    first[sides[:n_old][::-1]] = np.arange(n_old)[::-1]
+    # Of several faces at one place, such as a label on a wall, the first new one is the first old one.
+    olds = np.full((sides.max() + 2, MOST_COPIES), -1)
+    old_ranks, ranks = _ranks(sides[:n_old]), _ranks(sides[n_old:])
+    olds[sides[:n_old][::-1], old_ranks[::-1]] = np.arange(n_old)[::-1]
+    first = olds[:, 0]
     same, other = first[sides[n_old:]], first[sides[n_old:] ^ 1]
     found = np.where(same >= 0, same, other)
+    copies = olds[sides[n_old:], ranks]
+    found = np.where(copies >= 0, copies, found)
     left = np.flatnonzero(found < 0)
     if left.size:
         middles = new.vertices[new.faces[left]].mean(axis=1)
@@ -146,6 +152,14 @@ def _nearest_faces(
         )
         found[left] = np.where(away, twins, nearest)
     return found
+
+
+def _ranks(sides: Int[np.ndarray, " g"]) -> Int[np.ndarray, " g"]:
+    """Return how many faces before each one have the same places, up to a limit."""
+    order = np.argsort(sides, kind="stable")
+    ranks = np.empty_like(order)
+    ranks[order] = np.arange(len(sides)) - np.searchsorted(sides[order], sides[order])
+    return ranks.clip(max=MOST_COPIES - 1)
 
 
 def _corner_places(

@@ -1,10 +1,13 @@
-"""Wavefront OBJ: positions and faces. `obj_attributes` reads the rest."""
+"""Wavefront OBJ: positions and faces, and the lines of a file that `obj_attributes` understands."""
 
+import codecs
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.cells import fans
@@ -20,7 +23,11 @@ from eigenshape.io.formats.text import (
 # A backslash joins only lines of numbers: comments and names of folders may end in one.
 CONTINUED = re.compile(rb"^[ \t]*[vfl](?:[^\n\\#]|\\\r?\n|\\(?!\r?\n))*", re.MULTILINE)
 JOINT = re.compile(rb"\\\r?\n")
+KEPT = (b"vt", b"o", b"g", b"s", b"usemtl", b"mtllib")
+OTHER_LINES = {"l": "polylines", "p": "points"}
 AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/normal
+# A vertex, "/7" where it has the texture coordinate 7, and the number of its normal or -1.
+Corner = tuple[int, str, int]
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
@@ -101,3 +108,94 @@ def corner_index(word: bytes, line: Line, n_so_far: int) -> int:
             f"after {n_so_far} vertices."
         )
     return index - 1 if index > 0 else n_so_far + index
+
+
+@dataclass(frozen=True, eq=False)
+class ObjSheet:
+    """The content of an OBJ file that a triangle mesh does not store.
+
+    Comments are dropped. Normals are kept to tell where creases are.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float
+    tails : tuple of str
+        For each vertex, the text after its coordinates: a weight or a color.
+    normals : tuple
+        Three numbers each.
+    polygons : tuple
+        The corners of each face.
+    rows : tuple
+        Lines to copy, and numbers of polygons, in the order of the file.
+    dropped : tuple of str
+        Kinds of lines that are not kept.
+    """
+
+    vertices: Float[np.ndarray, "n 3"]
+    tails: tuple[str, ...]
+    normals: tuple[tuple[float, ...], ...]
+    polygons: tuple[tuple[Corner, ...], ...]
+    rows: tuple[str | int, ...]
+    dropped: tuple[str, ...]
+
+
+def read_sheet(data: bytes) -> ObjSheet:
+    """Read an OBJ file with its polygons, textures and groups.
+
+    Raises
+    ------
+    FileFormatError
+        If a vertex or a face cannot be read.
+    """
+    positions: list[Line] = []
+    tails: list[str] = []
+    polygons: list[tuple[Corner, ...]] = []
+    rows: list[str | int] = []
+    normals: list[Line] = []
+    dropped: set[str] = set()
+    n_textures = 0
+    for number, raw in enumerate(join_lines(data.removeprefix(codecs.BOM_UTF8)).splitlines(), 1):
+        text = raw.partition(b"#")[0].strip()
+        keyword = text.split(None, 1)[0] if text else b""
+        if keyword == b"v":
+            positions.append((number, text[1:]))
+            tails.append(" ".join(word.decode("latin-1") for word in text.split()[4:]))
+        elif keyword == b"f":
+            rows.append(len(polygons))
+            line = (number, text[1:])
+            counts = (len(positions), n_textures, len(normals))
+            corners = (_corner(word, line, counts) for word in text.split()[1:])
+            polygons.append(tuple(corners))
+        elif keyword == b"vn":
+            normals.append((number, text[2:]))
+        elif keyword in KEPT:
+            n_textures += keyword == b"vt"
+            rows.append(raw.strip().decode("latin-1"))  # names may contain #
+        elif keyword:
+            kind = keyword.decode("latin-1")[:20]
+            dropped.add(OTHER_LINES.get(kind, f"lines that begin with {kind!r}"))
+    return ObjSheet(
+        coordinates(positions),
+        tuple(tails),
+        tuple(map(tuple, coordinates(normals).tolist())),
+        # A corner whose normal the file does not hold has none.
+        tuple(
+            tuple((v, t, n if 0 <= n < len(normals) else -1) for v, t, n in polygon)
+            for polygon in polygons
+        ),
+        tuple(rows),
+        tuple(sorted(dropped)),
+    )
+
+
+def _corner(word: bytes, line: Line, counts: tuple[int, int, int]) -> Corner:
+    """Read a corner, after so many vertices, texture coordinates and normals."""
+    position, texture, normal = (*word.split(b"/"), b"", b"")[:3]
+    vertex = corner_index(position, line, counts[0])
+    place = whole(texture, line, "A texture coordinate") if texture else 0
+    number = whole(normal, line, "A normal") if normal else 0
+    return (
+        vertex,
+        f"/{place if place > 0 else counts[1] + 1 + place}" if texture else "",
+        (number - 1 if number > 0 else counts[2] + number) if normal else -1,
+    )

@@ -1,14 +1,17 @@
 """Attributes of OBJ files: read with their materials and images, and written with them."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
+from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
@@ -16,8 +19,10 @@ from eigenshape.io.attributes import (
     WriteJob,
     corner_normals,
     plain_attributes,
+    unit_rows,
 )
-from eigenshape.io.formats.obj_sheet import ObjSheet, format_sheet, read_sheet
+from eigenshape.io.formats.cells import fans
+from eigenshape.io.formats.obj import Corner, ObjSheet, read_sheet
 from eigenshape.io.formats.text import rows_text
 from eigenshape.io.sources import SourceFile
 
@@ -43,7 +48,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         raise FileFormatError(
             f"A corner must name one of {len(coordinates)} texture coordinates; one names {textures.max()}."
         )
-    normals = np.array([[normal for _, _, normal in row] for row in corners])
+    normals = np.array([[normal for _, _, normal in row] for row in corners])  # -1 for none
     faces_of = np.array([len(polygon) - 2 for polygon in sheet.polygons])
     groups, face_groups = _switches(sheet, ("g ", "o "))
     names, face_materials = _switches(sheet, ("usemtl ",))
@@ -61,7 +66,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         face_materials=np.repeat(face_materials, faces_of),
         face_groups=np.repeat(face_groups, faces_of),
         texture_coordinates=coordinates[textures - 1] if textures.any() else None,
-        normals=np.array(sheet.normals)[normals] if has_normals else None,
+        normals=np.array([*sheet.normals, (0.0, 0.0, 0.0)])[normals] if has_normals else None,
         colors=_colors(sheet)[mesh.faces]
         if any(len(t.split()) == 3 for t in sheet.tails)
         else None,
@@ -118,7 +123,7 @@ def find_beside(name: str, folder: Path) -> Path | None:
 
 
 def _material_files(sheet: ObjSheet, source: SourceFile) -> tuple[str, list[str]]:
-    """Return the text of all libraries of materials, and the names of those that are missing."""
+    """Return the text of all libraries of materials, and sentences about those that are missing."""
     text, missing = "", []
     for row in _rows(sheet, "mtllib"):
         rest = _unicode(row.split(None, 1)[1])
@@ -126,7 +131,7 @@ def _material_files(sheet: ObjSheet, source: SourceFile) -> tuple[str, list[str]
         for name in [rest] if whole else rest.split():
             path = find_beside(name, source.path.parent)
             if path is None:
-                missing.append(name)
+                missing.append(f"the materials of {name!r}, which is not in the folder of the file")
             elif path.stat().st_size:
                 text += read_regular(path, "materials").decode("latin-1") + "\n"
     return text, missing
@@ -140,10 +145,7 @@ def _image_of(rest: str, folder: Path) -> Path | None:
 
 
 def _read_materials(sheet: ObjSheet, source: SourceFile) -> tuple[dict[str, Material], list[str]]:
-    text, missing = _material_files(sheet, source)
-    lost = [
-        f"the materials of {name!r}, which is not in the folder of the file" for name in missing
-    ]
+    text, lost = _material_files(sheet, source)
     found: dict[str, Material] = {}
     for name, lines in _material_blocks(text):
         values = {key: rest for key, rest in lines if rest}
@@ -179,44 +181,182 @@ def _material_blocks(text: str) -> Iterator[tuple[str, list[tuple[str, str]]]]:
 def write(job: WriteJob) -> Files:
     """Write an OBJ file with its materials and images beside it: that of the source, or a new one."""
     held, source = job.attributes, job.attributes.source
-    if source and source.suffix == ".obj" and held.from_file.mean() > 0.5:
-        files, lost = rewrite(source, held, job.mesh, job.path)
-        job.lost.extend(lost)
-        return files
-    job.lose(["fields"])
-    return write_new(held, job.mesh, job.path)
-
-
-def rewrite(
-    source: SourceFile, attributes: MeshAttributes, mesh: TriangleMesh, path: Path
-) -> tuple[Files, list[str]]:
-    """Write an OBJ file again with other positions, its materials and images beside it."""
+    if not source or source.suffix != ".obj" or held.from_file.mean() <= 0.5:
+        job.lose(["fields"])
+        return write_new(held, job.mesh, job.path)
     sheet = read_sheet(source.data)
-    data = format_sheet(sheet, attributes, mesh.vertices)
-    if path.absolute().parent.resolve() == source.path.absolute().parent.resolve():
-        return {path: data}, [*sheet.dropped]
+    data = format_sheet(sheet, held, job.mesh)
+    job.lost.extend(sheet.dropped)
+    if job.path.absolute().parent.resolve() == source.path.absolute().parent.resolve():
+        return {job.path: data}
     text, missing = _material_files(sheet, source)
-    lost = [*sheet.dropped] + [
-        f"the materials of {name!r}, which is not in the folder of the file" for name in missing
-    ]
+    job.lost.extend(missing)
     if not text:
-        return {path: data}, lost
+        return {job.path: data}
     files: Files = {}
 
     def link(match: re.Match[str]) -> str:
         image = _image_of(match[2], source.path.parent)
         if image is None:
-            lost.append(f"the image {match[2][:80]!r}, which is not in the folder of the file")
+            job.lost.append(f"the image {match[2][:80]!r}, which is not in the folder of the file")
             return match[0]
-        copy = _add_image(files, path, image.name, read_regular(image, "an image"))
+        copy = add_image(files, job.path, image.name, read_regular(image, "an image"))
         return match[1] + copy.name.encode().decode("latin-1")
 
-    materials = path.with_suffix(".mtl")
+    materials = job.path.with_suffix(".mtl")
     files[materials] = MAP.sub(link, text).encode("latin-1")
-    library = f"mtllib {materials.name}".encode()
-    data = re.sub(rb"(?m)^mtllib[ \t].*\n", b"", data)
-    files[path] = library + b"\n" + data
-    return files, lost
+    library = f"mtllib {materials.name}\n".encode()
+    files[job.path] = library + re.sub(rb"(?m)^mtllib[ \t].*\n", b"", data)
+    return files
+
+
+def format_sheet(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
+    """Write a repaired or deformed mesh with the remaining polygons, textures and groups.
+
+    A polygon is kept if all its triangles still exist. Otherwise its remaining triangles are
+    written. Triangles that the file does not have, such as those of a filled hole, come last.
+
+    Parameters
+    ----------
+    sheet : ObjSheet
+        The content of the file that the attributes were read from.
+    attributes : MeshAttributes
+        Of the mesh after repairs.
+    mesh : TriangleMesh
+        The same faces, with the vertices to write.
+    """
+    # The new corners at the three corners of each triangle of the file that is still there
+    file_corners = attributes.corners.indices[attributes.corners.indptr[:-1]].reshape(-1, 3)
+    order = np.argsort(file_corners % 3, axis=1)
+    is_old = attributes.from_file & (np.sort(file_corners % 3, axis=1) == np.arange(3)).all(axis=1)
+    corners_of: dict[int, list[int]] = {}
+    added: list[int] = []
+    for face, corners in enumerate((3 * np.arange(mesh.n_faces)[:, None] + order).tolist()):
+        triangle = int(file_corners[face, 0]) // 3
+        if is_old[face] and triangle not in corners_of:
+            corners_of[triangle] = corners
+        else:
+            added.append(face)
+
+    rows: list[str | list[Corner]] = []
+    new_vertices = mesh.faces.ravel().tolist()
+    n_triangles = n_textures = 0
+    for row in sheet.rows:
+        if isinstance(row, str):
+            rows.append(row)
+            n_textures += row.split(None, 1)[0] == "vt"
+            continue
+        polygon = sheet.polygons[row]
+        triangles = [corners_of.get(n_triangles + place) for place in range(len(polygon) - 2)]
+        n_triangles += len(triangles)
+        rows += _pieces(polygon, triangles, new_vertices)
+    for face in added:
+        group, material = attributes.face_groups[face], attributes.face_materials[face]
+        rows += [f"g {_latin(attributes.groups[group])}"] if group >= 0 else []
+        rows += [f"usemtl {_latin(attributes.materials[material].name)}"] if material >= 0 else []
+        textures = [""] * 3
+        if attributes.texture_coordinates is not None:
+            rows += rows_text("vt ", attributes.texture_coordinates[face])
+            textures = [f"/{n_textures + number}" for number in (1, 2, 3)]
+            n_textures += 3
+        vertices = mesh.faces[face].tolist()
+        rows.append([(vertices[place], textures[place], -1) for place in range(3)])
+
+    lines = _vertex_lines(sheet, attributes, mesh)
+    faces = [content for content in rows if not isinstance(content, str)]
+    normals, numbers = _normals(sheet, faces, mesh.vertices)
+    lines += rows_text("vn ", normals)
+    for content in rows:
+        if isinstance(content, str):
+            lines.append(content)
+            continue
+        lines.append("f")
+        for vertex, texture, normal in content:
+            number = numbers.get((vertex, sheet.normals[normal])) if normal >= 0 else None
+            tail = "" if number is None else f"{'' if texture else '/'}/{number + 1}"
+            lines[-1] += f" {vertex + 1}{texture}{tail}"
+    return ("\n".join(lines) + "\n").encode("latin-1")
+
+
+def _pieces(
+    polygon: Sequence[Corner], triangles: Sequence[list[int] | None], new_vertices: Sequence[int]
+) -> list[list[Corner]]:
+    """Return what is left of a polygon, with new vertices: the whole, or some triangles.
+
+    It is whole if its triangles are all there, join as before, and none or all of them are turned
+    over.
+    """
+    left = [corners for corners in triangles if corners is not None]
+    joins = [
+        (new_vertices[one[0]], new_vertices[one[2]]) == (new_vertices[two[0]], new_vertices[two[1]])
+        for one, two in pairwise(left)
+    ]
+    if len(left) == len(triangles) and all(joins) and len({*map(_is_turned, left)}) == 1:
+        pieces = [(polygon, [*left[0][:2], *(corners[2] for corners in left)])]
+    else:
+        pieces = [
+            ((polygon[0], polygon[place], polygon[place + 1]), corners)
+            for place, corners in enumerate(triangles, 1)
+            if corners is not None
+        ]
+    rows = []
+    for old, corners in pieces:
+        row = [
+            (new_vertices[corner], texture, normal)
+            for corner, (_, texture, normal) in zip(corners, old, strict=True)
+        ]
+        rows.append([row[0], *row[:0:-1]] if _is_turned(corners) else row)
+    return rows
+
+
+def _is_turned(corners: Sequence[int]) -> bool:
+    """Return whether the first two corners of a face are in reverse order."""
+    return (corners[1] - corners[0]) % 3 == 2
+
+
+def _vertex_lines(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh) -> list[str]:
+    """Write vertices, each with the weight or color that it has in the file."""
+    lines = rows_text("v ", mesh.vertices)
+    if not any(sheet.tails):
+        return lines
+    # A corner with one entry in its row is a corner of the file; a vertex without faces is itself.
+    shared = min(mesh.n_vertices, len(sheet.vertices))
+    stays = (attributes.mesh.vertices[:shared] == sheet.vertices[:shared]).all(axis=1)
+    tails = {index: sheet.tails[index] for index in np.flatnonzero(stays).tolist()}
+    file_vertices = fans([[vertex for vertex, *_ in polygon] for polygon in sheet.polygons]).ravel()
+    starts = attributes.corners.indptr
+    singles = np.flatnonzero(np.diff(starts) == 1)
+    sources = file_vertices[attributes.corners.indices[starts[singles]]]
+    for vertex, source in zip(mesh.faces.ravel()[singles].tolist(), sources.tolist(), strict=True):
+        tails[vertex] = sheet.tails[source]
+    return [f"{line} {tails.get(index, '')}".rstrip() for index, line in enumerate(lines)]
+
+
+def _normals(
+    sheet: ObjSheet, faces: Sequence[Sequence[Corner]], vertices: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "m 3"], dict[tuple[int, tuple[float, ...]], int]]:
+    """Compute a normal for each vertex and each normal that it had, so that creases stay."""
+    numbers: dict[tuple[int, tuple[float, ...]], int] = {}
+    owners, triangles = [], []
+    for row in faces:
+        corners = fans([[vertex for vertex, _, _ in row]]).tolist()
+        for vertex, _, normal in row:
+            if normal >= 0:
+                key = (vertex, sheet.normals[normal])
+                number = numbers.setdefault(key, len(numbers))
+                triangles += corners
+                owners += [number] * len(corners)
+    if not numbers:
+        return np.empty((0, 3)), numbers
+    vectors = area_vectors(vertices[np.array(triangles)])
+    sums = np.column_stack([np.bincount(owners, weights=column) for column in vectors.T])
+    units, old = unit_rows(sums), np.array([normal for _, normal in numbers])
+    return np.where(units.any(axis=1, keepdims=True), units, old), numbers
+
+
+def _latin(name: str) -> str:
+    """Return a name as its bytes stand in a sheet."""
+    return name.encode().decode("latin-1")
 
 
 def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Files:
@@ -237,7 +377,7 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Fil
             red, green, blue, alpha = material.color
             text += [f"newmtl {name}", f"Kd {red:.6g} {green:.6g} {blue:.6g}", f"d {alpha:.6g}"]
             if material.image is not None:
-                image = _add_image(files, path, material.image_name, material.image)
+                image = add_image(files, path, material.image_name, material.image)
                 text.append(f"map_Kd {image.name}")
         files[library] = ("\n".join(text) + "\n").encode()
     vertices = rows_text("v ", mesh.vertices)
@@ -276,7 +416,7 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Fil
     return files
 
 
-def _add_image(files: Files, path: Path, name: str, data: bytes) -> Path:
+def add_image(files: Files, path: Path, name: str, data: bytes) -> Path:
     """Put an image beside an OBJ file, under another name if there is a different one already."""
     word, number = _word(name), 0
     place = path.with_name(word)
