@@ -374,7 +374,7 @@ def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarra
         raise FileFormatError(
             f"accessors[{index}] must be a plain list of {wanted or '1 to 4'} numbers each; it is not."
         )
-    data, step = _view(gltf, accessor.get("bufferView"))
+    data, step = view_of(gltf, accessor.get("bufferView"))
     row = kind.itemsize * width
     count, start = _whole(accessor, "count"), _whole(accessor, "byteOffset", 0)
     step = step if step and count > 1 else row  # fewer than two rows have no step
@@ -385,7 +385,8 @@ def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarra
     return np.ndarray((count, width), kind, data, start, (step, kind.itemsize))
 
 
-def _view(gltf: Gltf, index: Any) -> tuple[memoryview, int]:
+def view_of(gltf: Gltf, index: Any) -> tuple[memoryview, int]:
+    """Return the bytes of a view, and the distance between its rows or 0."""
     view = gltf.entry("bufferViews", index)
     place = _whole(view, "buffer")
     data = memoryview(gltf.buffers[place] if place < len(gltf.buffers) else b"")
