@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape import FileFormatError, TriangleMesh, read_mesh, write_mesh
-from eigenshape.geometry.repair import REPAIRS, repair
+from eigenshape.geometry.repairs.repair import REPAIRS, repair
 from eigenshape.io.attributes import plain_attributes
 from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.formats.obj import parse, read_sheet

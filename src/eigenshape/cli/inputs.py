@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.geometry.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
+from eigenshape.geometry.repairs.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
 from eigenshape.io.formats.registry import CellKind
 from eigenshape.retrieval.heat.recipe import PRESETS
 

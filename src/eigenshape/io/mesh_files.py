@@ -13,7 +13,7 @@ from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidSh
 from eigenshape._files import as_path, replace_file
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repair_report import PLURALS, count_nouns
+from eigenshape.geometry.repairs.repair_report import PLURALS, count_nouns
 from eigenshape.io.attributes import (
     MeshAttributes,
     WriteJob,
