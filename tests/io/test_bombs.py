@@ -132,11 +132,11 @@ BOMBS = {
     ),
     "points.vtk": (
         lambda: LEGACY.replace("POINTS 4", "POINTS 400000000").encode(),
-        "1200000000 items at byte .* do not fit",
+        "1200000000 items at byte",
     ),
     "types.vtk": (
         lambda: LEGACY.replace("TYPES 1", "TYPES 400000000").encode(),
-        "400000000 items at byte .* do not fit",
+        "400000000 items at byte",
     ),
     "vertices.mesh": (
         lambda: MEDIT.replace("Vertices\n4", "Vertices\n400000000").encode(),

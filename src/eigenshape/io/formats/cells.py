@@ -217,6 +217,10 @@ class CellLists:
         """Return lists of equal length as rows."""
         return self.corners[self.starts[chosen][:, None] + np.arange(length)]
 
+    def split(self) -> list[Int[np.ndarray, " _"]]:
+        """Return all lists, one by one."""
+        return np.split(self.corners, self.starts[1:-1])
+
     def pairs(self, chosen: Int[np.ndarray, " s"]) -> Int[np.ndarray, "p 2"]:
         """Return the pairs of successive points in lists."""
         owner = np.repeat(np.arange(len(self.lengths)), self.lengths)

@@ -5,9 +5,10 @@ import zlib
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.text import numbers_of
+from eigenshape.io.formats.text import numbers_of, wholes
 
 # Compression ratios: a regular lattice of tetrahedra has 9 with zlib and 36 with LZMA, zeros 1,000.
 MOST_TIMES = 40
@@ -36,10 +37,12 @@ class Cursor:
         self.data, self.what, self.is_text, self.place = data, what, is_text, place
 
     def line(self) -> bytes:
-        """Return the rest of the line without spaces around it; an empty one at the end."""
-        end = self.data.find(b"\n", self.place)
-        end = len(self.data) if end < 0 else end
-        text, self.place = self.data[self.place : end].strip(), end + 1
+        """Return the next line that is not blank, without spaces around it; an empty one at the end."""
+        text = b""
+        while not text and self.place < len(self.data):
+            end = self.data.find(b"\n", self.place)
+            end = len(self.data) if end < 0 else end
+            text, self.place = self.data[self.place : end].strip(), end + 1
         return text
 
     def take(self, kind: Any, count: int) -> np.ndarray:
@@ -59,6 +62,13 @@ class Cursor:
         found = np.frombuffer(self.data, kind, count, self.place) if count else np.empty(0, kind)
         self.place += count * size
         return found
+
+    def wholes(self, kind: Any, count: int) -> Int[np.ndarray, " k"]:
+        """Return the next numbers, all of them whole, such as counts or corners."""
+        found = self.take(kind, count)
+        if found.dtype.kind == "f":
+            return wholes(found, f"Counts and corners of {self.what[0].lower()}{self.what[1:]}")
+        return found.astype(np.int64)
 
     def _take_words(self, count: int) -> np.ndarray:
         # A window is split that grows until it holds all words, so that many short lists in a long

@@ -76,7 +76,7 @@ def _plain_count(section: Cursor) -> int:
     head = (
         section if section.is_text else Cursor(section.line() + b"\n", section.what, is_text=True)
     )
-    return int(_take_wholes(head, "<i8", 1)[0])
+    return int(head.wholes("<i8", 1)[0])
 
 
 def _plain_nodes(
@@ -96,7 +96,7 @@ def _plain_nodes(
 def _listed_elements(section: Cursor, count: int) -> Rows:
     """Read text of version 2: for each element tag, type, number of tags, tags, nodes."""
     n_words = len(section.data[section.place :].split())
-    flat = _take_wholes(section, "<i8", n_words)
+    flat = section.wholes("<i8", n_words)
     words, place = flat.tolist(), 0
     starts: dict[int, list[int]] = {}
     for index in range(count):
@@ -140,17 +140,17 @@ def _node_blocks(
     section: Cursor, size: str
 ) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
     """Read nodes of version 4: four counts, then blocks of a head, tags and coordinates."""
-    n_blocks, total, _, _ = _take_wholes(section, size, 4).tolist()
+    n_blocks, total, _, _ = section.wholes(size, 4).tolist()
     tags, points = [np.empty(0, dtype=np.int64)], [np.empty((0, 3))]
     for _ in range(n_blocks):
-        _, _, parametric = _take_wholes(section, "<i4", 3)
+        _, _, parametric = section.wholes("<i4", 3)
         if parametric:
             raise FileFormatError(
                 "Nodes of a gmsh file must have three coordinates; some have parametric ones, too. "
                 "Save it without (Mesh.SaveParametric = 0)."
             )
-        (height,) = _take_wholes(section, size, 1).tolist()
-        tags.append(_take_wholes(section, size, height))
+        (height,) = section.wholes(size, 1).tolist()
+        tags.append(section.wholes(size, height))
         points.append(section.take("<f8", 3 * height).reshape(-1, 3))
     section.require_end()
     _require_total(sum(map(len, tags)), total, "nodes")
@@ -159,28 +159,18 @@ def _node_blocks(
 
 def _element_blocks(section: Cursor, size: str) -> Rows:
     """Read elements of version 4: four counts, then blocks of a head and rows of tag and nodes."""
-    n_blocks, total, _, _ = _take_wholes(section, size, 4).tolist()
+    n_blocks, total, _, _ = section.wholes(size, 4).tolist()
     rows: Rows = []
     for _ in range(n_blocks):
-        _, _, kind = _take_wholes(section, "<i4", 3).tolist()
-        (height,) = _take_wholes(section, size, 1).tolist()
+        _, _, kind = section.wholes("<i4", 3).tolist()
+        (height,) = section.wholes(size, 1).tolist()
         if height:
             _require_known([kind])
             width = 1 + CORNERS[kind]
-            rows.append(
-                (kind, _take_wholes(section, size, height * width).reshape(-1, width)[:, 1:])
-            )
+            rows.append((kind, section.wholes(size, height * width).reshape(-1, width)[:, 1:]))
     section.require_end()
     _require_total(sum(len(block) for _, block in rows), total, "elements")
     return rows
-
-
-def _take_wholes(section: Cursor, kind: str, count: int) -> Int[np.ndarray, " k"]:
-    """Return the next tags or counts."""
-    numbers = section.take(kind, count)
-    if section.is_text:
-        return wholes(numbers, "Tags and counts of a gmsh file")
-    return numbers.astype(np.int64)
 
 
 def _require_known(kinds: list[int]) -> None:

@@ -1,7 +1,6 @@
 """Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID, and functions on them."""
 
 import re
-from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -10,6 +9,7 @@ from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import (
     FOUR_CORNERED,
+    NO_TRIANGLES,
     SEGMENTS,
     CellLists,
     cells_of_types,
@@ -17,7 +17,7 @@ from eigenshape.io.formats.cells import (
     strip_triangles,
 )
 from eigenshape.io.formats.cursor import Cursor
-from eigenshape.io.formats.text import quote_line, wholes
+from eigenshape.io.formats.text import quote_line
 
 KINDS = {
     b"float": ">f4", b"double": ">f8", b"char": ">i1", b"unsigned_char": ">u1", b"int": ">i4",
@@ -34,33 +34,21 @@ LEGACY_TYPES = {
 Arrays = dict[str, np.ndarray]
 
 
-class _File(Cursor):
-    """A cursor that knows names of types of numbers, and skips blank lines."""
+def _open(data: bytes) -> Cursor:
+    """Return a cursor behind the version, the title, which may be blank, and the encoding."""
+    head = data.split(b"\n", 3)[:3]
+    is_text = head[-1].strip().upper() != b"BINARY"
+    return Cursor(data, "A VTK file", is_text=is_text, place=sum(len(line) + 1 for line in head))
 
-    def __init__(self, data: bytes) -> None:
-        super().__init__(data, "A VTK file")
-        super().line()  # version
-        super().line()  # title, which may be blank
-        self.is_text = super().line().upper() != b"BINARY"
 
-    def line(self) -> bytes:
-        """Return the next line that is not blank, or an empty one at the end."""
-        text = b""
-        while not text and self.place < len(self.data):
-            text = super().line()
-        return text
-
-    def numbers(self, count: int, kind: bytes) -> np.ndarray:
-        """Return the next `count` numbers; raise an error if there are fewer."""
-        if kind not in KINDS:
-            raise FileFormatError(
-                f"Numbers of a VTK file must be {b', '.join(KINDS).decode()}; they are {kind!r}."
-            )
-        return self.take(KINDS[kind], count)
-
-    def wholes(self, count: int, kind: bytes) -> Int[np.ndarray, " k"]:
-        """Return the next numbers, all of them whole."""
-        return wholes(self.numbers(count, kind), "Cells of a VTK file")
+def _kind_of(word: bytes) -> str:
+    """Return the numpy type of numbers that a file names."""
+    kind = KINDS.get(word.lower())
+    if kind is None:
+        raise FileFormatError(
+            f"Numbers of a VTK file must be {b', '.join(KINDS).decode()}; they are {word.lower()!r}."
+        )
+    return kind
 
 
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarray, "_ _"]]]:
@@ -71,7 +59,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarr
     FileFormatError
         If the content differs from the header.
     """
-    cursor = _File(data)
+    cursor = _open(data)
     dataset = cursor.line().split()
     if dataset[:1] != [b"DATASET"] or dataset[-1].upper() not in DATASETS:
         raise FileFormatError(
@@ -93,7 +81,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarr
     return points, cells_of_types(lists[b"CELLS"], types)
 
 
-def _sections(cursor: _File) -> tuple[np.ndarray, np.ndarray | None, dict[bytes, CellLists]]:
+def _sections(cursor: Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[bytes, CellLists]]:
     """Read points, types of cells, and lists of cells by the name of their section."""
     points, types = None, None
     lists: dict[bytes, CellLists] = {}
@@ -114,10 +102,10 @@ def _sections(cursor: _File) -> tuple[np.ndarray, np.ndarray | None, dict[bytes,
         seen.add(name)
         count = _count(words[1])
         if name == b"POINTS":
-            numbers = cursor.numbers(3 * count, words[2].lower())
+            numbers = cursor.take(_kind_of(words[2]), 3 * count)
             points = numbers.reshape(-1, 3).astype(np.float64)
         elif name == b"CELL_TYPES":
-            types = cursor.wholes(count, b"int")
+            types = cursor.wholes(">i4", count)
         else:
             lists[name] = _cells(cursor, name, count, _count(words[2]))
         start = cursor.place
@@ -134,7 +122,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     FileFormatError
         If the content differs from the header.
     """
-    cursor = _File(data)
+    cursor = _open(data)
     cursor.line()
     _sections(cursor)
     fields: dict[bytes, dict[str, np.ndarray]] = {name: {} for name in DATA_SECTIONS}
@@ -144,7 +132,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
         words = text.split()
         keyword = words[0].upper()
         if n_arrays and len(words) == 4 and words[1].isdigit():
-            width, rows, kind = int(words[1]), _count(words[2]), words[3].lower()
+            width, rows, kind = int(words[1]), _count(words[2]), words[3]
             name = words[0]
             n_arrays -= 1
         elif keyword in DATA_SECTIONS and len(words) == 2:
@@ -154,14 +142,14 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
             n_arrays = _count(words[2])
             continue
         elif keyword == b"SCALARS" and len(words) >= 3:
-            name, kind, rows = words[1], words[2].lower(), count
+            name, kind, rows = words[1], words[2], count
             width = _count(words[3]) if len(words) > 3 else 1
             cursor.line()  # LOOKUP_TABLE
         elif keyword in WIDTHS and len(words) == 3:
-            name, kind, rows, width = words[1], words[2].lower(), count, WIDTHS[keyword]
+            name, kind, rows, width = words[1], words[2], count, WIDTHS[keyword]
         else:
             continue
-        values = cursor.numbers(rows * width, kind)
+        values = cursor.take(_kind_of(kind), rows * width)
         values = values.astype(values.dtype.newbyteorder("="))
         held = fields[section]
         held[name.decode("latin-1")] = values if width == 1 else values.reshape(-1, width)
@@ -173,24 +161,19 @@ def _polydata_cells(lists: dict[bytes, CellLists]) -> dict[str, Int[np.ndarray, 
     blocks = {}
     if b"LINES" in lists:
         blocks[SEGMENTS] = lists[b"LINES"].pairs(np.arange(len(lists[b"LINES"].lengths)))
-    strips = lists.get(b"TRIANGLE_STRIPS")
-    triangles = (
-        strip_triangles(np.split(strips.corners, strips.starts[1:-1]))
-        if strips
-        else np.empty((0, 3), int)
-    )
+    triangles = NO_TRIANGLES
+    if b"TRIANGLE_STRIPS" in lists:
+        triangles = strip_triangles(lists[b"TRIANGLE_STRIPS"].split())
     polygons = lists.get(b"POLYGONS")
     if polygons is not None and len(polygons.lengths):
-        lengths = polygons.lengths
-        everyone = np.arange(len(lengths))
-        if not len(triangles) and (lengths == 4).all():
+        sizes = np.unique(polygons.lengths)
+        everyone = np.arange(len(polygons.lengths))
+        if sizes.tolist() == [4] and not len(triangles):
             return blocks | {FOUR_CORNERED: polygons.rows(everyone, 4)}
-        if (lengths == lengths[0]).all():
-            fanned = fans(polygons.rows(everyone, int(lengths[0])))
+        if len(sizes) == 1:
+            fanned = fans(polygons.rows(everyone, int(sizes[0])))
         else:
-            fanned = fans(
-                [row.tolist() for row in np.split(polygons.corners, polygons.starts[1:-1])]
-            )
+            fanned = fans([row.tolist() for row in polygons.split()])
         triangles = np.concatenate([triangles, fanned])
     return blocks | {"triangles": triangles} if len(triangles) else blocks
 
@@ -204,15 +187,21 @@ def _count(word: bytes) -> int:
         ) from err
 
 
-def _cells(cursor: _File, name: bytes, count: int, size: int) -> CellLists:
+def _cells(cursor: Cursor, name: bytes, count: int, size: int) -> CellLists:
     """Read lists of points; version 5 has offsets and connectivity instead of counts per cell."""
     start = cursor.place
     words = cursor.line().split()
     if words and words[0].upper() == b"OFFSETS":
-        cells = _cells_by_offsets(cursor, words, count, size)
+        offsets = cursor.wholes(_kind_of(b" ".join(words[1:])), count)
+        corners = cursor.wholes(_kind_of(b" ".join(cursor.line().split()[1:])), size)
+        if not count or offsets[0] != 0 or offsets[-1] != size or (np.diff(offsets) < 0).any():
+            raise FileFormatError(
+                f"Offsets of a VTK file must rise from 0 to {size}; they are {offsets[:9].tolist()}."
+            )
+        cells = CellLists(offsets, corners)
     else:
         cursor.place = start
-        cells = _cells_by_counts(cursor.wholes(size, b"int"), count)
+        cells = _cells_by_counts(cursor.wholes(">i4", size), count)
     short = np.flatnonzero(cells.lengths < SECTIONS[name])
     if short.size:
         raise FileFormatError(
@@ -220,20 +209,6 @@ def _cells(cursor: _File, name: bytes, count: int, size: int) -> CellLists:
             f"{cells.lengths[short[0]]}."
         )
     return cells
-
-
-def _cells_by_offsets(cursor: _File, words: Sequence[bytes], count: int, size: int) -> CellLists:
-    offsets = cursor.wholes(count, _kind(words))
-    corners = cursor.wholes(size, _kind(cursor.line().split()))
-    if not count or offsets[0] != 0 or offsets[-1] != size or (np.diff(offsets) < 0).any():
-        raise FileFormatError(
-            f"Offsets of a VTK file must rise from 0 to {size}; they are {offsets[:9].tolist()}."
-        )
-    return CellLists(offsets, corners)
-
-
-def _kind(words: Sequence[bytes]) -> bytes:
-    return words[1].lower() if len(words) > 1 else b""
 
 
 def _cells_by_counts(flat: Int[np.ndarray, " k"], count: int) -> CellLists:
@@ -256,9 +231,8 @@ def _cells_by_counts(flat: Int[np.ndarray, " k"], count: int) -> CellLists:
         raise FileFormatError(
             f"Cells of a VTK file must fill {size} numbers; {count} cells fill {place}."
         )
-    at_counts = np.array(places, dtype=np.int64)
-    starts = np.concatenate([[0], np.cumsum(flat[at_counts])])
-    return CellLists(starts, np.delete(flat, at_counts))
+    starts = np.cumsum([0, *flat[places]]) if places else np.zeros(1, dtype=np.int64)
+    return CellLists(starts, np.delete(flat, places))
 
 
 def format_fields(mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:
