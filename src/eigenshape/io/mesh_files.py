@@ -73,7 +73,7 @@ def read_mesh(
     Parameters
     ----------
     path : str or Path
-        A file in OFF, OBJ, PLY, STL, GLB or glTF, or a surface in .mesh, .msh, .vtk, .vtu or .npz.
+        A file of a format in `eigenshape.io.MESH_FORMATS`, such as .off, .obj, .ply, .stl or .glb.
     file_format : str, optional
         Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
     cells : {"triangles", "quads", "tetrahedra"}, optional
@@ -279,10 +279,10 @@ def write_mesh(
     mesh : MeshLike
         With n vertices and f faces.
     path : str or Path
-        Must end in .off, .obj, .ply, .stl, .glb, .vtu, .vtk or .npz.
+        Its suffix, such as .ply, names the format. Another one raises an error that lists all.
     binary : bool, optional
-        Whether to write binary data. By default True for PLY and STL. OFF and OBJ are always text,
-        GLB, VTU, VTK and NPZ always binary.
+        Whether to write binary data, where the format has both forms, such as PLY and STL. By
+        default True.
     colors : (n, 3) uint8, optional
         Red, green and blue of each vertex; for PLY, OBJ and GLB.
     face_labels : (f,) int, optional

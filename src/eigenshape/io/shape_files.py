@@ -39,7 +39,7 @@ def read_shape(
     Parameters
     ----------
     path : str or Path
-        A file in OFF, OBJ, PLY, STL, GLB, glTF, .mesh, .msh, .vtk, .vtu, .pts, .xyz or .pcd.
+        A file of a format in `eigenshape.io.SHAPE_FORMATS`, such as .ply, .msh, .vtu or .xyz.
     file_format : str, optional
         Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
     dim : int
