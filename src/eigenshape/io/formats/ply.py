@@ -1,8 +1,9 @@
 """Polygon File Format: a header that declares tables, then their rows, as text or binary of either order."""
 
+import re
 import struct
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,7 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cells import fans, strip_triangles
-from eigenshape.io.formats.ply_header import TEXT, Column, Element, parse_header
+from eigenshape.io.formats.cells import NO_TRIANGLES, fans, strip_triangles
 from eigenshape.io.formats.text import (
     Line,
     lines_of,
@@ -25,9 +25,55 @@ from eigenshape.io.formats.text import (
 
 AXES = ("x", "y", "z")
 CORNERS = ("vertex_indices", "vertex_index")
-WRITTEN = {"u1": "uchar", "i4": "int", "f8": "double"}  # types of columns that are written
+WRITTEN_TYPES = {"u1": "uchar", "i4": "int", "f8": "double"}  # of columns
 LABEL = "label"  # the property of faces that holds the number of their part
 Table = dict[str, Any]  # the values of each column, by name
+TYPES = {
+    "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",
+    "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f", "float64": "d",
+}  # fmt: skip
+TEXT = "text"
+ORDERS = {"ascii": TEXT, "binary_little_endian": "<", "binary_big_endian": ">"}
+MOST_DIGITS = 18  # more rows than any file can hold
+END = re.compile(rb"(?:^|(?<=[\r\n]))end_header[ \t]*(\r\n|\n|\r|$)")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A property: its name, the letter of its type, and for a list that of its length."""
+
+    name: str
+    kind: str
+    length_kind: str = ""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether its values are whole numbers."""
+        return self.kind not in "fd"
+
+
+@dataclass(frozen=True)
+class Element:
+    """A table: its name, its declared number of rows, and its columns."""
+
+    name: str
+    count: int
+    columns: tuple[Column, ...] = ()
+
+    @property
+    def least_bytes(self) -> int:
+        """Least number of bytes of a row of the table, in binary."""
+        return sum(np.dtype(column.length_kind or column.kind).itemsize for column in self.columns)
+
+
+@dataclass(frozen=True)
+class Header:
+    """The byte order (or TEXT), the tables, and the place where their rows begin."""
+
+    order: str
+    elements: tuple[Element, ...]
+    end: int
+    n_lines: int
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
@@ -36,41 +82,91 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     vertices = np.column_stack(
         [np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES]
     )
-    polygons, strips = read_lists(tables, "face"), read_lists(tables, "tristrips")
-    triangles = [_triangles(polygons)] if len(polygons) else []
-    if len(strips):
-        triangles.append(strip_triangles(_pieces(strips)))
-    return vertices, np.concatenate(triangles) if triangles else np.empty((0, 3), dtype=np.int64)
+    triangles = [NO_TRIANGLES]
+    polygons = read_lists(tables, "face")
+    are_equal = isinstance(polygons, np.ndarray)
+    for index, corners in enumerate(polygons[:1] if are_equal else polygons):
+        if len(corners) < 3:
+            raise FileFormatError(
+                f"A face must have three corners or more; face {index} is {list(map(int, corners))}."
+            )
+    if len(polygons):
+        triangles.append(fans(polygons.astype(np.int64) if are_equal else polygons))
+    for strip in read_lists(tables, "tristrips"):
+        corners = np.asarray(strip, dtype=np.int64)
+        pieces = np.split(corners, np.flatnonzero(corners == -1))  # -1 separates strips
+        triangles.append(strip_triangles([piece[piece != -1] for piece in pieces]))
+    return vertices, np.concatenate(triangles)
+
+
+def parse_header(data: bytes) -> Header:
+    """Read the header, refusing tables that are larger than the file before anybody makes room for them."""
+    if not re.match(rb"ply\s", data):
+        raise FileFormatError(
+            f"A PLY file must begin with ply; it begins with {quote_line((1, data[:10]))}."
+        )
+    mark = END.search(data)
+    if mark is None:
+        raise FileFormatError("A PLY header must end with end_header; the file has no such line.")
+    lines = data[: mark.start()].splitlines()
+    order, elements = _declarations(lines)
+    if not order:
+        raise FileFormatError("A PLY header must name its format; it has no such line.")
+    # Where lines end in a carriage return alone, a line feed that follows belongs to the rows.
+    end = mark.end() - (mark[1] == b"\r\n" and not re.match(rb"ply[ \t]*\r?\n", data))
+    n_bytes = len(data) - end
+    for element in elements:
+        least = element.least_bytes if order != TEXT else 2 * len(element.columns)
+        if element.count * least > n_bytes + 1:  # the last line of a text may lack its end
+            raise FileFormatError(
+                f"A PLY file must hold the rows it declares; {element.count} rows of {element.name} take "
+                f"{element.count * least} bytes or more and {n_bytes} follow the header."
+            )
+    return Header(order, elements, end, len(lines) + 1)
+
+
+def _declarations(lines: Sequence[bytes]) -> tuple[str, tuple[Element, ...]]:
+    """Return the byte order, empty if there is none, and the tables that the lines of a header declare."""
+    order = ""
+    counts: dict[str, int] = {}
+    tables: dict[str, dict[str, Column]] = {}
+    columns: dict[str, Column] | None = None  # of the last table
+    for index, line in enumerate(lines, 1):
+        match line.decode("latin-1").split():
+            case [] | ["ply" | "comment" | "obj_info", *_]:
+                pass
+            case ["format", name, *_] if name in ORDERS:
+                order = ORDERS[name]
+            case ["element", name, count, *_] if (
+                name not in tables and count.isdecimal() and len(count) <= MOST_DIGITS
+            ):
+                counts[name] = int(count)
+                columns = tables[name] = {}
+            case ["property", "list", lengths, kind, name, *_] if (
+                columns is not None
+                and name not in columns
+                and kind in TYPES
+                and TYPES.get(lengths, "f") not in "fd"
+            ):
+                columns[name] = Column(name, TYPES[kind], TYPES[lengths])
+            case ["property", kind, name, *_] if (
+                columns is not None and name not in columns and kind in TYPES
+            ):
+                columns[name] = Column(name, TYPES[kind])
+            case _:
+                raise FileFormatError(
+                    f"A PLY header must declare format, elements and properties; "
+                    f"line {index} is {quote_line((index, line))}."
+                )
+    return order, tuple(
+        Element(name, counts[name], tuple(table.values())) for name, table in tables.items()
+    )
 
 
 def read_tables(data: bytes) -> dict[str, Table]:
     """Read all columns, by table and name; of text those that make no mesh are left as words."""
     header = parse_header(data)
     elements = [element for element in header.elements if element.columns]
-    _require_mesh(elements)
-    body = data[header.end :]
-    if header.order == TEXT:
-        return _textread_tables(lines_of(body, first=header.n_lines + 1), elements)
-    return _binaryread_tables(body, elements, header.order)
-
-
-def read_lists(tables: dict[str, Table], name: str) -> Any:
-    """Return the lists of corners of faces or strips."""
-    table = tables.get(name, {})
-    return next((table[column] for column in CORNERS if column in table), ())
-
-
-def _pieces(strips: Sequence[Sequence[int]] | np.ndarray) -> list[np.ndarray]:
-    """Split strips at -1, which separates them."""
-    pieces = []
-    for strip in strips:
-        corners = np.asarray(strip, dtype=np.int64)
-        ends = np.flatnonzero(corners == -1)
-        pieces += [piece[piece != -1] for piece in np.split(corners, ends)]
-    return pieces
-
-
-def _require_mesh(elements: Sequence[Element]) -> None:
     columns = {
         (element.name, column.name): column for element in elements for column in element.columns
     }
@@ -82,26 +178,32 @@ def _require_mesh(elements: Sequence[Element]) -> None:
     for element in elements:
         if element.name not in ("face", "tristrips") or not element.count:
             continue
-        corners = [
-            columns[element.name, name] for name in CORNERS if (element.name, name) in columns
-        ]
-        if not (corners and corners[0].length_kind and corners[0].is_whole):
+        names = [(element.name, name) for name in CORNERS]
+        corners = next((columns[name] for name in names if name in columns), None)
+        if corners is None or not corners.length_kind or not corners.is_whole:
             raise FileFormatError(
                 f"The element {element.name} of a PLY file must declare a list of whole vertex_indices; it does not."
             )
+    body = data[header.end :]
+    if header.order == TEXT:
+        return _read_text(lines_of(body, first=header.n_lines + 1), elements)
+    tables, start = {}, 0
+    for element in elements:
+        tables[element.name], start = _binary_table(body, element, header.order, start)
+    if body[start:].strip(b"\r\n\0 "):
+        raise FileFormatError(
+            f"A PLY file must end with its last row; {len(body) - start} more bytes follow."
+        )
+    return tables
 
 
-def _triangles(polygons: Sequence[Sequence[int]] | np.ndarray) -> np.ndarray:
-    uniform = isinstance(polygons, np.ndarray)
-    for index, corners in enumerate(polygons[:1] if uniform else polygons):
-        if len(corners) < 3:
-            raise FileFormatError(
-                f"A face must have three corners or more; face {index} is {list(map(int, corners))}."
-            )
-    return fans(polygons.astype(np.int64) if isinstance(polygons, np.ndarray) else polygons)
+def read_lists(tables: dict[str, Table], name: str) -> Any:
+    """Return the lists of corners of faces or strips."""
+    table = tables.get(name, {})
+    return next((table[column] for column in CORNERS if column in table), ())
 
 
-def _textread_tables(lines: Sequence[Line], elements: Sequence[Element]) -> dict[str, Table]:
+def _read_text(lines: Sequence[Line], elements: Sequence[Element]) -> dict[str, Table]:
     declared = sum(element.count for element in elements)
     if declared != len(lines):
         raise FileFormatError(
@@ -145,7 +247,20 @@ def _row_by_row(rows: Sequence[Line], element: Element) -> Table:
         words = row[1].split()
         place = 0
         for column in element.columns:
-            values, place = _text_values(words, place, column, row)
+            count = 1
+            if column.length_kind and place < len(words):
+                count = whole(words[place], row, "The length of a list")
+                place += 1
+            if not 0 <= count <= len(words) - place:
+                raise FileFormatError(
+                    f"A row must hold all its columns; line {row[0]} lacks {column.name}: {quote_line(row)}."
+                )
+            values: Sequence[Any] = words[place : place + count]
+            place += count
+            if column.name in AXES:
+                values = [number(word, row) for word in values]
+            elif column.name in CORNERS:
+                values = [whole(word, row, "A corner") for word in values]
             table[column.name].append(values if column.length_kind else values[0])
         if place < len(words):
             raise FileFormatError(
@@ -155,39 +270,6 @@ def _row_by_row(rows: Sequence[Line], element: Element) -> Table:
     return table
 
 
-def _text_values(
-    words: Sequence[bytes], place: int, column: Column, row: Line
-) -> tuple[Sequence[Any], int]:
-    count = 1
-    if column.length_kind and place < len(words):
-        count = whole(words[place], row, "The length of a list")
-        place += 1
-    if not 0 <= count <= len(words) - place:
-        raise FileFormatError(
-            f"A row must hold all its columns; line {row[0]} lacks {column.name}: {quote_line(row)}."
-        )
-    return _understood(words[place : place + count], column, row), place + count
-
-
-def _understood(words: Sequence[bytes], column: Column, row: Line) -> Sequence[Any]:
-    if column.name in AXES:
-        return [number(word, row) for word in words]
-    if column.name in CORNERS:
-        return [whole(word, row, "A corner") for word in words]
-    return words  # the column is not used
-
-
-def _binaryread_tables(body: bytes, elements: Sequence[Element], order: str) -> dict[str, Table]:
-    tables, start = {}, 0
-    for element in elements:
-        tables[element.name], start = _binary_table(body, element, order, start)
-    if body[start:].strip(b"\r\n\0 "):
-        raise FileFormatError(
-            f"A PLY file must end with its last row; {len(body) - start} more bytes follow."
-        )
-    return tables
-
-
 def _binary_table(body: bytes, element: Element, order: str, start: int) -> tuple[Table, int]:
     """Read all rows at once if their lists have equal lengths, as in most files."""
     first, end = _ragged_table(body, replace(element, count=min(element.count, 1)), order, start)
@@ -195,15 +277,11 @@ def _binary_table(body: bytes, element: Element, order: str, start: int) -> tupl
         return first, end
     fields: list[Any] = []
     for column in element.columns:
+        shape: tuple[int, ...] = ()
         if column.length_kind:
             fields.append((f"length of {column.name}", order + column.length_kind))
-        fields.append(
-            (
-                column.name,
-                order + column.kind,
-                (len(first[column.name][0]),) if column.length_kind else (),
-            )
-        )
+            shape = (len(first[column.name][0]),)
+        fields.append((column.name, order + column.kind, shape))
     record = np.dtype(fields)
     end = start + element.count * record.itemsize
     if end <= len(body):
@@ -278,20 +356,12 @@ def format_binary(
     mesh: TriangleMesh, of_vertices: Table | None = None, of_faces: Table | None = None
 ) -> bytes:
     """Write a mesh, and columns of vertices and faces by name, in binary that reads back exactly."""
-    tables = _columns(mesh, of_vertices, of_faces)
-    data = _header_text(tables, "binary_little_endian")
-    for columns in tables.values():
-        kinds: list[Any] = []
-        for name, values in columns.items():
-            kinds += [(f"length of {name}", "u1")] if values.ndim == 2 else []
-            kinds.append((name, values.dtype.newbyteorder("<"), values.shape[1:]))
-        table = np.zeros(len(next(iter(columns.values()))), dtype=kinds)
-        for name, values in columns.items():
-            table[name] = values
-            if values.ndim == 2:
-                table[f"length of {name}"] = values.shape[1]
-        data += table.tobytes()
-    return data
+    return _pack(_columns(mesh, of_vertices, of_faces))
+
+
+def format_points(points: np.ndarray, _suffix: str) -> bytes:
+    """Write points without faces, in binary."""
+    return _pack({"vertex": dict(zip(AXES, points.T, strict=True))})
 
 
 def _columns(
@@ -302,13 +372,20 @@ def _columns(
     return {"vertex": places | (of_vertices or {}), "face": corners | (of_faces or {})}
 
 
-def format_points(points: np.ndarray, _suffix: str) -> bytes:
-    """Write points without faces, in binary."""
-    lines = [
-        "ply", "format binary_little_endian 1.0",
-        f"element vertex {len(points)}", *(f"property double {axis}" for axis in AXES), "end_header",
-    ]  # fmt: skip
-    return ("\n".join(lines) + "\n").encode() + points.astype("<f8").tobytes()
+def _pack(tables: dict[str, Table]) -> bytes:
+    data = _header_text(tables, "binary_little_endian")
+    for columns in tables.values():
+        filled: Table = {}
+        for name, values in columns.items():
+            if values.ndim == 2:
+                filled[f"length of {name}"] = np.full(len(values), values.shape[1], np.uint8)
+            filled[name] = values
+        kinds = [(name, v.dtype.newbyteorder("<"), v.shape[1:]) for name, v in filled.items()]
+        rows = np.zeros(len(next(iter(columns.values()))), dtype=kinds)
+        for name, values in filled.items():
+            rows[name] = values
+        data += rows.tobytes()
+    return data
 
 
 def _header_text(tables: dict[str, Table], order: str) -> bytes:
@@ -316,6 +393,6 @@ def _header_text(tables: dict[str, Table], order: str) -> bytes:
     for element, columns in tables.items():
         lines.append(f"element {element} {len(next(iter(columns.values())))}")
         for name, values in columns.items():
-            kind = WRITTEN[values.dtype.str[1:]]
+            kind = WRITTEN_TYPES[values.dtype.str[1:]]
             lines.append(f"property {'list uchar ' if values.ndim == 2 else ''}{kind} {name}")
     return ("\n".join([*lines, "end_header"]) + "\n").encode()

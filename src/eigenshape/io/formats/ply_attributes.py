@@ -26,13 +26,14 @@ from eigenshape.io.formats.ply import (
     AXES,
     CORNERS,
     LABEL,
+    Column,
     Table,
     format_binary,
     format_text,
+    parse_header,
     read_lists,
     read_tables,
 )
-from eigenshape.io.formats.ply_header import Column, parse_header
 from eigenshape.io.sources import SourceFile
 
 IMAGE = re.compile(rb"(?m)^comment TextureFile[ \t]+(.+?)[ \t\r]*$")  # as MeshLab writes it
