@@ -30,18 +30,62 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     if binary:
         return _parse_binary(data[binary.end() :])
     lines = lines_of(data)
-    counts, rows = _head(lines)
-    n_vertices, n_faces = _counts(counts)
+    first = lines[0] if lines else (1, b"")
+    keyword, *words = first[1].split() or [b""]
+    match = KEYWORD.fullmatch(keyword)
+    if match is None:
+        raise FileFormatError(
+            f"An OFF file must begin with OFF, COFF, NOFF or the like; it begins with {quote_line(first)}."
+        )
+    # The counts stand behind the keyword or in the next line.
+    counts, rows = (first[0], b" ".join([match["glued"], *words]).strip()), lines[1:]
+    if not counts[1]:
+        counts, rows = (rows[0] if rows else (first[0] + 1, b"")), rows[1:]
+    declared = counts[1].split()[:2]
+    if len(declared) < 2:
+        raise FileFormatError(
+            f"An OFF file must declare vertices and faces; line {counts[0]} is {quote_line(counts)}."
+        )
+    n_vertices, n_faces = (whole(word, counts, "A count") for word in declared)
+    if min(n_vertices, n_faces) < 0:
+        raise FileFormatError(
+            f"A count must not be negative; line {counts[0]} is {quote_line(counts)}."
+        )
     if n_vertices + n_faces != len(rows):
-        found = _parse_stream(rows, n_vertices, n_faces) if PLAIN.match(lines[0][1]) else None
+        found = _parse_stream(rows, n_vertices, n_faces) if PLAIN.match(first[1]) else None
         if found is not None:
             return found
         raise FileFormatError(
             f"An OFF file must hold the rows it declares; it declares {n_vertices} vertices and {n_faces} faces "
             f"and holds {len(rows)} rows."
         )
-    _require_equal_rows(rows[:n_vertices])
+    # A face could be read as a vertex, but rows have different widths then.
+    widths = [len(text.split()) for _, text in rows[:n_vertices]]
+    for row, width in zip(rows, widths, strict=False):
+        if width != widths[0]:
+            raise FileFormatError(
+                f"All vertices must have equally many columns; the first has {widths[0]} and "
+                f"line {row[0]} is {quote_line(row)}."
+            )
     return coordinates(rows[:n_vertices]), _triangles(rows[n_vertices:])
+
+
+def _triangles(rows: Sequence[Line]) -> np.ndarray:
+    table = whole_table(rows)
+    if table is not None and 3 <= table[0, 0] < table.shape[1]:
+        size = table[0, 0]
+        if (table[:, 0] == size).all():
+            return fans(table[:, 1 : 1 + size])
+    polygons = []
+    for row in rows:
+        words = row[1].split()
+        count = whole(words[0], row, "A number of corners")
+        if not 3 <= count < len(words):
+            raise FileFormatError(
+                f"A face must have three corners or more, as many as it says; line {row[0]} is {quote_line(row)}."
+            )
+        polygons.append([whole(word, row, "A corner") for word in words[1 : 1 + count]])
+    return fans(polygons)
 
 
 def _parse_stream(
@@ -49,23 +93,14 @@ def _parse_stream(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Read numbers without regard to lines; None if vertices and faces do not fill the file."""
     words = [(at, word) for at, text in rows for word in text.split()]
-    if 3 * n_vertices + 4 * n_faces > len(words):
+    n_numbers = 3 * n_vertices
+    if n_numbers + 4 * n_faces > len(words):
         return None
-    place = 3 * n_vertices
-    polygons = []
-    for _ in range(n_faces):
-        if place >= len(words):
-            return None
-        line = words[place]
-        count = whole(line[1], line, "A number of corners")
-        if not 3 <= count < len(words) - place:
-            return None
-        corners = words[place + 1 : place + 1 + count]
-        polygons.append([whole(word, (at, word), "A corner") for at, word in corners])
-        place += 1 + count
-    if place != len(words):
+    faces = [whole(word, (at, word), "A corner") for at, word in words[n_numbers:]]
+    polygons = _polygons(faces, n_faces, has_colors=False)
+    if polygons is None:
         return None
-    numbers = [number(word, (at, word)) for at, word in words[: 3 * n_vertices]]
+    numbers = [number(word, (at, word)) for at, word in words[:n_numbers]]
     return np.array(numbers).reshape(-1, 3), fans(polygons)
 
 
@@ -76,24 +111,25 @@ def _parse_binary(body: bytes) -> tuple[np.ndarray, np.ndarray]:
     Mesh Processing library and OpenMesh use the byte order of the machine and write no such number.
     """
     for order in ">", "<":
+        numbers: list[int] = np.frombuffer(body, f"{order}i4", len(body) // 4).tolist()
+        n_vertices, n_faces, *_ = [*numbers[:3], -1, -1]
+        place = 3 + 3 * n_vertices
+        if len(body) % 4 or min(n_vertices, n_faces) < 0 or place + 4 * n_faces > len(numbers):
+            continue
         for has_colors in True, False:
-            found = _binary_mesh(body, order, has_colors)
-            if found is not None:
-                return found
+            polygons = _polygons(numbers[place:], n_faces, has_colors=has_colors)
+            if polygons is not None:
+                vertices = np.frombuffer(body, f"{order}f4", 3 * n_vertices, 12).reshape(-1, 3)
+                return vertices.astype(np.float64), fans(polygons)
     raise FileFormatError(
         f"A binary OFF file must hold 32-bit counts, x, y and z of each vertex, and faces that fill it; it does not, "
         f"in {len(body)} bytes."
     )
 
 
-def _binary_mesh(body: bytes, order: str, has_colors: bool) -> tuple[np.ndarray, np.ndarray] | None:
-    numbers = np.frombuffer(body, f"{order}i4", len(body) // 4).tolist()
-    if len(body) % 4 or len(numbers) < 3:
-        return None
-    n_vertices, n_faces, _ = numbers[:3]
-    place = 3 + 3 * n_vertices
-    if min(n_vertices, n_faces) < 0 or place + 4 * n_faces > len(numbers):
-        return None
+def _polygons(numbers: list[int], n_faces: int, *, has_colors: bool) -> list[list[int]] | None:
+    """Return polygons from numbers that begin with theirs; None if they do not fill them."""
+    place = 0
     polygons = []
     for _ in range(n_faces):
         if place >= len(numbers) or not 3 <= numbers[place] < len(numbers) - place:
@@ -105,70 +141,7 @@ def _binary_mesh(body: bytes, order: str, has_colors: bool) -> tuple[np.ndarray,
             if not 0 <= n_colors <= 4:
                 return None
             place += 1 + n_colors
-    if place != len(numbers):
-        return None
-    vertices = np.frombuffer(body, f"{order}f4", 3 * n_vertices, 12).reshape(-1, 3)
-    return vertices.astype(np.float64), fans(polygons)
-
-
-def _head(lines: list[Line]) -> tuple[Line, list[Line]]:
-    first = lines[0] if lines else (1, b"")
-    keyword, *words = first[1].split() or [b""]
-    match = KEYWORD.fullmatch(keyword)
-    if match is None:
-        raise FileFormatError(
-            f"An OFF file must begin with OFF, COFF, NOFF or the like; it begins with {quote_line(first)}."
-        )
-    counts = b" ".join([match["glued"], *words]).strip()
-    if counts:
-        return (first[0], counts), lines[1:]
-    return (lines[1] if len(lines) > 1 else (first[0] + 1, b"")), lines[2:]
-
-
-def _counts(line: Line) -> tuple[int, int]:
-    words = line[1].split()
-    if len(words) < 2:
-        raise FileFormatError(
-            f"An OFF file must declare vertices and faces; line {line[0]} is {quote_line(line)}."
-        )
-    n_vertices, n_faces = (whole(word, line, "A count") for word in words[:2])
-    if min(n_vertices, n_faces) < 0:
-        raise FileFormatError(
-            f"A count must not be negative; line {line[0]} is {quote_line(line)}."
-        )
-    return n_vertices, n_faces
-
-
-def _require_equal_rows(rows: Sequence[Line]) -> None:
-    """Raise an error if rows have different widths: a face could be read as a vertex."""
-    widths = [len(row[1].split()) for row in rows]
-    odd = next((row for row, width in zip(rows, widths, strict=True) if width != widths[0]), None)
-    if odd is not None:
-        raise FileFormatError(
-            f"All vertices must have equally many columns; the first has {widths[0]} and "
-            f"line {odd[0]} is {quote_line(odd)}."
-        )
-
-
-def _triangles(rows: Sequence[Line]) -> np.ndarray:
-    table = whole_table(rows)
-    if (
-        table is not None
-        and (table[:, 0] == table[0, 0]).all()
-        and 3 <= table[0, 0] < table.shape[1]
-    ):
-        return fans(table[:, 1 : 1 + table[0, 0]])
-    return fans([_corners(row) for row in rows])
-
-
-def _corners(row: Line) -> list[int]:
-    words = row[1].split()
-    count = whole(words[0], row, "A number of corners")
-    if not 3 <= count < len(words):
-        raise FileFormatError(
-            f"A face must have three corners or more, as many as it says; line {row[0]} is {quote_line(row)}."
-        )
-    return [whole(word, row, "A corner") for word in words[1 : 1 + count]]
+    return polygons if place == len(numbers) else None
 
 
 def format_text(mesh: TriangleMesh) -> bytes:
