@@ -336,7 +336,10 @@ def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
 
 
 def format_text(
-    mesh: TriangleMesh, of_vertices: Table | None = None, of_faces: Table | None = None
+    mesh: TriangleMesh,
+    of_vertices: Table | None = None,
+    of_faces: Table | None = None,
+    comment: str = "",
 ) -> bytes:
     """Write a mesh, and columns of vertices and faces by name, as text that reads back exactly."""
     tables = _columns(mesh, of_vertices, of_faces)
@@ -349,14 +352,17 @@ def format_text(
             for values in columns.values()
         ]
         rows += map(" ".join, zip(*words, strict=True))
-    return _header_text(tables, "ascii") + ("\n".join(rows) + "\n").encode()
+    return _header_text(tables, "ascii", comment) + ("\n".join(rows) + "\n").encode()
 
 
 def format_binary(
-    mesh: TriangleMesh, of_vertices: Table | None = None, of_faces: Table | None = None
+    mesh: TriangleMesh,
+    of_vertices: Table | None = None,
+    of_faces: Table | None = None,
+    comment: str = "",
 ) -> bytes:
     """Write a mesh, and columns of vertices and faces by name, in binary that reads back exactly."""
-    return _pack(_columns(mesh, of_vertices, of_faces))
+    return _pack(_columns(mesh, of_vertices, of_faces), comment)
 
 
 def format_points(points: np.ndarray, _suffix: str) -> bytes:
@@ -372,8 +378,8 @@ def _columns(
     return {"vertex": places | (of_vertices or {}), "face": corners | (of_faces or {})}
 
 
-def _pack(tables: dict[str, Table]) -> bytes:
-    data = _header_text(tables, "binary_little_endian")
+def _pack(tables: dict[str, Table], comment: str = "") -> bytes:
+    data = _header_text(tables, "binary_little_endian", comment)
     for columns in tables.values():
         filled: Table = {}
         for name, values in columns.items():
@@ -388,8 +394,8 @@ def _pack(tables: dict[str, Table]) -> bytes:
     return data
 
 
-def _header_text(tables: dict[str, Table], order: str) -> bytes:
-    lines = ["ply", f"format {order} 1.0"]
+def _header_text(tables: dict[str, Table], order: str, comment: str) -> bytes:
+    lines = ["ply", f"format {order} 1.0", *([f"comment {comment}"] if comment else [])]
     for element, columns in tables.items():
         lines.append(f"element {element} {len(next(iter(columns.values())))}")
         for name, values in columns.items():

@@ -21,7 +21,7 @@ from eigenshape.io.attributes import (
     plain_attributes,
 )
 from eigenshape.io.formats.cells import fans
-from eigenshape.io.formats.obj_attributes import find_beside
+from eigenshape.io.formats.obj_attributes import add_image, find_beside
 from eigenshape.io.formats.ply import (
     AXES,
     CORNERS,
@@ -178,11 +178,20 @@ def write(job: WriteJob) -> dict[Path, bytes]:
             lost.append(f"the field {name!r}")
         else:
             table[name] = values.astype(_kind(values))
-    lost += [name for name in ("materials", "images") if held.contents[name]]
+    files: dict[Path, bytes] = {}
+    comment, kept = "", set[str]()
+    material = held.materials[0] if held.materials and not held.face_materials.any() else None
+    if material and material.image is not None:  # one image for all faces
+        place = add_image(files, job.path, material.image_name, material.image)
+        comment = f"TextureFile {place.name}"
+        name = Path(material.image_name).stem
+        is_plain = material.name == name and material.color == Material().color
+        kept = {"images", "materials"} if is_plain else {"images"}
+    lost += [name for name in ("materials", "images") if held.contents[name] and name not in kept]
     if held.contents["names of groups"] and not (numbered and labels is None):
         lost.append("names of groups")
     format_columns = format_binary if job.binary else format_text
-    return {job.path: format_columns(mesh, of_vertices, of_faces)}
+    return {**files, job.path: format_columns(mesh, of_vertices, of_faces, comment)}
 
 
 def _kind(values: np.ndarray) -> type[np.generic]:
