@@ -63,8 +63,17 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
     if np.array_equal(old.faces, mesh.faces) and np.array_equal(old.vertices, mesh.vertices):
         return attributes
     places = _places(old, mesh)
-    starts = _nearest_faces(old, mesh, places)
-    faces, weights = _corner_places(attributes, mesh, starts, places[: old.n_faces])
+    starts, is_old = _nearest_faces(old, mesh, places)
+    # A face at the places of an old one has its very values; corners of others lie on old faces.
+    faces, weights = np.column_stack([starts] * 3), np.zeros((mesh.n_faces, 3, 3))
+    old_order = np.argsort(places[: old.n_faces][starts], axis=1, kind="stable")
+    order = np.argsort(places[old.n_faces :], axis=1, kind="stable")
+    weights[np.arange(mesh.n_faces)[:, None], order, old_order] = 1.0
+    left = np.flatnonzero(~is_old)
+    if left.size:
+        new_corners = mesh.vertices[mesh.faces[left]]
+        neighbors = _neighbors(attributes, places[: old.n_faces])
+        faces[left], weights[left] = _corner_places(old, new_corners, starts[left], neighbors)
     columns = (3 * faces[:, :, None] + np.arange(3)).ravel()
     rows = np.repeat(np.arange(3 * mesh.n_faces), 3)
     shape = (3 * mesh.n_faces, 3 * old.n_faces)
@@ -122,8 +131,11 @@ def _places(old: TriangleMesh, new: TriangleMesh) -> Int[np.ndarray, "g 3"]:
 
 def _nearest_faces(
     old: TriangleMesh, new: TriangleMesh, places: Int[np.ndarray, "g 3"]
-) -> Int[np.ndarray, " f"]:
-    """Return the old face at the places of each new one, or the nearest; the right side of a sheet."""
+) -> tuple[Int[np.ndarray, " f"], Bool[np.ndarray, " f"]]:
+    """Return the old face at the places of each new one, or the nearest, and whether it is there.
+
+    On a sheet of two sides it is the right side.
+    """
     n_old = old.n_faces
     keys = np.unique(np.sort(places, axis=1), axis=0, return_inverse=True)[1].ravel()
     # Whether a face goes around its places in their order, or the other way around
@@ -138,7 +150,8 @@ def _nearest_faces(
     found = np.where(same >= 0, same, other)
     copies = olds[sides[n_old:], ranks]
     found = np.where(copies >= 0, copies, found)
-    left = np.flatnonzero(found < 0)
+    is_old = found >= 0
+    left = np.flatnonzero(~is_old)
     if left.size:
         middles = new.vertices[new.faces[left]].mean(axis=1)
         nearest = closest_points(old, middles).simplices
@@ -151,7 +164,7 @@ def _nearest_faces(
             twins >= 0
         )
         found[left] = np.where(away, twins, nearest)
-    return found
+    return found, is_old
 
 
 def _ranks(sides: Int[np.ndarray, " g"]) -> Int[np.ndarray, " g"]:
@@ -163,20 +176,18 @@ def _ranks(sides: Int[np.ndarray, " g"]) -> Int[np.ndarray, " g"]:
 
 
 def _corner_places(
-    attributes: MeshAttributes,
-    mesh: TriangleMesh,
-    starts: Int[np.ndarray, " f"],
-    places: Int[np.ndarray, "o 3"],
-) -> tuple[Int[np.ndarray, "f 3"], Float[np.ndarray, "f 3 3"]]:
+    old: TriangleMesh,
+    new_corners: Float[np.ndarray, "k 3 3"],
+    starts: Int[np.ndarray, " k"],
+    neighbors: Int[np.ndarray, "o 3"],
+) -> tuple[Int[np.ndarray, "k 3"], Float[np.ndarray, "k 3 3"]]:
     """Return for each corner the old face in which its nearest point lies, and the weights there."""
-    old = attributes.mesh
     middle = old.vertices.mean(axis=0)
     corners, scale = size_one(old.vertices[old.faces] - middle)
-    wanted = (mesh.vertices[mesh.faces] - middle) / scale
+    wanted = (new_corners - middle) / scale
     middles = wanted.mean(axis=1)
     radii = np.linalg.norm(wanted - middles[:, None], axis=2).max(axis=1)
     gaps = np.linalg.norm(corners[starts].mean(axis=1) - middles, axis=1)
-    neighbors = _neighbors(attributes, places)
     found: tuple[np.ndarray, np.ndarray] = nearest_around(
         wanted, middles, starts, (REACH * np.maximum(radii, gaps)) ** 2, corners, neighbors
     )

@@ -401,18 +401,19 @@ def _replace_meshes(tree: dict[str, Any], written: dict[int, list[dict[str, Any]
     """Give each node a mesh of its new primitives, and empty the accessors that they replace."""
     nodes, meshes = tree["nodes"], tree["meshes"]
     before = copy.deepcopy(meshes)
-    taken = {entry.get("mesh") for node, entry in enumerate(nodes) if node not in written}
+    first_user: dict[int, int] = {}
+    for node, entry in enumerate(nodes):
+        first_user.setdefault(entry.get("mesh", -1), node)
     for node, primitives in written.items():
         index = nodes[node]["mesh"]
         if not primitives:
             del nodes[node]["mesh"]  # all its faces were dropped
             nodes[node].pop("skin", None)
-        elif index in taken:  # several nodes share a mesh, and each has its own positions now
+        elif first_user[index] == node:
+            meshes[index] = {**before[index], "primitives": primitives}
+        else:  # several nodes share a mesh, and each has its own positions now
             nodes[node]["mesh"] = len(meshes)
             meshes.append({**before[index], "primitives": primitives})
-        else:
-            meshes[index] = {**before[index], "primitives": primitives}
-            taken.add(index)
     still_used = {index for mesh in meshes for index in _accessors_of(mesh)}
     for animation in tree.get("animations", []):
         still_used |= {s[key] for s in animation.get("samplers", []) for key in ("input", "output")}

@@ -51,59 +51,53 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         (element.name, column.name): column
         for element in header.elements
         for column in element.columns
-        if element.count
+        if element.count and column.name not in CORNERS
     }
-    vertex, face = tables["vertex"], tables.get("face", {})
-    polygons = read_lists(tables, "face")
-    polygon_of = np.repeat(np.arange(len(polygons)), [len(polygon) - 2 for polygon in polygons])
-    found: dict[str, Any] = {}
-    known = {("vertex", name) for name in AXES} | {(e, n) for e, *_ in columns for n in CORNERS}
+    left = {key: None for key in columns if key[0] != "vertex" or key[1] not in AXES}
 
-    def numbers(element: str, names: Sequence[str]) -> Float[np.ndarray, "rows k"]:
-        known.update((element, name) for name in names)
+    def take(element: str, names: Sequence[str]) -> Float[np.ndarray, "rows k"] | None:
+        """Return columns, if they are all there, and strike them off the list of those that are left."""
+        if not all((element, name) in left for name in names):
+            return None
+        for name in names:
+            del left[element, name]
         return np.column_stack([_numbers(tables[element][name]) for name in names])
 
-    def holds(element: str, names: Sequence[str]) -> bool:
-        return all((element, name) in columns for name in names)
-
-    if holds("vertex", NORMALS):
-        found["normals"] = numbers("vertex", NORMALS)[mesh.faces]
-    for pair in COORDINATES:
-        if holds("vertex", pair):
-            found["texture_coordinates"] = numbers("vertex", pair)[mesh.faces]
+    polygons = read_lists(tables, "face")
+    polygon_of = np.repeat(np.arange(len(polygons)), [len(polygon) - 2 for polygon in polygons])
     are_faces = len(polygon_of) == mesh.n_faces  # not strips
-    tinted = [e for e in ("vertex", *["face"] * are_faces) if holds(e, TINTS)]
-    for element in tinted[:1]:
-        names = [*TINTS, *(["alpha"] if (element, "alpha") in columns else [])]
-        scales = [1 if columns[element, name].is_whole else 255 for name in names]
-        tints = numbers(element, names) * scales
-        colors = np.full((len(tints), 4), 255, np.uint8)
-        colors[:, : len(names)] = np.rint(np.nan_to_num(tints).clip(0, 255))
-        found["colors"] = (
-            colors[mesh.faces]
-            if element == "vertex"
-            else colors[polygon_of[:, None]].repeat(3, axis=1)
-        )
-    if are_faces and "texture_coordinates" not in found and ("face", WEDGES) in columns:
-        found["texture_coordinates"] = _wedges(face[WEDGES], polygons)
-        known.add(("face", WEDGES))
+    found: dict[str, Any] = {}
+    if (normals := take("vertex", NORMALS)) is not None:
+        found["normals"] = normals[mesh.faces]
+    for pair in COORDINATES:
+        if (coordinates := take("vertex", pair)) is not None:
+            found["texture_coordinates"] = coordinates[mesh.faces]
+    if are_faces and "texture_coordinates" not in found and ("face", WEDGES) in left:
+        found["texture_coordinates"] = _wedges(tables["face"][WEDGES], polygons)
+        del left["face", WEDGES]
+    for element, rows in (("vertex", mesh.faces), ("face", np.column_stack([polygon_of] * 3))):
+        names = [*TINTS, *(["alpha"] if (element, "alpha") in left else [])]
+        tints = None if "colors" in found or len(rows) != mesh.n_faces else take(element, names)
+        if tints is not None:
+            scales = [1 if columns[element, name].is_whole else 255 for name in names]
+            colors = np.full((len(tints), 4), 255, np.uint8)
+            colors[:, : len(names)] = np.rint(np.nan_to_num(tints * scales).clip(0, 255))
+            found["colors"] = colors[rows]
     label = columns.get(("face", LABEL))
-    if are_faces and label is not None and not label.length_kind:
-        labels = _numbers(face[LABEL])[polygon_of].astype(np.int64)
+    if are_faces and label and not label.length_kind:
+        labels = _numbers(tables["face"][LABEL])[polygon_of].astype(np.int64)
         distinct, found["face_groups"] = np.unique(labels, return_inverse=True)
         found["groups"] = tuple(map(str, distinct.tolist()))
-        known.add(("face", LABEL))
+        del left["face", LABEL]
     fields = {}
-    for (element, name), column in columns.items():
-        is_plain = not column.length_kind and (element, name) not in known and name not in fields
-        if is_plain and element == "vertex":
-            fields[name] = _typed(vertex[name], column)
-        elif is_plain and element == "face" and are_faces and mesh.n_faces != mesh.n_vertices:
-            fields[name] = _typed(face[name], column)[polygon_of]
-        else:
-            continue
-        known.add((element, name))
-    others = [f"{name} of {element}" for element, name in columns if (element, name) not in known]
+    for element, name in list(left):  # numbers without a known meaning
+        column = columns[element, name]
+        is_of_faces = element == "face" and are_faces and mesh.n_faces != mesh.n_vertices
+        if not column.length_kind and name not in fields and (element == "vertex" or is_of_faces):
+            values = _typed(tables[element][name], column)
+            fields[name] = values[polygon_of] if is_of_faces else values
+            del left[element, name]
+    others = [f"{name} of {element}" for element, name in left]
     if are_faces and len(polygons) < mesh.n_faces:
         others.append("polygons, of which triangles are made")
     materials, missing = _read_images(source, header.end)
