@@ -307,11 +307,15 @@ EXPORTS = [
 ]  # fmt: skip
 
 
+# Bending and cutting write files in the same way as repairs, so two files are enough there.
+PAIRS = [(verb, *file) for verb in ("repair", "decimate") for file in EXPORTS]
+PAIRS += [(verb, *file) for verb in ("deform", "segment") for file in EXPORTS[:3:2]]
+
+
 @pytest.mark.parametrize(
-    ("name", "export", "kind"), EXPORTS, ids=lambda value: getattr(value, "__name__", value)
+    ("verb", "name", "export", "kind"), PAIRS, ids=lambda value: getattr(value, "__name__", value)
 )
-@pytest.mark.parametrize("verb", VERBS)
-def test_files_of_exporters_keep_their_looks(tmp_path, name, export, kind, verb):
+def test_files_of_exporters_keep_their_looks(tmp_path, verb, name, export, kind):
     path = tmp_path / name
     export(path, kind)
     before = es.read_mesh(path, attributes=True)[1]
