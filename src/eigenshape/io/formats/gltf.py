@@ -72,6 +72,13 @@ class Gltf:
             )
         return entries[index]
 
+    def require_few(self, total: int) -> None:
+        """Raise an error if there are more vertices and faces than the limit."""
+        if total > self.most:
+            raise FileFormatError(
+                f"A glTF file must stay within {self.most} vertices and faces; its copies make more."
+            )
+
 
 def parse(data: bytes, folder: Path | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Read vertices and faces of the scene, from a .glb file or, if a folder is given, a .gltf file.
@@ -204,7 +211,11 @@ def file_beside(index: int, uri: str, folder: Path) -> Path:
 
 def place_triangles(gltf: Gltf) -> Scene:
     """Gather the triangles of all nodes, in world coordinates."""
-    _refuse_extensions(gltf)
+    for name in _list(gltf.tree, "extensionsRequired"):
+        if not str(name).startswith(HARMLESS):
+            raise FileFormatError(
+                f"A glTF file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}."
+            )
     shapes: dict[int, Piece] = {}
     matrices: dict[int, np.ndarray] = {}
     meshes: dict[int, int] = {}  # by node
@@ -214,39 +225,31 @@ def place_triangles(gltf: Gltf) -> Scene:
         if index not in shapes:
             shapes[index] = _mesh(gltf, mesh)
         total += len(shapes[index].vertices) + len(shapes[index].faces)
-        _require_few(total, gltf)  # before any copy is made
+        gltf.require_few(total)  # before any copy is made
         matrices[node], meshes[node] = matrix, index
-    placed = [_transform(shapes[meshes[node]], matrix) for node, matrix in matrices.items()]
+    placed = []
+    for node, matrix in matrices.items():
+        piece = shapes[meshes[node]]
+        # A reflection turns triangles inside out; by the format they must be turned back.
+        flips = np.linalg.slogdet(matrix[:3, :3])[0] < 0
+        vertices = piece.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = piece.faces[:, ::-1] if flips else piece.faces
+        placed.append(piece._replace(vertices=vertices, faces=faces))
     n_faces = [len(piece.faces) for piece in placed]
     nodes = np.repeat(np.array(list(matrices), dtype=np.int64), n_faces)
     return Scene(_merge_pieces(placed), nodes, matrices)
 
 
-def _require_few(total: int, gltf: Gltf) -> None:
-    if total > gltf.most:
-        raise FileFormatError(
-            f"A glTF file must stay within {gltf.most} vertices and faces; its copies make more."
-        )
-
-
 def _merge_pieces(pieces: Sequence[Piece]) -> Piece:
-    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])[:-1]
-    faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=True)]
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
     none = np.empty(0, dtype=np.int64)
+    faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=False)]
     return Piece(
         np.concatenate([np.empty((0, 3)), *(piece.vertices for piece in pieces)]),
         np.concatenate([NO_TRIANGLES, *faces]),
         np.concatenate([none, *(piece.rows for piece in pieces)]),
         np.concatenate([none, *(piece.primitives for piece in pieces)]),
     )
-
-
-def _refuse_extensions(gltf: Gltf) -> None:
-    for name in _list(gltf.tree, "extensionsRequired"):
-        if not str(name).startswith(HARMLESS):
-            raise FileFormatError(
-                f"A glTF file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}."
-            )
 
 
 def _placed_meshes(gltf: Gltf) -> Iterator[tuple[int, Any, np.ndarray]]:
@@ -293,67 +296,53 @@ def _local_matrix(node: dict[str, Any]) -> np.ndarray:
     return matrix
 
 
-def _transform(piece: Piece, matrix: np.ndarray) -> Piece:
-    # A reflection turns triangles inside out; by the format they must be turned back.
-    flips = np.linalg.slogdet(matrix[:3, :3])[0] < 0
-    return piece._replace(
-        vertices=piece.vertices @ matrix[:3, :3].T + matrix[:3, 3],
-        faces=piece.faces[:, ::-1] if flips else piece.faces,
-    )
-
-
 def _mesh(gltf: Gltf, mesh: dict[str, Any]) -> Piece:
     """Read one mesh; parts that differ only in material share their vertices, as in the file."""
-    parts: dict[int, list[int]] = {}
     primitives = _list(mesh, "primitives")
+    sharing: dict[int, list[int]] = {}  # by the accessor of positions
     for number, part in enumerate(primitives):
         if _whole(part, "mode", TRIANGLES) in SURFACES:
-            parts.setdefault(_whole(part.get("attributes"), "POSITION"), []).append(number)
+            sharing.setdefault(_whole(part.get("attributes"), "POSITION"), []).append(number)
     pieces = []
     total = 0
-    for position, sharing in parts.items():
+    for position, numbers in sharing.items():
         vertices = read_accessor(gltf, position, 3)
-        faces = []
         total += len(vertices)
-        for number in sharing:
+        faces = []
+        for number in numbers:
             faces.append(_faces(gltf, primitives[number], len(vertices)))
             total += 1 + len(faces[-1])
-            _require_few(total, gltf)
-        owners = np.repeat(sharing, [len(block) for block in faces])
+            gltf.require_few(total)
+        owners = np.repeat(numbers, [len(block) for block in faces])
         pieces.append(Piece(vertices, np.concatenate(faces), np.arange(len(vertices)), owners))
     return _merge_pieces(pieces)
 
 
 def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
+    """Read the triangles of a primitive: a list, a strip or a fan."""
+    corners = np.arange(n_vertices)
+    if "indices" in part:
+        indices = read_accessor(gltf, part["indices"], 1)[:, 0]
+        is_known = (indices >= 0) & (indices < n_vertices) & (indices == np.floor(indices))
+        bad = np.flatnonzero(~is_known)
+        if bad.size:
+            raise FileFormatError(
+                f"Indices of a primitive must be whole and within 0..{n_vertices - 1}; index {bad[0]} is "
+                f"{indices[bad[0]]:.10g}."
+            )
+        corners = indices.astype(np.int64)
     mode = _whole(part, "mode", TRIANGLES)
-    if "indices" not in part:
-        return _split(np.arange(n_vertices), mode)
-    corners = read_accessor(gltf, part["indices"], 1)[:, 0]
-    bad = np.flatnonzero(
-        ~((corners >= 0) & (corners < n_vertices) & (corners == np.floor(corners)))
-    )
-    if bad.size:
-        raise FileFormatError(
-            f"Indices of a primitive must be whole and within 0..{n_vertices - 1}; index {bad[0]} is "
-            f"{corners[bad[0]]:.10g}."
-        )
-    return _split(corners.astype(np.int64), mode)
-
-
-def _split(corners: np.ndarray, mode: int) -> np.ndarray:
     if mode == TRIANGLES:
         if len(corners) % 3:
             raise FileFormatError(
                 f"Triangles must have three corners each; a primitive has {len(corners)} in all."
             )
         return corners.reshape(-1, 3)
+    place = np.arange(max(len(corners) - 2, 0))
     if mode == FAN:
-        return np.column_stack(
-            [corners[1:-1], corners[2:], np.broadcast_to(corners[:1], max(len(corners) - 2, 0))]
-        )
-    odd = np.arange(max(len(corners) - 2, 0)) % 2
-    place = np.arange(len(odd))
-    return np.column_stack([corners[place], corners[place + 1 + odd], corners[place + 2 - odd]])
+        return corners[np.column_stack([place + 1, place + 2, np.zeros_like(place)])]
+    odd = place % 2  # every second triangle of a strip is turned
+    return corners[np.column_stack([place, place + 1 + odd, place + 2 - odd])]
 
 
 def read_accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
