@@ -1,7 +1,6 @@
 """Read and write meshes. The content of a file is checked before a mesh is returned."""
 
 import warnings
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, overload
@@ -173,7 +172,7 @@ def parse_file(
     known = format_of(source.suffix)
     folder = (source.path.parent,) if "beside" in known.traits else ()
     points, found = known.load().parse(source.data, *folder)
-    blocks = found if isinstance(found, Mapping) else {KINDS[found.shape[1]]: found}
+    blocks = found if isinstance(found, dict) else {KINDS[found.shape[1]]: found}
     simplices = select_cells(points, blocks, cells)
     if simplices.shape[1] == 4 and (sentence := split_sentence(blocks)):
         warnings.warn(f"{source.path}: {sentence}", stacklevel=4)

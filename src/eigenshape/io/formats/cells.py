@@ -1,6 +1,6 @@
 """Selection of the cells of a file: those of the highest dimension, or of a requested kind."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, cast, get_args
 
@@ -15,7 +15,7 @@ SEGMENTS = "segments"
 FOUR_CORNERED = "polygons of four corners"  # quads or tetrahedra: LaPy writes both as polygons
 SOLIDS = ("hexahedra", "wedges", "pyramids")
 NO_TRIANGLES = np.empty((0, 3), dtype=np.int64)
-Blocks = Mapping[str, Int[np.ndarray, "_ _"]]  # by CellKind, or SEGMENTS
+Cells = dict[str, Int[np.ndarray, "_ _"]]  # corners, by CellKind or another kind of cell
 SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
 # Largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7.
 FLAT = 1e-6
@@ -68,7 +68,7 @@ def require_splittable(others: Sequence[str]) -> None:
 
 
 def select_cells(
-    points: Float[np.ndarray, "n d"], blocks: Blocks, cells: CellKind | None
+    points: Float[np.ndarray, "n d"], blocks: Cells, cells: CellKind | None
 ) -> Int[np.ndarray, "s corners"]:
     """Return the simplices of the requested kind, where each quad becomes two triangles.
 
@@ -105,7 +105,7 @@ def select_cells(
     return next((block for block in by_dimension if len(block)), surface)
 
 
-def split_sentence(blocks: Blocks) -> str:
+def split_sentence(blocks: Cells) -> str:
     """Say which cells of a file were split into tetrahedra; nothing if there are none."""
     solids = {name: blocks[name] for name in SOLIDS if name in blocks and len(blocks[name])}
     if not solids:
@@ -228,9 +228,7 @@ class CellLists:
         return np.column_stack([self.corners[:-1][follows], self.corners[1:][follows]])
 
 
-def cells_of_types(
-    lists: CellLists, types: Int[np.ndarray, " c"]
-) -> dict[str, Int[np.ndarray, "_ _"]]:
+def cells_of_types(lists: CellLists, types: Int[np.ndarray, " c"]) -> Cells:
     """Sort cells by their kind; ignore cells that are points.
 
     Raises

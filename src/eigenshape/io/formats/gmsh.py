@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.cells import SEGMENTS, require_splittable
+from eigenshape.io.formats.cells import SEGMENTS, Cells, require_splittable
 from eigenshape.io.formats.cursor import Cursor
 from eigenshape.io.formats.text import quote_line, wholes
 
@@ -26,7 +26,7 @@ RULE = "Nodes and elements of a gmsh file must be as it declares them"
 Rows = list[tuple[int, Int[np.ndarray, "_ _"]]]  # gmsh's number of a type, and tags of nodes
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarray, "_ _"]]]:
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells]:
     """Return points and cells by kind.
 
     Raises
@@ -182,7 +182,7 @@ def _require_total(found: int, declared: int, what: str) -> None:
         raise FileFormatError(f"{RULE}; it declares {declared} {what} and holds {found}.")
 
 
-def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> dict[str, Int[np.ndarray, "_ _"]]:
+def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> Cells:
     """Return cells by kind, with the order of nodes in the file instead of their tags.
 
     Raises

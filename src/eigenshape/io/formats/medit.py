@@ -7,32 +7,23 @@ https://github.com/LoicMarechal/libMeshb
 import re
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.cells import SEGMENTS, require_splittable
+from eigenshape.io.formats.cells import SEGMENTS, Cells, require_splittable
 from eigenshape.io.formats.cursor import Cursor
 from eigenshape.io.formats.text import numbers_of, quote_line, wholes
 
+# Kind of cells, and how many corners they have; a label follows them.
 CELLS = {
-    "Edges": 2,
-    "Triangles": 3,
-    "Quadrilaterals": 4,
-    "Tetrahedra": 4,
-    "Prisms": 6,
-    "Pyramids": 5,
-    "Hexahedra": 8,
-    "Hexaedra": 8,
-}  # corners; a label follows them
-KINDS = {
-    "Edges": SEGMENTS,
-    "Triangles": "triangles",
-    "Quadrilaterals": "quads",
-    "Tetrahedra": "tetrahedra",
-    "Prisms": "wedges",
-    "Pyramids": "pyramids",
-    "Hexahedra": "hexahedra",
-    "Hexaedra": "hexahedra",
+    "Edges": (SEGMENTS, 2),
+    "Triangles": ("triangles", 3),
+    "Quadrilaterals": ("quads", 4),
+    "Tetrahedra": ("tetrahedra", 4),
+    "Prisms": ("wedges", 6),
+    "Pyramids": ("pyramids", 5),
+    "Hexahedra": ("hexahedra", 8),
+    "Hexaedra": ("hexahedra", 8),
 }
 # Sections that are ignored. An unknown keyword is an error: it could be misspelt cells.
 PASSED_OVER = {
@@ -55,7 +46,7 @@ CODES = {
 CURVED = {24, 25, 27, 30, 33, *range(86, 94), *range(96, 104)}  # cells of second to fourth order
 POLYTOPES = {46, 47}
 
-Found = tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarray, "_ _"]]]
+Found = tuple[Float[np.ndarray, "n d"], Cells]
 
 
 def parse(data: bytes) -> Found:
@@ -89,7 +80,7 @@ def _parse_text(data: bytes) -> Found:
                 raise FileFormatError(f"A Medit file must have one section {name}; it has two.")
             single[name] = _numbers(body, name)
         elif name in CELLS:
-            rows = _rows(_numbers(body, name), CELLS[name] + 1, name)
+            rows = _rows(_numbers(body, name), CELLS[name][1] + 1, name)
             tables.setdefault(name, []).append(wholes(rows.ravel(), name).reshape(rows.shape))
         elif name not in PASSED_OVER:
             raise FileFormatError(
@@ -141,10 +132,10 @@ def _rows(numbers: Float[np.ndarray, " k"], width: int, name: str) -> Float[np.n
     return numbers[1:].reshape(-1, width)
 
 
-def _blocks(tables: dict[str, list[np.ndarray]]) -> dict[str, Int[np.ndarray, "_ _"]]:
+def _blocks(tables: dict[str, list[np.ndarray]]) -> Cells:
     """Return the corners of cells, counted from 0 and without their labels, by kind."""
     return {
-        KINDS[name]: np.concatenate(rows)[:, :-1].astype(np.int64) - 1
+        CELLS[name][0]: np.concatenate(rows)[:, :-1].astype(np.int64) - 1
         for name, rows in tables.items()
     }
 
@@ -177,7 +168,7 @@ def _parse_binary(data: bytes) -> Found:
             points = cursor.take(row, count)["point"].astype(np.float64)
         elif code in CODES:
             name = CODES[code]
-            width = CELLS[name] + 1
+            width = CELLS[name][1] + 1
             count = int(cursor.take(whole, 1)[0])
             rows = cursor.take(whole, count * width).reshape(count, width)
             tables.setdefault(name, []).append(rows)

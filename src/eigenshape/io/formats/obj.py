@@ -2,7 +2,6 @@
 
 import codecs
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -36,61 +35,42 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     Vertices are in the plane if all of them have two numbers.
     """
     positions: list[Line] = []
-    polygons: list[Line] = []
-    polylines: list[Line] = []
-    n_so_far: dict[bytes, list[int]] = {b"f": [], b"l": []}
+    cells: dict[bytes, list[Line]] = {b"f": [], b"l": []}
+    n_before: dict[bytes, list[int]] = {b"f": [], b"l": []}  # vertices before each
     for number, text in lines_of(join_lines(data)):
         keyword = text.split(None, 1)[0]
         if keyword == b"v":
             positions.append((number, text[1:]))
-        elif keyword == b"f":
-            polygons.append((number, AFTER_POSITION.sub(b"", text[1:])))
-            n_so_far[keyword].append(len(positions))
-        elif keyword == b"l":
-            polylines.append((number, AFTER_POSITION.sub(b"", text[1:])))
-            n_so_far[keyword].append(len(positions))
+        elif keyword in cells:
+            cells[keyword].append((number, AFTER_POSITION.sub(b"", text[1:])))
+            n_before[keyword].append(len(positions))
     vertices = coordinates(positions, least=2)
-    return vertices, _triangles(polygons, n_so_far[b"f"]) if polygons else _segments(
-        polylines, n_so_far[b"l"]
-    )
+    table = whole_table(cells[b"f"])
+    if table is not None and table.shape[1] >= 3 and (table > 0).all():
+        return vertices, fans(table - 1)
+    kind, least, rule = b"l", 2, "A polyline must have two points or more"
+    if cells[b"f"]:
+        kind, least, rule = b"f", 3, "A face must have three corners or more"
+    rows = []
+    for line, count in zip(cells[kind], n_before[kind], strict=True):
+        words = line[1].split()
+        if len(words) < least:
+            raise FileFormatError(f"{rule}; line {line[0]} is {quote_line(line)}.")
+        rows.append([corner_index(word, line, count) for word in words])
+    if cells[b"f"]:
+        return vertices, fans(rows)
+    pairs = [pair for row in rows for pair in pairwise(row)]
+    return vertices, np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
 def join_lines(data: bytes) -> bytes:
     """Join lines of numbers that end in a backslash with the next line; keep all line numbers."""
-    return CONTINUED.sub(_join_match, data) if JOINT.search(data) else data
 
+    def join_match(match: re.Match[bytes]) -> bytes:
+        text, n_joints = JOINT.subn(b" ", match[0])
+        return text + b"\n" * n_joints  # lines that follow keep their numbers
 
-def _join_match(match: re.Match[bytes]) -> bytes:
-    text, n_joints = JOINT.subn(b" ", match[0])
-    return text + b"\n" * n_joints  # lines that follow keep their numbers
-
-
-def _triangles(polygons: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:
-    table = whole_table(polygons)
-    if table is not None and table.shape[1] >= 3 and (table > 0).all():
-        return fans(table - 1)
-    return fans([_corners(line, count) for line, count in zip(polygons, n_so_far, strict=True)])
-
-
-def _corners(line: Line, n_so_far: int) -> list[int]:
-    words = line[1].split()
-    if len(words) < 3:
-        raise FileFormatError(
-            f"A face must have three corners or more; line {line[0]} is {quote_line(line)}."
-        )
-    return [corner_index(word, line, n_so_far) for word in words]
-
-
-def _segments(polylines: Sequence[Line], n_so_far: Sequence[int]) -> np.ndarray:
-    pairs: list[tuple[int, int]] = []
-    for line, count in zip(polylines, n_so_far, strict=True):
-        places = [corner_index(word, line, count) for word in line[1].split()]
-        if len(places) < 2:
-            raise FileFormatError(
-                f"A polyline must have two points or more; line {line[0]} is {quote_line(line)}."
-            )
-        pairs += pairwise(places)
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return CONTINUED.sub(join_match, data) if JOINT.search(data) else data
 
 
 def corner_index(word: bytes, line: Line, n_so_far: int) -> int:

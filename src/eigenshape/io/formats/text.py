@@ -51,16 +51,15 @@ def coordinates(lines: Sequence[Line], *, least: int = 3) -> Float[np.ndarray, "
         return values
     if values is not None and values.shape[1] >= 3:
         return values[:, :3]
-    return np.array([_three_numbers(line) for line in lines], dtype=np.float64).reshape(-1, 3)
-
-
-def _three_numbers(line: Line) -> list[float]:
-    words = line[1].split()[:3]
-    if len(words) < 3:
-        raise FileFormatError(
-            f"A vertex must have three numbers; line {line[0]} is {quote_line(line)}."
-        )
-    return [number(word, line) for word in words]
+    rows = []
+    for line in lines:
+        words = line[1].split()[:3]
+        if len(words) < 3:
+            raise FileFormatError(
+                f"A vertex must have three numbers; line {line[0]} is {quote_line(line)}."
+            )
+        rows.append([number(word, line) for word in words])
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
 def number(word: bytes, line: Line) -> float:

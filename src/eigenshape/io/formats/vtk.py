@@ -12,6 +12,7 @@ from eigenshape.io.formats.cells import (
     NO_TRIANGLES,
     SEGMENTS,
     CellLists,
+    Cells,
     cells_of_types,
     fans,
     strip_triangles,
@@ -51,7 +52,7 @@ def _kind_of(word: bytes) -> str:
     return kind
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], dict[str, Int[np.ndarray, "_ _"]]]:
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells]:
     """Return points and cells by kind.
 
     Raises
@@ -157,7 +158,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     return of_points, of_cells
 
 
-def _polydata_cells(lists: dict[bytes, CellLists]) -> dict[str, Int[np.ndarray, "_ _"]]:
+def _polydata_cells(lists: dict[bytes, CellLists]) -> Cells:
     blocks = {}
     if b"LINES" in lists:
         blocks[SEGMENTS] = lists[b"LINES"].pairs(np.arange(len(lists[b"LINES"].lengths)))

@@ -9,11 +9,18 @@ from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.io.formats.cells import LINE, TETRAHEDRON, TRIANGLE, CellLists, cells_of_types
+from eigenshape.io.formats.cells import (
+    LINE,
+    TETRAHEDRON,
+    TRIANGLE,
+    CellLists,
+    Cells,
+    cells_of_types,
+)
 from eigenshape.io.formats.cursor import COMPRESSORS, require_reasonable, unpack_block
 from eigenshape.io.formats.text import numbers_of, wholes
 
@@ -49,7 +56,12 @@ class _Packing:
                 f"Arrays of a VTU file must be of numbers; {name!r} is of {array.get('type')!r}."
             )
         if array.get("format", "ascii") == "ascii":
-            found = _text_numbers(array.text or "", name)
+            try:
+                found = numbers_of((array.text or "").encode().split())
+            except ValueError as err:
+                raise FileFormatError(
+                    f"Arrays of a VTU file must be of numbers; {name!r} is not: {err}."
+                ) from err
         else:
             dtype = np.dtype(self.order + kind)
             data = self._data(array, None if count is None else count * dtype.itemsize, name)
@@ -142,16 +154,7 @@ def _require_size(found: int, expected: int | None, name: str) -> None:
         )
 
 
-def _text_numbers(text: str, name: str) -> np.ndarray:
-    try:
-        return numbers_of(text.encode().split())
-    except ValueError as err:
-        raise FileFormatError(
-            f"Arrays of a VTU file must be of numbers; {name!r} is not: {err}."
-        ) from err
-
-
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarray, "_ _"]]]:
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Cells]:
     """Return points and cells by kind; attribute data are not unpacked.
 
     Raises
@@ -160,7 +163,17 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarr
         If the content differs from the tags, or they declare more than the file can hold.
     """
     piece, packing, n_points, n_cells = _parse_piece(data)
-    return _points(piece, packing, n_points), _cells(piece, packing, n_cells)
+    array = piece.find("./Points/DataArray")
+    if array is None:
+        raise FileFormatError("A VTU file must have points; it has none.")
+    width = (array.get("NumberOfComponents") or "3").strip()
+    if width not in ("1", "2", "3"):
+        raise FileFormatError(
+            f"Points of a VTU file must have 1 to 3 coordinates each; they have {width[:30]!r}."
+        )
+    numbers = packing.numbers(array, n_points * int(width))
+    points = numbers.reshape(n_points, int(width)).astype(np.float64)
+    return points, _cells(piece, packing, n_cells)
 
 
 def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
@@ -247,24 +260,7 @@ def _parse_tags(data: bytes) -> tuple[ElementTree.Element, _Packing]:
     return root, _Packing(size, ORDERS[order], compressor, appended, raw is not None, len(data))
 
 
-def _points(
-    piece: ElementTree.Element, packing: _Packing, n_points: int
-) -> Float[np.ndarray, "n d"]:
-    array = piece.find("./Points/DataArray")
-    if array is None:
-        raise FileFormatError("A VTU file must have points; it has none.")
-    width = (array.get("NumberOfComponents") or "3").strip()
-    if width not in ("1", "2", "3"):
-        raise FileFormatError(
-            f"Points of a VTU file must have 1 to 3 coordinates each; they have {width[:30]!r}."
-        )
-    numbers = packing.numbers(array, n_points * int(width))
-    return numbers.reshape(n_points, int(width)).astype(np.float64)
-
-
-def _cells(
-    piece: ElementTree.Element, packing: _Packing, n_cells: int
-) -> dict[str, Int[np.ndarray, "_ _"]]:
+def _cells(piece: ElementTree.Element, packing: _Packing, n_cells: int) -> Cells:
     arrays = {array.get("Name"): array for array in piece.findall("./Cells/DataArray")}
     if not n_cells:
         return {}
