@@ -143,6 +143,7 @@ def test_indices_that_are_no_whole_numbers_are_refused(value):
     corners = np.zeros(12, "<f4")
     corners[7] = value
     tree["accessors"][1]["componentType"] = 5126
+    tree["bufferViews"][1]["byteLength"] = corners.nbytes
     message = rf"must be whole and within 0\.\.3; index 7 is {value:g}"
     with pytest.raises(FileFormatError, match=message):
         gltf.parse(packed(tree, binary[:48] + corners.tobytes()))

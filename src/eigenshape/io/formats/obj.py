@@ -25,8 +25,8 @@ JOINT = re.compile(rb"\\\r?\n")
 KEPT = (b"vt", b"o", b"g", b"s", b"usemtl", b"mtllib")
 OTHER_LINES = {"l": "polylines", "p": "points"}
 AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/normal
-# A vertex, "/7" where it has the texture coordinate 7, and the number of its normal or -1.
-Corner = tuple[int, str, int]
+# A vertex, its texture coordinate from 1 or 0 for none, and its normal from 0 or -1 for none
+Corner = tuple[int, int, int]
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
@@ -176,6 +176,6 @@ def _corner(word: bytes, line: Line, counts: tuple[int, int, int]) -> Corner:
     number = whole(normal, line, "A normal") if normal else 0
     return (
         vertex,
-        f"/{place if place > 0 else counts[1] + 1 + place}" if texture else "",
+        (place if place > 0 else counts[1] + 1 + place) if texture else 0,
         (number - 1 if number > 0 else counts[2] + number) if normal else -1,
     )

@@ -1,13 +1,13 @@
 """Attributes of OBJ files: read with their materials and images, and written with them."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
@@ -34,21 +34,14 @@ Files = dict[Path, bytes]  # to write, by path
 def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     """Return the attributes of an OBJ file, by face as in the mesh that was read."""
     sheet = read_sheet(source.data)
-    # Each polygon is a fan of triangles around its first corner.
-    corners = [
-        (polygon[0], polygon[place], polygon[place + 1])
-        for polygon in sheet.polygons
-        for place in range(1, len(polygon) - 1)
-    ]
     coordinates = np.array(
         [[*map(float, row.split()[1:3]), 0.0][:2] for row in _rows(sheet, "vt")] or [[0.0, 0.0]]
     )
-    textures = np.array([[int(texture[1:] or 0) for _, texture, _ in row] for row in corners])
+    _, textures, normals = np.moveaxis(_triangle_corners(sheet), 2, 0)
     if textures.max() > len(coordinates):
         raise FileFormatError(
             f"A corner must name one of {len(coordinates)} texture coordinates; one names {textures.max()}."
         )
-    normals = np.array([[normal for _, _, normal in row] for row in corners])  # -1 for none
     faces_of = np.array([len(polygon) - 2 for polygon in sheet.polygons])
     groups, face_groups = _switches(sheet, ("g ", "o "))
     names, face_materials = _switches(sheet, ("usemtl ",))
@@ -75,6 +68,13 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         others=tuple(others),
         source=source,
     )
+
+
+def _triangle_corners(sheet: ObjSheet) -> Int[np.ndarray, "f 3 3"]:
+    """Return the corners of triangles; each polygon is a fan of them around its first corner."""
+    corners = np.array([corner for polygon in sheet.polygons for corner in polygon])
+    ends = np.cumsum([0, *map(len, sheet.polygons)]).tolist()
+    return corners[fans([range(start, end) for start, end in pairwise(ends)])]
 
 
 def _rows(sheet: ObjSheet, keyword: str) -> list[str]:
@@ -147,15 +147,16 @@ def _image_of(rest: str, folder: Path) -> Path | None:
 def _read_materials(sheet: ObjSheet, source: SourceFile) -> tuple[dict[str, Material], list[str]]:
     text, lost = _material_files(sheet, source)
     found: dict[str, Material] = {}
-    for name, lines in _material_blocks(text):
-        values = {key: rest for key, rest in lines if rest}
+    for block in re.split(r"(?im)^[ \t]*newmtl[ \t]+", text)[1:]:
+        name, *rows = map(str.strip, block.splitlines())
+        pairs = [row.split(None, 1) for row in rows if row and row[0] != "#"]
+        values = {pair[0].lower(): pair[1] for pair in pairs if len(pair) > 1}
         if set(values) - PLAIN_MATERIAL:
             lost.append("properties of materials other than color and image")
         red, green, blue = ([float(x) for x in values.get("kd", "1 1 1").split()[:3]] * 3)[:3]
-        alpha = float(values.get("d", "1").split()[-1]) if "d" in values else 1.0
-        alpha = (
-            1.0 - float(values["tr"].split()[-1]) if "tr" in values and "d" not in values else alpha
-        )
+        alpha = float(values["d"].split()[-1]) if "d" in values else None
+        if alpha is None:
+            alpha = 1.0 - float(values.get("tr", "0").split()[-1])
         image, image_name = None, ""
         if "map_kd" in values:
             path = _image_of(values["map_kd"], source.path.parent)
@@ -167,15 +168,6 @@ def _read_materials(sheet: ObjSheet, source: SourceFile) -> tuple[dict[str, Mate
                 image, image_name = read_regular(path, "an image"), path.name
         found[name] = Material(_unicode(name), (red, green, blue, alpha), image, image_name)
     return found, lost
-
-
-def _material_blocks(text: str) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    for block in re.split(r"(?im)^[ \t]*newmtl[ \t]+", text)[1:]:
-        name, *rows = block.splitlines()
-        words = [
-            row.strip().split(None, 1) for row in rows if row.strip() and row.strip()[0] != "#"
-        ]
-        yield name.strip(), [(pair[0].lower(), pair[1] if len(pair) > 1 else "") for pair in words]
 
 
 def write(job: WriteJob) -> Files:
@@ -254,10 +246,10 @@ def format_sheet(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh
         group, material = attributes.face_groups[face], attributes.face_materials[face]
         rows += [f"g {_latin(attributes.groups[group])}"] if group >= 0 else []
         rows += [f"usemtl {_latin(attributes.materials[material].name)}"] if material >= 0 else []
-        textures = [""] * 3
+        textures = [0, 0, 0]
         if attributes.texture_coordinates is not None:
             rows += rows_text("vt ", attributes.texture_coordinates[face])
-            textures = [f"/{n_textures + number}" for number in (1, 2, 3)]
+            textures = [n_textures + number for number in (1, 2, 3)]
             n_textures += 3
         vertices = mesh.faces[face].tolist()
         rows.append([(vertices[place], textures[place], -1) for place in range(3)])
@@ -273,8 +265,8 @@ def format_sheet(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh
         lines.append("f")
         for vertex, texture, normal in content:
             number = numbers.get((vertex, sheet.normals[normal])) if normal >= 0 else None
-            tail = "" if number is None else f"{'' if texture else '/'}/{number + 1}"
-            lines[-1] += f" {vertex + 1}{texture}{tail}"
+            tail = "" if number is None else f"/{number + 1}"
+            lines[-1] += f" {vertex + 1}" + (f"/{texture or ''}{tail}" if texture or tail else "")
     return ("\n".join(lines) + "\n").encode("latin-1")
 
 
@@ -323,7 +315,7 @@ def _vertex_lines(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMes
     shared = min(mesh.n_vertices, len(sheet.vertices))
     stays = (attributes.mesh.vertices[:shared] == sheet.vertices[:shared]).all(axis=1)
     tails = {index: sheet.tails[index] for index in np.flatnonzero(stays).tolist()}
-    file_vertices = fans([[vertex for vertex, *_ in polygon] for polygon in sheet.polygons]).ravel()
+    file_vertices = _triangle_corners(sheet)[..., 0].ravel()
     starts = attributes.corners.indptr
     singles = np.flatnonzero(np.diff(starts) == 1)
     sources = file_vertices[attributes.corners.indices[starts[singles]]]
