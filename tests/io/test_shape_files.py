@@ -15,8 +15,9 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io.formats.pcd import decompress
-from eigenshape.io.mesh_files import read_mesh
+from eigenshape.io.mesh_files import parse_file, read_mesh
 from eigenshape.io.shape_files import read_points, read_shape, write_points
+from eigenshape.io.sources import SourceFile
 from eigenshape.shapes.domains import box, disc
 
 CUBE = box(2, 1, 1)
@@ -244,19 +245,17 @@ def test_truncated_files_are_refused_or_whole(tmp_path, capfd, kind):
     suffix = {"medit": ".mesh", "gmsh": ".msh", "gmsh22": ".msh"}.get(name, f".{name}")
     path = tmp_path / f"whole{suffix}"
     options = {"binary": False} if text else {}
-    meshio.write_points_cells(
-        path, CUBE.points, [("tetra", CUBE.simplices)], file_format=name, **options
-    )
+    points, cells = CUBE.points[CUBE.simplices[0]], np.array([[0, 1, 2, 3]])
+    meshio.write_points_cells(path, points, [("tetra", cells)], file_format=name, **options)
     capfd.readouterr()
     whole, n_refused = path.read_bytes(), 0
     for end in range(1, len(whole)):
-        path.write_bytes(whole[:end])
         try:
-            found = read_shape(path)
+            _, found = parse_file(SourceFile(path, suffix, whole[:end]), None)
         except EigenshapeError:
             n_refused += 1
             continue
-        np.testing.assert_array_equal(found.simplices, CUBE.simplices)
+        np.testing.assert_array_equal(found, cells)
     assert n_refused > len(whole) / 2
     assert capfd.readouterr() == ("", "")
 
