@@ -48,14 +48,14 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     table = whole_table(cells[b"f"])
     if table is not None and table.shape[1] >= 3 and (table > 0).all():
         return vertices, fans(table - 1)
-    kind, least, rule = b"l", 2, "A polyline must have two points or more"
+    kind, least, noun = b"l", 2, "polyline must have two points"
     if cells[b"f"]:
-        kind, least, rule = b"f", 3, "A face must have three corners or more"
+        kind, least, noun = b"f", 3, "face must have three corners"
     rows = []
     for line, count in zip(cells[kind], n_before[kind], strict=True):
         words = line[1].split()
         if len(words) < least:
-            raise FileFormatError(f"{rule}; line {line[0]} is {quote_line(line)}.")
+            raise FileFormatError(f"A {noun} or more; line {line[0]} is {quote_line(line)}.")
         rows.append([corner_index(word, line, count) for word in words])
     if cells[b"f"]:
         return vertices, fans(rows)
