@@ -13,6 +13,9 @@ from eigenshape.io.formats.registry import CellKind
 
 SEGMENTS = "segments"
 FOUR_CORNERED = "polygons of four corners"  # quads or tetrahedra: LaPy writes both as polygons
+N_CORNERS = {
+    SEGMENTS: 2, "triangles": 3, "quads": 4, "tetrahedra": 4, "hexahedra": 8, "wedges": 6, "pyramids": 5,
+}  # fmt: skip
 SOLIDS = ("hexahedra", "wedges", "pyramids")
 NO_TRIANGLES = np.empty((0, 3), dtype=np.int64)
 Cells = dict[str, Int[np.ndarray, "_ _"]]  # corners, by CellKind or another kind of cell
@@ -23,14 +26,9 @@ FLAT = 1e-6
 VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, QUAD, TETRAHEDRON = 1, 2, 3, 4, 5, 9, 10
 HEXAHEDRON, WEDGE, PYRAMID = 12, 13, 14
 VTK_KINDS = {
-    LINE: (SEGMENTS, 2),
-    TRIANGLE: ("triangles", 3),
-    QUAD: ("quads", 4),
-    TETRAHEDRON: ("tetrahedra", 4),
-    HEXAHEDRON: ("hexahedra", 8),
-    WEDGE: ("wedges", 6),
-    PYRAMID: ("pyramids", 5),
-}
+    LINE: SEGMENTS, TRIANGLE: "triangles", QUAD: "quads", TETRAHEDRON: "tetrahedra",
+    HEXAHEDRON: "hexahedra", WEDGE: "wedges", PYRAMID: "pyramids",
+}  # fmt: skip
 VTK_NAMES = {
     6: "triangle strip", 7: "polygon", 8: "pixel", 11: "voxel",
     21: "quadratic edge", 22: "quadratic triangle", 23: "quadratic quad", 24: "quadratic tetrahedron", 42: "polyhedron",
@@ -244,7 +242,8 @@ def cells_of_types(lists: CellLists, types: Int[np.ndarray, " c"]) -> Cells:
             f"it holds {named}. Save it with those."
         )
     blocks = {}
-    for kind, (name, length) in VTK_KINDS.items():
+    for kind, name in VTK_KINDS.items():
+        length = N_CORNERS[name]
         chosen = np.flatnonzero(types == kind)
         wrong = chosen[lists.lengths[chosen] != length]
         if wrong.size:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.cells import SEGMENTS, Cells, require_splittable
+from eigenshape.io.formats.cells import N_CORNERS, SEGMENTS, Cells, require_splittable
 from eigenshape.io.formats.cursor import Cursor
 from eigenshape.io.formats.text import quote_line, wholes
 
@@ -19,7 +19,7 @@ POINT = 15  # elements of one node, which are ignored
 KINDS = {
     1: SEGMENTS, 2: "triangles", 3: "quads", 4: "tetrahedra", 5: "hexahedra", 6: "wedges", 7: "pyramids",
 }  # fmt: skip
-CORNERS = {1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, POINT: 1}
+CORNERS = {POINT: 1, **{kind: N_CORNERS[name] for kind, name in KINDS.items()}}
 NODE = np.dtype([("tag", "<i4"), ("place", "<f8", 3)])  # of a binary file of version 2
 RULE = "Nodes and elements of a gmsh file must be as it declares them"
 

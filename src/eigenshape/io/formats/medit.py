@@ -10,21 +10,14 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.cells import SEGMENTS, Cells, require_splittable
+from eigenshape.io.formats.cells import N_CORNERS, SEGMENTS, Cells, require_splittable
 from eigenshape.io.formats.cursor import Cursor
 from eigenshape.io.formats.text import numbers_of, quote_line, wholes
 
-# Kind of cells, and how many corners they have; a label follows them.
 CELLS = {
-    "Edges": (SEGMENTS, 2),
-    "Triangles": ("triangles", 3),
-    "Quadrilaterals": ("quads", 4),
-    "Tetrahedra": ("tetrahedra", 4),
-    "Prisms": ("wedges", 6),
-    "Pyramids": ("pyramids", 5),
-    "Hexahedra": ("hexahedra", 8),
-    "Hexaedra": ("hexahedra", 8),
-}
+    "Edges": SEGMENTS, "Triangles": "triangles", "Quadrilaterals": "quads", "Tetrahedra": "tetrahedra",
+    "Prisms": "wedges", "Pyramids": "pyramids", "Hexahedra": "hexahedra", "Hexaedra": "hexahedra",
+}  # fmt: skip
 # Sections that are ignored. An unknown keyword is an error: it could be misspelt cells.
 PASSED_OVER = {
     "End", "Corners", "Ridges", "Normals", "Tangents", "AngleOfCornerBound", "BoundingBox",
@@ -80,7 +73,8 @@ def _parse_text(data: bytes) -> Found:
                 raise FileFormatError(f"A Medit file must have one section {name}; it has two.")
             single[name] = _numbers(body, name)
         elif name in CELLS:
-            rows = _rows(_numbers(body, name), CELLS[name][1] + 1, name)
+            # A label follows the corners.
+            rows = _rows(_numbers(body, name), N_CORNERS[CELLS[name]] + 1, name)
             tables.setdefault(name, []).append(wholes(rows.ravel(), name).reshape(rows.shape))
         elif name not in PASSED_OVER:
             raise FileFormatError(
@@ -135,7 +129,7 @@ def _rows(numbers: Float[np.ndarray, " k"], width: int, name: str) -> Float[np.n
 def _blocks(tables: dict[str, list[np.ndarray]]) -> Cells:
     """Return the corners of cells, counted from 0 and without their labels, by kind."""
     return {
-        CELLS[name][0]: np.concatenate(rows)[:, :-1].astype(np.int64) - 1
+        CELLS[name]: np.concatenate(rows)[:, :-1].astype(np.int64) - 1
         for name, rows in tables.items()
     }
 
@@ -168,7 +162,7 @@ def _parse_binary(data: bytes) -> Found:
             points = cursor.take(row, count)["point"].astype(np.float64)
         elif code in CODES:
             name = CODES[code]
-            width = CELLS[name][1] + 1
+            width = N_CORNERS[CELLS[name]] + 1
             count = int(cursor.take(whole, 1)[0])
             rows = cursor.take(whole, count * width).reshape(count, width)
             tables.setdefault(name, []).append(rows)
