@@ -59,13 +59,15 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     corner_rows = scene.piece.rows[scene.piece.faces]
     found: dict[str, Any] = {}
     materials = [_material(gltf, source, entry) for entry in gltf.tree.get("materials", [])]
-    face_materials, face_parts = np.full((2, n_faces), -1)
-    for part, (_, _, primitive, chosen) in enumerate(_placed_primitives(gltf, scene)):
-        face_parts[chosen] = part
+    nodes = list(scene.matrices)
+    face_materials, face_groups, face_parts = np.full((3, n_faces), -1)
+    for part, (node, _, primitive, chosen) in enumerate(_placed_primitives(gltf, scene)):
         named = primitive["attributes"]
         number = primitive.get("material", -1)
-        face_materials[chosen] = number
-        coordinate = f"TEXCOORD_{_texture(gltf, number).get('texCoord', 0)}"
+        face_materials[chosen], face_groups[chosen] = number, nodes.index(node)
+        face_parts[chosen] = part
+        pbr = {} if number < 0 else _base_color(gltf.entry("materials", number))
+        coordinate = f"TEXCOORD_{pbr.get('baseColorTexture', {}).get('texCoord', 0)}"
         columns = {"normals": ("NORMAL", (3,)), "texture_coordinates": (coordinate, (2,)),
                    "colors": ("COLOR_0", (3, 4))}  # fmt: skip
         for key, (name, widths) in columns.items():
@@ -87,14 +89,16 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     if "colors" in found:
         found["colors"][..., :3] = screen_colors(found["colors"][..., :3])
         found["colors"] = np.rint(255 * found["colors"].clip(0, 1)).astype(np.uint8)
-    owners = np.array(list(scene.matrices), dtype=np.int64)
-    names = [_node_name(gltf, int(node)) for node in owners]
-    groups = np.searchsorted(np.sort(owners), scene.nodes)
+    entries = [gltf.entry("nodes", node) for node in nodes]
+    names = [
+        str(entry.get("name") or gltf.entry("meshes", entry["mesh"]).get("name", ""))
+        for entry in entries
+    ]
     return replace(
         plain_attributes(mesh),
         face_parts=face_parts,
         face_materials=face_materials,
-        face_groups=np.argsort(owners)[groups],
+        face_groups=face_groups,
         materials=tuple(materials),
         groups=tuple(names),
         others=_others(gltf),
@@ -129,16 +133,13 @@ def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
     return rows[corners]
 
 
-def _texture(gltf: Gltf, material: int) -> dict[str, Any]:
-    if material < 0:
-        return {}
-    pbr = gltf.entry("materials", material).get("pbrMetallicRoughness", {})
-    texture: dict[str, Any] = pbr.get("baseColorTexture", {})
-    return texture
+def _base_color(material: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = material.get("pbrMetallicRoughness", {})
+    return found
 
 
 def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material:
-    pbr = entry.get("pbrMetallicRoughness", {})
+    pbr = _base_color(entry)
     *light, alpha = pbr.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])
     red, green, blue = screen_colors(np.array(light, dtype=np.float64)).tolist()
     image, image_name = None, ""
@@ -171,11 +172,6 @@ def _image(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> tuple[bytes
         return None, kind
 
 
-def _node_name(gltf: Gltf, node: int) -> str:
-    entry = gltf.entry("nodes", node)
-    return str(entry.get("name") or gltf.entry("meshes", entry["mesh"]).get("name", ""))
-
-
 def _others(gltf: Gltf) -> tuple[str, ...]:
     """Name what only a glTF file keeps."""
     tree = gltf.tree
@@ -187,7 +183,7 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
         names.append("lines and points")
     plain_pbr = {"baseColorFactor", "baseColorTexture", "metallicFactor"}
     for entry in tree.get("materials", []):
-        pbr = entry.get("pbrMetallicRoughness", {})
+        pbr = _base_color(entry)
         is_metal = pbr.get("metallicFactor", 1.0) != 0.0  # our own files say 0
         is_clear = pbr.get("baseColorFactor", [1.0])[-1] < 1
         plain = {"name", "pbrMetallicRoughness", *(["alphaMode"] if is_clear else [])}

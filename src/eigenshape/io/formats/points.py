@@ -48,17 +48,18 @@ def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:
         raise FileFormatError(
             f"A binary point set must have a position of 12 bytes; it has {sizes}."
         )
-    record = sum(sizes.values())
-    if declared < 1 or len(body) < declared * record:
+    record = np.dtype(
+        [
+            (name.decode("latin-1"), ("<f4", 3) if name == b"position" else f"V{size}")
+            for name, size in sizes.items()
+        ]
+    )
+    if declared < 1 or len(body) < declared * record.itemsize:
         raise FileFormatError(
-            f"A binary point set must hold the points it declares; it declares {declared} of {record} bytes each and "
-            f"holds {len(body)} bytes."
+            f"A binary point set must hold the points it declares; it declares {declared} of {record.itemsize} bytes "
+            f"each and holds {len(body)} bytes."
         )
-    before = sum(size for name, size in list(sizes.items())[: list(sizes).index(b"position")])
-    rows = np.frombuffer(body, np.uint8, declared * record).reshape(declared, record)[
-        :, before : before + 12
-    ]
-    return np.ascontiguousarray(rows).view("<f4").astype(np.float64)
+    return np.frombuffer(body, record, declared)["position"].astype(np.float64)
 
 
 def format_points(points: Float[np.ndarray, "n 3"], suffix: str) -> bytes:
