@@ -56,6 +56,7 @@ def followed(tmp_path):
     recipe = (ROOT / "CONTRIBUTING.md").read_text().partition("### Add a mesh format")[2]
     module, line = re.findall(r"```python\n(.*?)```", recipe.partition("\n## ")[0], re.DOTALL)
     module = re.sub(r"(?m)^ {3}", "", module)  # code in a list is indented by three
+    line = f"    {line.strip()}\n"
     changed = ("eigenshape", "eigenshape/io", "eigenshape/io/formats")
     for folder in changed:
         (tmp_path / folder).mkdir()
