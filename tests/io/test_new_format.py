@@ -54,9 +54,10 @@ TRIANGLES = "4 4\n0 0 0\n1 0 0\n0 0.1 0\n0 0 1\n0 2 1\n0 1 3\n1 2 3\n0 3 2\n"
 def followed(tmp_path):
     """A copy of the package, of links to its files, in which the recipe was followed."""
     recipe = (ROOT / "CONTRIBUTING.md").read_text().partition("### Add a mesh format")[2]
-    module, line = re.findall(r"```python\n(.*?)```", recipe.partition("\n## ")[0], re.DOTALL)
+    recipe = recipe.partition("\n## ")[0]
+    (module,) = re.findall(r"```python\n(.*?)```", recipe, re.DOTALL)
     module = re.sub(r"(?m)^ {3}", "", module)  # code in a list is indented by three
-    line = f"    {line.strip()}\n"
+    (entry,) = re.findall(r"`(Format\(.*?\))`", recipe)
     changed = ("eigenshape", "eigenshape/io", "eigenshape/io/formats")
     for folder in changed:
         (tmp_path / folder).mkdir()
@@ -67,7 +68,9 @@ def followed(tmp_path):
     formats = tmp_path / "eigenshape/io/formats"
     registry = (formats / "registry.py").read_text()
     (formats / "registry.py").unlink()
-    (formats / "registry.py").write_text(registry.replace("FORMATS = (\n", f"FORMATS = (\n{line}"))
+    (formats / "registry.py").write_text(
+        registry.replace("FORMATS = (\n", f"FORMATS = (\n    {entry},\n")
+    )
     (formats / "tri.py").write_text(module)
     return tmp_path
 
