@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_cli import run, run_json
 
-from eigenshape.io.labels import read_labels
+from eigenshape.io.labeled_shapes import read_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.shapes.surfaces import icosphere
 

@@ -12,7 +12,7 @@ from eigenshape.cli import app
 from eigenshape.deformation.handles import Translation
 from eigenshape.geometry.repairs.repair import REPAIRS
 from eigenshape.io.folders import find_items
-from eigenshape.io.labels import read_labels
+from eigenshape.io.labeled_shapes import read_labels
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.spheres import icosphere
 

@@ -107,7 +107,7 @@ def test_segment_prints_a_table(biped):
         ),
         (
             ("segment", "{missing}", "-o", "a.off"),
-            "A mesh with labels must be written to a file that ends in .ply, .glb, .obj, .seg, .txt; a.off ends",
+            "A mesh with labels must be written to a file that ends in .obj, .ply, .glb, .seg, .txt; a.off ends",
         ),
         (
             ("segment", "{missing}", "-o", "{missing}/a.ply"),
@@ -116,7 +116,7 @@ def test_segment_prints_a_table(biped):
         (("segment", "{missing}", "--picture", "a.bmp"), "A picture must end in"),
         (
             ("features", "{missing}", "-o", "a.off"),
-            "A mesh with colors must be written to a file that ends in .ply, .glb, .obj; ",
+            "A mesh with colors must be written to a file that ends in .obj, .ply, .glb; ",
         ),
         (
             ("segment", "{mesh}", "--level", 1, "-n", 3),

@@ -9,7 +9,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import escape_text, out, print_json, print_repairs
-from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption
+from eigenshape.cli.inputs import MESHES_TO_WRITE, JsonOption, MeshArgument, RepairOption
 
 
 def decimate(
@@ -17,9 +17,7 @@ def decimate(
     *,
     output: Annotated[
         Path,
-        typer.Option(
-            "-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ."
-        ),
+        typer.Option("-o", "--output", help=f"Mesh to write: {MESHES_TO_WRITE}."),
     ],
     faces: Annotated[int | None, typer.Option(help="Number of faces to keep.")] = None,
     ratio: Annotated[

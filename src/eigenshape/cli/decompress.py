@@ -9,6 +9,7 @@ import eigenshape as es
 from eigenshape._files import read_regular
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
+from eigenshape.cli.inputs import MESHES_TO_WRITE
 
 
 def decompress(
@@ -16,9 +17,7 @@ def decompress(
     *,
     output: Annotated[
         Path,
-        typer.Option(
-            "-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ."
-        ),
+        typer.Option("-o", "--output", help=f"Mesh to write: {MESHES_TO_WRITE}."),
     ],
 ) -> None:
     """Write the mesh of a file that `eigenshape compress` wrote.

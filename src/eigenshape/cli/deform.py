@@ -10,6 +10,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
 from eigenshape.cli.inputs import (
+    MESHES_TO_WRITE,
     REGIONS,
     JsonOption,
     MeshArgument,
@@ -81,9 +82,7 @@ def deform(
     repair: RepairOption = "",
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o", "--output", help="Write the bent mesh (PLY, OBJ, GLB, OFF, STL, VTU, VTK or NPZ)."
-        ),
+        typer.Option("-o", "--output", help=f"Write the bent mesh ({MESHES_TO_WRITE})."),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")

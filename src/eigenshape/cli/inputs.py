@@ -9,7 +9,7 @@ import typer
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.repairs.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
-from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.formats.registry import MESH_FORMATS, POINT_FORMATS, WRITTEN, CellKind
 from eigenshape.retrieval.heat.recipe import PRESETS
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
@@ -44,17 +44,16 @@ IndexRepairOption = Annotated[
 AutoRepairOption = Annotated[
     str, typer.Option("--repair", metavar="NAMES", help=f"{AUTO_REPAIRS}By default auto.")
 ]
+MESHES_TO_WRITE = ", ".join(WRITTEN)  # suffixes, for the help of `--output`
 MeshArgument = Annotated[
     Path,
-    typer.Argument(
-        help="Mesh file: OFF, OBJ, PLY, STL, GLB, glTF, or a surface in .mesh, .msh, .vtk, .vtu."
-    ),
+    typer.Argument(help=f"Mesh file: {', '.join(MESH_FORMATS)}."),
 ]
 ShapeArgument = Annotated[
     Path,
     typer.Argument(
-        help="Shape file: a mesh (OFF, OBJ, PLY, STL, GLB, glTF, .mesh, .msh, .vtk, .vtu) or points "
-        "(.pts, .xyz, .pcd, PLY)."
+        help=f"Shape file: a mesh ({', '.join(MESH_FORMATS)}) or points "
+        f"({', '.join(POINT_FORMATS)}, or a mesh file without faces)."
     ),
 ]
 CellsOption = Annotated[

@@ -9,7 +9,14 @@ import typer
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import out, print_json, progress_bar
-from eigenshape.cli.inputs import AutoRepairOption, JsonOption, MeshArgument, UpOption, ViewOption
+from eigenshape.cli.inputs import (
+    MESHES_TO_WRITE,
+    AutoRepairOption,
+    JsonOption,
+    MeshArgument,
+    UpOption,
+    ViewOption,
+)
 
 
 def pose(
@@ -29,9 +36,7 @@ def pose(
     repair: AutoRepairOption = "auto",
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o", "--output", help="Write the bent mesh (PLY, OBJ, GLB, OFF, STL, VTU, VTK or NPZ)."
-        ),
+        typer.Option("-o", "--output", help=f"Write the bent mesh ({MESHES_TO_WRITE})."),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")

@@ -8,7 +8,7 @@ import typer
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, print_repairs, print_table, print_written
-from eigenshape.cli.inputs import CellsOption, JsonOption, MeshArgument
+from eigenshape.cli.inputs import MESHES_TO_WRITE, CellsOption, JsonOption, MeshArgument
 from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 
 USUAL = "auto"
@@ -27,7 +27,7 @@ def repair(
         typer.Option(
             "-o",
             "--output",
-            help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ; for tetrahedra VTU.",
+            help=f"Mesh to write: {MESHES_TO_WRITE}; for tetrahedra .vtu.",
         ),
     ],
     names: Annotated[

@@ -11,7 +11,8 @@ from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_written
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.mesh_files import WITH_ATTRIBUTES, WRITTEN, read_mesh, save_mesh
+from eigenshape.io.formats.registry import WITH_MORE, WRITTEN
+from eigenshape.io.mesh_files import read_mesh, save_mesh
 from eigenshape.plot.figure import require_picture_path, save_figure
 
 
@@ -71,7 +72,7 @@ def save_like(
         Colors and labels to write, as in `write_mesh`.
     """
     attributes = None
-    if source.suffix.lower() in WITH_ATTRIBUTES:
+    if source.suffix.lower() in WITH_MORE:
         try:
             attributes = carry_attributes(
                 read_mesh(source, attributes=True, drop_missing=True)[1], mesh

@@ -12,8 +12,9 @@ from eigenshape.cli.steps.outputs import require_output, save_like
 from eigenshape.features.segmentation import Segmentation
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.labels import write_labels
-from eigenshape.io.mesh_files import LABELED, write_mesh
+from eigenshape.io.formats.registry import WITH_COLORS
+from eigenshape.io.labeled_shapes import write_labels
+from eigenshape.io.mesh_files import write_mesh
 from eigenshape.plot.fields import part_colors
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 from eigenshape.retrieval.labels.transfer import LabelTransfer
@@ -33,12 +34,12 @@ SHOWN: dict[str, Callable[[Any], str]] = {
 
 def require_colored_path(path: Path | None) -> None:
     """Raise an error if no mesh with colors can be written to a path, before any work is done."""
-    require_output(path, LABELED, "A mesh with colors")
+    require_output(path, WITH_COLORS, "A mesh with colors")
 
 
 def require_label_path(path: Path | None) -> None:
     """Raise an error if no labels can be written to a path, before any work is done."""
-    require_output(path, (*LABELED, *LABEL_LISTS), "A mesh with labels")
+    require_output(path, (*WITH_COLORS, *LABEL_LISTS), "A mesh with labels")
 
 
 def save_colors(mesh: TriangleMesh, colors: UInt8[np.ndarray, "n 3"], path: Path) -> None:

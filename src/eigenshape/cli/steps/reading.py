@@ -18,13 +18,13 @@ from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io import mesh_files, shape_files
-from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.formats.registry import CellKind
 from eigenshape.io.labeled_shapes import (
     find_labeled_shapes,
     read_label_names,
     read_labeled_shape,
+    read_map,
 )
-from eigenshape.io.labels import read_map
 from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 

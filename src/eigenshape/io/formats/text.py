@@ -51,16 +51,15 @@ def coordinates(lines: Sequence[Line], *, least: int = 3) -> Float[np.ndarray, "
         return values
     if values is not None and values.shape[1] >= 3:
         return values[:, :3]
-    return np.array([_three_numbers(line) for line in lines], dtype=np.float64).reshape(-1, 3)
-
-
-def _three_numbers(line: Line) -> list[float]:
-    words = line[1].split()[:3]
-    if len(words) < 3:
-        raise FileFormatError(
-            f"A vertex must have three numbers; line {line[0]} is {quote_line(line)}."
-        )
-    return [number(word, line) for word in words]
+    rows = []
+    for line in lines:
+        words = line[1].split()[:3]
+        if len(words) < 3:
+            raise FileFormatError(
+                f"A vertex must have three numbers; line {line[0]} is {quote_line(line)}."
+            )
+        rows.append([number(word, line) for word in words])
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
 def number(word: bytes, line: Line) -> float:
@@ -115,35 +114,6 @@ def wholes(numbers: Shaped[np.ndarray, " k"], what: str) -> Int[np.ndarray, " k"
 def quote_line(line: Line) -> str:
     """Quote a line, shortened if it is long."""
     return repr(line[1].strip()[:60].decode("latin-1"))
-
-
-def fans(polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> Int[np.ndarray, "f 3"]:
-    """Split polygons into triangles around their first corner."""
-    if isinstance(polygons, np.ndarray):
-        first = np.broadcast_to(polygons[:, :1], polygons[:, 1:-1].shape)
-        return np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2).reshape(-1, 3)
-    triangles = [
-        (corners[0], corners[place], corners[place + 1])
-        for corners in polygons
-        for place in range(1, len(corners) - 1)
-    ]
-    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
-
-
-def strip_triangles(strips: Sequence[Int[np.ndarray, " _"]]) -> Int[np.ndarray, "f 3"]:
-    """Split strips into triangles, every second one reversed so that all agree.
-
-    A strip changes its direction by a repeated point. The triangles without area that result from
-    this are left out.
-    """
-    pieces = [np.empty((0, 3), dtype=np.int64)]
-    for corners in strips:
-        triangles = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
-        triangles[1::2] = triangles[1::2, [1, 0, 2]]
-        pieces.append(triangles)
-    found = np.concatenate(pieces).astype(np.int64)
-    first, second, third = found.T
-    return found[(first != second) & (second != third) & (third != first)]
 
 
 def rows_text(prefix: str, rows: np.ndarray) -> list[str]:

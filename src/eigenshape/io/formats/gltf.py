@@ -1,6 +1,7 @@
-"""The scene of a glTF file: nodes that place meshes, and accessors to numbers in buffers."""
+"""glTF, as one binary file or with separate buffers: the triangles of all nodes, transformed."""
 
 import base64
+import json
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,12 +14,16 @@ from scipy.spatial.transform import Rotation
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
+from eigenshape.io.formats.cells import NO_TRIANGLES
+from eigenshape.io.formats.text import quote_line
 
+JSON_CHUNK = b"JSON"
+BINARY_CHUNK = b"BIN\0"
+COPIES = 2**22  # most vertices and faces from copies in a small file; they take 200 MB
 KINDS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 TRIANGLES, STRIP, FAN = SURFACES = 4, 5, 6
 LARGEST = sys.float_info.max
-NO_FACES = np.empty((0, 3), dtype=np.int64)
 # Extensions that change the look of a surface but not its place, or that a reader may ignore.
 HARMLESS = (
     "KHR_materials_",
@@ -66,6 +71,89 @@ class Gltf:
                 f"A glTF file must hold what it names; it names {kind}[{ascii(index)[:60]}] and holds none."
             )
         return entries[index]
+
+    def require_few(self, total: int) -> None:
+        """Raise an error if there are more vertices and faces than the limit."""
+        if total > self.most:
+            raise FileFormatError(
+                f"A glTF file must stay within {self.most} vertices and faces; its copies make more."
+            )
+
+
+def parse(data: bytes, folder: Path | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Read vertices and faces of the scene, from a .glb file or, if a folder is given, a .gltf file.
+
+    The buffers of a .gltf file lie in its folder or in data URIs.
+    """
+    piece = read_scene(read_gltf(data, folder)).piece
+    return piece.vertices, piece.faces
+
+
+def read_gltf(data: bytes, folder: Path | None = None) -> Gltf:
+    """Read the tree and the buffers of a file; see `parse`."""
+    if folder is None:
+        chunks = _chunks(data)
+        tree = _tree(chunks.get(JSON_CHUNK, b""))
+        buffers = decode_buffers(tree, chunks.get(BINARY_CHUNK, b""))
+    else:
+        tree = _tree(data)
+        buffers = decode_buffers(tree, b"", folder)
+    return Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES))
+
+
+def read_scene(gltf: Gltf) -> Scene:
+    """Read the triangles of the scene; there must be some."""
+    scene = place_triangles(gltf)
+    if not len(scene.piece.faces):
+        raise FileFormatError("A glTF file must hold triangles; it holds none.")
+    return scene
+
+
+def _chunks(data: bytes) -> dict[bytes, bytes]:
+    version, length = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8))
+    if data[:4] != b"glTF" or version != 2 or length != len(data):
+        raise FileFormatError(
+            f"A GLB file must begin with glTF, version 2 and its length; it begins with {quote_line((1, data[:4]))}, "
+            f"{version} and {length}, and has {len(data)} bytes."
+        )
+    chunks: dict[bytes, bytes] = {}
+    start = 12
+    while start < length:
+        end = start + 8 + int.from_bytes(data[start : start + 4], "little")
+        if start + 8 > length or end > length:
+            raise FileFormatError(
+                f"A chunk of a GLB file must end within it; one ends at {end} of {length} bytes."
+            )
+        chunks.setdefault(data[start + 4 : start + 8], data[start + 8 : end])
+        start = end
+    return chunks
+
+
+def _tree(text: bytes) -> dict[str, Any]:
+    try:
+        tree: Any = json.loads(text)
+    except (ValueError, RecursionError) as err:
+        raise FileFormatError(
+            f"The first chunk of a GLB file, and a .gltf file, must be JSON; {err}."
+        ) from err
+    if not isinstance(tree, dict):
+        raise FileFormatError(
+            f"The JSON of a glTF file must be an object; it is a {type(tree).__name__}."
+        )
+    return tree
+
+
+def pack(tree: dict[str, Any], binary: bytes) -> bytes:
+    """Write a tree and its buffer as one binary file."""
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    body = _chunk(JSON_CHUNK, text + b" " * (-len(text) % 4))
+    if binary:
+        body += _chunk(BINARY_CHUNK, binary + b"\0" * (-len(binary) % 4))
+    return b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(4, "little") + body
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return len(content).to_bytes(4, "little") + kind + content
 
 
 def decode_buffers(tree: dict[str, Any], binary: bytes, folder: Path | None = None) -> list[bytes]:
@@ -123,7 +211,11 @@ def file_beside(index: int, uri: str, folder: Path) -> Path:
 
 def place_triangles(gltf: Gltf) -> Scene:
     """Gather the triangles of all nodes, in world coordinates."""
-    _refuse_extensions(gltf)
+    for name in _list(gltf.tree, "extensionsRequired"):
+        if not str(name).startswith(HARMLESS):
+            raise FileFormatError(
+                f"A glTF file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}."
+            )
     shapes: dict[int, Piece] = {}
     matrices: dict[int, np.ndarray] = {}
     meshes: dict[int, int] = {}  # by node
@@ -133,39 +225,31 @@ def place_triangles(gltf: Gltf) -> Scene:
         if index not in shapes:
             shapes[index] = _mesh(gltf, mesh)
         total += len(shapes[index].vertices) + len(shapes[index].faces)
-        _require_few(total, gltf)  # before any copy is made
+        gltf.require_few(total)  # before any copy is made
         matrices[node], meshes[node] = matrix, index
-    placed = [_transform(shapes[meshes[node]], matrix) for node, matrix in matrices.items()]
+    placed = []
+    for node, matrix in matrices.items():
+        piece = shapes[meshes[node]]
+        # A reflection turns triangles inside out; by the format they must be turned back.
+        flips = np.linalg.slogdet(matrix[:3, :3])[0] < 0
+        vertices = piece.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = piece.faces[:, ::-1] if flips else piece.faces
+        placed.append(piece._replace(vertices=vertices, faces=faces))
     n_faces = [len(piece.faces) for piece in placed]
     nodes = np.repeat(np.array(list(matrices), dtype=np.int64), n_faces)
     return Scene(_merge_pieces(placed), nodes, matrices)
 
 
-def _require_few(total: int, gltf: Gltf) -> None:
-    if total > gltf.most:
-        raise FileFormatError(
-            f"A glTF file must stay within {gltf.most} vertices and faces; its copies make more."
-        )
-
-
 def _merge_pieces(pieces: Sequence[Piece]) -> Piece:
-    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])[:-1]
-    faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=True)]
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
     none = np.empty(0, dtype=np.int64)
+    faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=False)]
     return Piece(
         np.concatenate([np.empty((0, 3)), *(piece.vertices for piece in pieces)]),
-        np.concatenate([NO_FACES, *faces]),
+        np.concatenate([NO_TRIANGLES, *faces]),
         np.concatenate([none, *(piece.rows for piece in pieces)]),
         np.concatenate([none, *(piece.primitives for piece in pieces)]),
     )
-
-
-def _refuse_extensions(gltf: Gltf) -> None:
-    for name in _list(gltf.tree, "extensionsRequired"):
-        if not str(name).startswith(HARMLESS):
-            raise FileFormatError(
-                f"A glTF file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}."
-            )
 
 
 def _placed_meshes(gltf: Gltf) -> Iterator[tuple[int, Any, np.ndarray]]:
@@ -212,67 +296,53 @@ def _local_matrix(node: dict[str, Any]) -> np.ndarray:
     return matrix
 
 
-def _transform(piece: Piece, matrix: np.ndarray) -> Piece:
-    # A reflection turns triangles inside out; by the format they must be turned back.
-    flips = np.linalg.slogdet(matrix[:3, :3])[0] < 0
-    return piece._replace(
-        vertices=piece.vertices @ matrix[:3, :3].T + matrix[:3, 3],
-        faces=piece.faces[:, ::-1] if flips else piece.faces,
-    )
-
-
 def _mesh(gltf: Gltf, mesh: dict[str, Any]) -> Piece:
     """Read one mesh; parts that differ only in material share their vertices, as in the file."""
-    parts: dict[int, list[int]] = {}
     primitives = _list(mesh, "primitives")
+    sharing: dict[int, list[int]] = {}  # by the accessor of positions
     for number, part in enumerate(primitives):
         if _whole(part, "mode", TRIANGLES) in SURFACES:
-            parts.setdefault(_whole(part.get("attributes"), "POSITION"), []).append(number)
+            sharing.setdefault(_whole(part.get("attributes"), "POSITION"), []).append(number)
     pieces = []
     total = 0
-    for position, sharing in parts.items():
+    for position, numbers in sharing.items():
         vertices = read_accessor(gltf, position, 3)
-        faces = []
         total += len(vertices)
-        for number in sharing:
+        faces = []
+        for number in numbers:
             faces.append(_faces(gltf, primitives[number], len(vertices)))
             total += 1 + len(faces[-1])
-            _require_few(total, gltf)
-        owners = np.repeat(sharing, [len(block) for block in faces])
+            gltf.require_few(total)
+        owners = np.repeat(numbers, [len(block) for block in faces])
         pieces.append(Piece(vertices, np.concatenate(faces), np.arange(len(vertices)), owners))
     return _merge_pieces(pieces)
 
 
 def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
+    """Read the triangles of a primitive: a list, a strip or a fan."""
+    corners = np.arange(n_vertices)
+    if "indices" in part:
+        indices = read_accessor(gltf, part["indices"], 1)[:, 0]
+        is_known = (indices >= 0) & (indices < n_vertices) & (indices == np.floor(indices))
+        bad = np.flatnonzero(~is_known)
+        if bad.size:
+            raise FileFormatError(
+                f"Indices of a primitive must be whole and within 0..{n_vertices - 1}; index {bad[0]} is "
+                f"{indices[bad[0]]:.10g}."
+            )
+        corners = indices.astype(np.int64)
     mode = _whole(part, "mode", TRIANGLES)
-    if "indices" not in part:
-        return _split(np.arange(n_vertices), mode)
-    corners = read_accessor(gltf, part["indices"], 1)[:, 0]
-    bad = np.flatnonzero(
-        ~((corners >= 0) & (corners < n_vertices) & (corners == np.floor(corners)))
-    )
-    if bad.size:
-        raise FileFormatError(
-            f"Indices of a primitive must be whole and within 0..{n_vertices - 1}; index {bad[0]} is "
-            f"{corners[bad[0]]:.10g}."
-        )
-    return _split(corners.astype(np.int64), mode)
-
-
-def _split(corners: np.ndarray, mode: int) -> np.ndarray:
     if mode == TRIANGLES:
         if len(corners) % 3:
             raise FileFormatError(
                 f"Triangles must have three corners each; a primitive has {len(corners)} in all."
             )
         return corners.reshape(-1, 3)
+    place = np.arange(max(len(corners) - 2, 0))
     if mode == FAN:
-        return np.column_stack(
-            [corners[1:-1], corners[2:], np.broadcast_to(corners[:1], max(len(corners) - 2, 0))]
-        )
-    odd = np.arange(max(len(corners) - 2, 0)) % 2
-    place = np.arange(len(odd))
-    return np.column_stack([corners[place], corners[place + 1 + odd], corners[place + 2 - odd]])
+        return corners[np.column_stack([place + 1, place + 2, np.zeros_like(place)])]
+    odd = place % 2  # every second triangle of a strip is turned
+    return corners[np.column_stack([place, place + 1 + odd, place + 2 - odd])]
 
 
 def read_accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
@@ -293,7 +363,7 @@ def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarra
         raise FileFormatError(
             f"accessors[{index}] must be a plain list of {wanted or '1 to 4'} numbers each; it is not."
         )
-    data, step = _view(gltf, accessor.get("bufferView"))
+    data, step = view_of(gltf, accessor.get("bufferView"))
     row = kind.itemsize * width
     count, start = _whole(accessor, "count"), _whole(accessor, "byteOffset", 0)
     step = step if step and count > 1 else row  # fewer than two rows have no step
@@ -304,7 +374,8 @@ def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarra
     return np.ndarray((count, width), kind, data, start, (step, kind.itemsize))
 
 
-def _view(gltf: Gltf, index: Any) -> tuple[memoryview, int]:
+def view_of(gltf: Gltf, index: Any) -> tuple[memoryview, int]:
+    """Return the bytes of a view, and the distance between its rows or 0."""
     view = gltf.entry("bufferViews", index)
     place = _whole(view, "buffer")
     data = memoryview(gltf.buffers[place] if place < len(gltf.buffers) else b"")

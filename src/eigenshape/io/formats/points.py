@@ -4,15 +4,16 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.text import coordinates, lines_of, quote_line, rows_text, whole
+from eigenshape.io.formats.cells import NO_TRIANGLES
+from eigenshape.io.formats.text import coordinates, lines_of, quote_line, rows_text, whole
 
 EXPE = b"[Expe/PointSet/Binary/"
 
 
-def parse(data: bytes) -> Float[np.ndarray, "n 3"]:
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray]:
     """Read the first three numbers of each line; a first line with one number alone declares how many follow."""
     if data.startswith(EXPE):
-        return _parse_binary(data)
+        return _parse_binary(data), NO_TRIANGLES
     lines = lines_of(data)
     if lines and len(lines[0][1].split()) == 1:
         declared = whole(lines[0][1], lines[0], "A number of points")
@@ -23,7 +24,7 @@ def parse(data: bytes) -> Float[np.ndarray, "n 3"]:
             )
     if not lines:
         raise FileFormatError("A file of points must hold points; it holds none.")
-    return coordinates(lines)
+    return coordinates(lines), NO_TRIANGLES
 
 
 def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:
@@ -47,24 +48,21 @@ def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:
         raise FileFormatError(
             f"A binary point set must have a position of 12 bytes; it has {sizes}."
         )
-    record = sum(sizes.values())
-    if declared < 1 or len(body) < declared * record:
+    record = np.dtype(
+        [
+            (name.decode("latin-1"), ("<f4", 3) if name == b"position" else f"V{size}")
+            for name, size in sizes.items()
+        ]
+    )
+    if declared < 1 or len(body) < declared * record.itemsize:
         raise FileFormatError(
-            f"A binary point set must hold the points it declares; it declares {declared} of {record} bytes each and "
-            f"holds {len(body)} bytes."
+            f"A binary point set must hold the points it declares; it declares {declared} of {record.itemsize} bytes "
+            f"each and holds {len(body)} bytes."
         )
-    before = sum(size for name, size in list(sizes.items())[: list(sizes).index(b"position")])
-    rows = np.frombuffer(body, np.uint8, declared * record).reshape(declared, record)[
-        :, before : before + 12
-    ]
-    return np.ascontiguousarray(rows).view("<f4").astype(np.float64)
+    return np.frombuffer(body, record, declared)["position"].astype(np.float64)
 
 
-def format_text(points: Float[np.ndarray, "n 3"]) -> bytes:
-    """Write points so that they read back exactly."""
-    return ("\n".join(rows_text("", points)) + "\n").encode()
-
-
-def format_counted(points: Float[np.ndarray, "n 3"]) -> bytes:
-    """Write points with their number before them."""
-    return f"{len(points)}\n".encode() + format_text(points)
+def format_points(points: Float[np.ndarray, "n 3"], suffix: str) -> bytes:
+    """Write points so that they read back exactly; a .pts file has their number before them."""
+    count = [str(len(points))] if suffix == ".pts" else []
+    return ("\n".join([*count, *rows_text("", points)]) + "\n").encode()

@@ -4,10 +4,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
@@ -15,14 +16,25 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
+    WriteJob,
     corner_normals,
     plain_attributes,
 )
-from eigenshape.io.obj_attributes import find_beside
-from eigenshape.io.ply import AXES, CORNERS, LABEL, Table, read_lists, read_tables
-from eigenshape.io.ply_header import Column, parse_header
-from eigenshape.io.text import fans
+from eigenshape.io.formats.cells import fans
+from eigenshape.io.formats.obj_attributes import add_image, find_beside
+from eigenshape.io.formats.ply import (
+    AXES,
+    CORNERS,
+    LABEL,
+    Column,
+    Table,
+    format_binary,
+    format_text,
+    parse_header,
+    read_lists,
+    read_tables,
+)
+from eigenshape.io.sources import SourceFile
 
 IMAGE = re.compile(rb"(?m)^comment TextureFile[ \t]+(.+?)[ \t\r]*$")  # as MeshLab writes it
 TINTS = ("red", "green", "blue")
@@ -39,59 +51,53 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         (element.name, column.name): column
         for element in header.elements
         for column in element.columns
-        if element.count
+        if element.count and column.name not in CORNERS
     }
-    vertex, face = tables["vertex"], tables.get("face", {})
-    polygons = read_lists(tables, "face")
-    polygon_of = np.repeat(np.arange(len(polygons)), [len(polygon) - 2 for polygon in polygons])
-    found: dict[str, Any] = {}
-    known = {("vertex", name) for name in AXES} | {(e, n) for e, *_ in columns for n in CORNERS}
+    left = {key: None for key in columns if key[0] != "vertex" or key[1] not in AXES}
 
-    def numbers(element: str, names: Sequence[str]) -> Float[np.ndarray, "rows k"]:
-        known.update((element, name) for name in names)
+    def take(element: str, names: Sequence[str]) -> Float[np.ndarray, "rows k"] | None:
+        """Return columns, if they are all there, and strike them off the list of those that are left."""
+        if not all((element, name) in left for name in names):
+            return None
+        for name in names:
+            del left[element, name]
         return np.column_stack([_numbers(tables[element][name]) for name in names])
 
-    def holds(element: str, names: Sequence[str]) -> bool:
-        return all((element, name) in columns for name in names)
-
-    if holds("vertex", NORMALS):
-        found["normals"] = numbers("vertex", NORMALS)[mesh.faces]
-    for pair in COORDINATES:
-        if holds("vertex", pair):
-            found["texture_coordinates"] = numbers("vertex", pair)[mesh.faces]
+    polygons = read_lists(tables, "face")
+    polygon_of = np.repeat(np.arange(len(polygons)), [len(polygon) - 2 for polygon in polygons])
     are_faces = len(polygon_of) == mesh.n_faces  # not strips
-    tinted = [e for e in ("vertex", *["face"] * are_faces) if holds(e, TINTS)]
-    for element in tinted[:1]:
-        names = [*TINTS, *(["alpha"] if (element, "alpha") in columns else [])]
-        scales = [1 if columns[element, name].is_whole else 255 for name in names]
-        tints = numbers(element, names) * scales
-        colors = np.full((len(tints), 4), 255, np.uint8)
-        colors[:, : len(names)] = np.rint(np.nan_to_num(tints).clip(0, 255))
-        found["colors"] = (
-            colors[mesh.faces]
-            if element == "vertex"
-            else colors[polygon_of[:, None]].repeat(3, axis=1)
-        )
-    if are_faces and "texture_coordinates" not in found and ("face", WEDGES) in columns:
-        found["texture_coordinates"] = _wedges(face[WEDGES], polygons)
-        known.add(("face", WEDGES))
+    found: dict[str, Any] = {}
+    if (normals := take("vertex", NORMALS)) is not None:
+        found["normals"] = normals[mesh.faces]
+    for pair in COORDINATES:
+        if (coordinates := take("vertex", pair)) is not None:
+            found["texture_coordinates"] = coordinates[mesh.faces]
+    if are_faces and "texture_coordinates" not in found and ("face", WEDGES) in left:
+        found["texture_coordinates"] = _wedges(tables["face"][WEDGES], polygons)
+        del left["face", WEDGES]
+    for element, rows in (("vertex", mesh.faces), ("face", np.column_stack([polygon_of] * 3))):
+        names = [*TINTS, *(["alpha"] if (element, "alpha") in left else [])]
+        tints = None if "colors" in found or len(rows) != mesh.n_faces else take(element, names)
+        if tints is not None:
+            scales = [1 if columns[element, name].is_whole else 255 for name in names]
+            colors = np.full((len(tints), 4), 255, np.uint8)
+            colors[:, : len(names)] = np.rint(np.nan_to_num(tints * scales).clip(0, 255))
+            found["colors"] = colors[rows]
     label = columns.get(("face", LABEL))
-    if are_faces and label is not None and not label.length_kind:
-        labels = _numbers(face[LABEL])[polygon_of].astype(np.int64)
+    if are_faces and label and not label.length_kind:
+        labels = _numbers(tables["face"][LABEL])[polygon_of].astype(np.int64)
         distinct, found["face_groups"] = np.unique(labels, return_inverse=True)
         found["groups"] = tuple(map(str, distinct.tolist()))
-        known.add(("face", LABEL))
+        del left["face", LABEL]
     fields = {}
-    for (element, name), column in columns.items():
-        is_plain = not column.length_kind and (element, name) not in known and name not in fields
-        if is_plain and element == "vertex":
-            fields[name] = _typed(vertex[name], column)
-        elif is_plain and element == "face" and are_faces and mesh.n_faces != mesh.n_vertices:
-            fields[name] = _typed(face[name], column)[polygon_of]
-        else:
-            continue
-        known.add((element, name))
-    others = [f"{name} of {element}" for element, name in columns if (element, name) not in known]
+    for element, name in list(left):  # numbers without a known meaning
+        column = columns[element, name]
+        is_of_faces = element == "face" and are_faces and mesh.n_faces != mesh.n_vertices
+        if not column.length_kind and name not in fields and (element == "vertex" or is_of_faces):
+            values = _typed(tables[element][name], column)
+            fields[name] = values[polygon_of] if is_of_faces else values
+            del left[element, name]
+    others = [f"{name} of {element}" for element, name in left]
     if are_faces and len(polygons) < mesh.n_faces:
         others.append("polygons, of which triangles are made")
     materials, missing = _read_images(source, header.end)
@@ -132,13 +138,10 @@ def _typed(values: Any, column: Column) -> np.ndarray:
     return _numbers(values).ravel().astype(kinds.get(column.kind, np.float64))
 
 
-def columns(
-    held: MeshAttributes,
-    mesh: TriangleMesh,
-    labels: Int[np.ndarray, " f"] | None,
-    lost: list[str],
-) -> tuple[Table, Table]:
-    """Return the columns of vertices and faces to write, and add to `lost` what they do not keep."""
+def write(job: WriteJob) -> dict[Path, bytes]:
+    """Write a PLY file with columns of vertices and faces."""
+    mesh, held, labels, lost = job.mesh, job.attributes, job.face_labels, job.lost
+    job.lose([])
     of_vertices: Table = {}
     of_faces: Table = {}
     if held.colors is not None:
@@ -169,10 +172,20 @@ def columns(
             lost.append(f"the field {name!r}")
         else:
             table[name] = values.astype(_kind(values))
-    lost += [name for name in ("materials", "images") if held.contents[name]]
+    files: dict[Path, bytes] = {}
+    comment, kept = "", set[str]()
+    material = held.materials[0] if held.materials and not held.face_materials.any() else None
+    if material and material.image is not None:  # one image for all faces
+        place = add_image(files, job.path, material.image_name, material.image)
+        comment = f"TextureFile {place.name}"
+        name = Path(material.image_name).stem
+        is_plain = material.name == name and material.color == Material().color
+        kept = {"images", "materials"} if is_plain else {"images"}
+    lost += [name for name in ("materials", "images") if held.contents[name] and name not in kept]
     if held.contents["names of groups"] and not (numbered and labels is None):
         lost.append("names of groups")
-    return of_vertices, of_faces
+    format_columns = format_binary if job.binary else format_text
+    return {**files, job.path: format_columns(mesh, of_vertices, of_faces, comment)}
 
 
 def _kind(values: np.ndarray) -> type[np.generic]:

@@ -7,32 +7,17 @@ https://github.com/LoicMarechal/libMeshb
 import re
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.cells import SEGMENTS, require_splittable
-from eigenshape.io.text import numbers_of, quote_line, wholes
+from eigenshape.io.formats.cells import N_CORNERS, SEGMENTS, Cells, require_splittable
+from eigenshape.io.formats.cursor import Cursor
+from eigenshape.io.formats.text import numbers_of, quote_line, wholes
 
 CELLS = {
-    "Edges": 2,
-    "Triangles": 3,
-    "Quadrilaterals": 4,
-    "Tetrahedra": 4,
-    "Prisms": 6,
-    "Pyramids": 5,
-    "Hexahedra": 8,
-    "Hexaedra": 8,
-}  # corners; a label follows them
-KINDS = {
-    "Edges": SEGMENTS,
-    "Triangles": "triangles",
-    "Quadrilaterals": "quads",
-    "Tetrahedra": "tetrahedra",
-    "Prisms": "wedges",
-    "Pyramids": "pyramids",
-    "Hexahedra": "hexahedra",
-    "Hexaedra": "hexahedra",
-}
+    "Edges": SEGMENTS, "Triangles": "triangles", "Quadrilaterals": "quads", "Tetrahedra": "tetrahedra",
+    "Prisms": "wedges", "Pyramids": "pyramids", "Hexahedra": "hexahedra", "Hexaedra": "hexahedra",
+}  # fmt: skip
 # Sections that are ignored. An unknown keyword is an error: it could be misspelt cells.
 PASSED_OVER = {
     "End", "Corners", "Ridges", "Normals", "Tangents", "AngleOfCornerBound", "BoundingBox",
@@ -54,17 +39,22 @@ CODES = {
 CURVED = {24, 25, 27, 30, 33, *range(86, 94), *range(96, 104)}  # cells of second to fourth order
 POLYTOPES = {46, 47}
 
-Found = tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarray, "_ _"]]]
+Found = tuple[Float[np.ndarray, "n d"], Cells]
 
 
-def parse_text(data: bytes) -> Found:
-    """Return the points, and the cells by kind, of a text file.
+def parse(data: bytes) -> Found:
+    """Return the points, and the cells by kind; only binary files hold zero bytes.
 
     Raises
     ------
     FileFormatError
-        If a keyword is unknown, or a section does not hold what it declares.
+        If a keyword is unknown, a section does not hold what it declares, or a cell has curved sides
+        or any number of corners.
     """
+    return _parse_binary(data) if b"\0" in data[:8] else _parse_text(data)
+
+
+def _parse_text(data: bytes) -> Found:
     text = NO_NUMBERS.sub(b"", data.replace(b"\r\n", b"\n").replace(b"\r", b"\n"))
     keywords = list(KEYWORD.finditer(text))
     before = text[: keywords[0].start()] if keywords else text
@@ -83,7 +73,8 @@ def parse_text(data: bytes) -> Found:
                 raise FileFormatError(f"A Medit file must have one section {name}; it has two.")
             single[name] = _numbers(body, name)
         elif name in CELLS:
-            rows = _rows(_numbers(body, name), CELLS[name] + 1, name)
+            # A label follows the corners.
+            rows = _rows(_numbers(body, name), N_CORNERS[CELLS[name]] + 1, name)
             tables.setdefault(name, []).append(wholes(rows.ravel(), name).reshape(rows.shape))
         elif name not in PASSED_OVER:
             raise FileFormatError(
@@ -135,26 +126,19 @@ def _rows(numbers: Float[np.ndarray, " k"], width: int, name: str) -> Float[np.n
     return numbers[1:].reshape(-1, width)
 
 
-def _blocks(tables: dict[str, list[np.ndarray]]) -> dict[str, Int[np.ndarray, "_ _"]]:
+def _blocks(tables: dict[str, list[np.ndarray]]) -> Cells:
     """Return the corners of cells, counted from 0 and without their labels, by kind."""
     return {
-        KINDS[name]: np.concatenate(rows)[:, :-1].astype(np.int64) - 1
+        CELLS[name]: np.concatenate(rows)[:, :-1].astype(np.int64) - 1
         for name, rows in tables.items()
     }
 
 
-def parse_binary(data: bytes) -> Found:
-    """Return the points, and the cells by kind, of a binary file of version 1 to 4.
-
-    Both byte orders are read.
-
-    Raises
-    ------
-    FileFormatError
-        If the file ends early, or a cell has curved sides or any number of corners.
-    """
+def _parse_binary(data: bytes) -> Found:
+    """Read a file of version 1 to 4, of either byte order."""
     order = {1: "<", 2**24: ">"}.get(int.from_bytes(data[:4], "little"), "")
-    version = int(_read_items(data, 4, order + "i4", 1)[0]) if order else 0
+    cursor = Cursor(data, "A binary Medit file", place=4)
+    version = int(cursor.take(order + "i4", 1)[0]) if order else 0
     if not 1 <= version <= 4:
         raise FileFormatError(
             f"A binary Medit file must begin with 1 and a version of 1 to 4; it has {data[:8]!r}."
@@ -164,51 +148,32 @@ def parse_binary(data: bytes) -> Found:
     real = order + ("f4" if version == 1 else "f8")
     dimension, points = 0, np.empty((0, 0))
     tables: dict[str, list[np.ndarray]] = {}
-    place = 8
-    while (code := int(_read_items(data, place, order + "i4", 1)[0])) != END:
-        following = int(_read_items(data, place + 4, position, 1)[0])
-        place += 4 + np.dtype(position).itemsize
+    while (code := int(cursor.take(order + "i4", 1)[0])) != END:
+        following = int(cursor.take(position, 1)[0])
         if code == DIMENSION:
-            dimension = int(_read_items(data, place, order + "i4", 1)[0])
-            place += 4
+            dimension = int(cursor.take(order + "i4", 1)[0])
             if dimension not in (2, 3):
                 raise FileFormatError(
                     f"Dimension of a Medit file must be 2 or 3; it is {dimension}."
                 )
-        elif code == VERTICES or code in CODES:
-            name = CODES.get(code, "Vertices")
-            count = int(_read_items(data, place, whole, 1)[0])
-            place += np.dtype(whole).itemsize
-            width = CELLS.get(name, 0) + 1
-            row = np.dtype(
-                [("point", real, (dimension,)), ("label", whole)]
-                if code == VERTICES
-                else (whole, (width,))
-            )
-            rows = _read_items(data, place, row, count)
-            place += count * row.itemsize
-            if code == VERTICES:
-                points = rows["point"].astype(np.float64)
-            else:
-                tables.setdefault(name, []).append(rows)
+        elif code == VERTICES:
+            row = np.dtype([("point", real, (dimension,)), ("label", whole)])
+            count = int(cursor.take(whole, 1)[0])
+            points = cursor.take(row, count)["point"].astype(np.float64)
+        elif code in CODES:
+            name = CODES[code]
+            width = N_CORNERS[CELLS[name]] + 1
+            count = int(cursor.take(whole, 1)[0])
+            rows = cursor.take(whole, count * width).reshape(count, width)
+            tables.setdefault(name, []).append(rows)
         else:
             require_splittable(
                 ["curved cells"] if code in CURVED else ["polytopes"] if code in POLYTOPES else []
             )
-            if not (0 < code <= LAST and place < following <= len(data)):
+            if not (0 < code <= LAST and cursor.place < following <= len(data)):
                 raise FileFormatError(
                     f"Sections of a binary Medit file must have a keyword of 1 to {LAST} and the "
                     f"place of the next section; one has keyword {code} and place {following} of {len(data)}."
                 )
-            place = following
+            cursor.place = following
     return points, _blocks(tables)
-
-
-def _read_items(data: bytes, place: int, kind: str | np.dtype, count: int) -> np.ndarray:
-    size = count * np.dtype(kind).itemsize
-    if not 0 <= size <= len(data) - place:
-        raise FileFormatError(
-            f"A binary Medit file must hold what it declares; {count} items of "
-            f"{np.dtype(kind).itemsize} bytes at byte {place} do not fit into its {len(data)} bytes."
-        )
-    return np.frombuffer(data, kind, count, place)

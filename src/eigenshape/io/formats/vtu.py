@@ -3,16 +3,26 @@
 import base64
 import binascii
 import re
+import struct
 from dataclasses import dataclass
 from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.text import numbers_of, wholes
-from eigenshape.io.unpacking import COMPRESSORS, require_reasonable, unpack_block
-from eigenshape.io.vtk_cells import CellLists, cells_of_types
+from eigenshape.geometry.simplicial import Mesh
+from eigenshape.io.formats.cells import (
+    LINE,
+    TETRAHEDRON,
+    TRIANGLE,
+    CellLists,
+    Cells,
+    cells_of_types,
+)
+from eigenshape.io.formats.cursor import COMPRESSORS, require_reasonable, unpack_block
+from eigenshape.io.formats.text import numbers_of, wholes
 
 HEADER_TYPES = {"UInt32": "u4", "UInt64": "u8"}
 ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
@@ -20,6 +30,9 @@ NUMBERS = {
     "Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2", "Int32": "i4", "UInt32": "u4",
     "Int64": "i8", "UInt64": "u8", "Float32": "f4", "Float64": "f8",
 }  # fmt: skip
+# VTK's number of the type of cell, by its number of corners
+SIMPLEX_TYPES = {2: LINE, 3: TRIANGLE, 4: TETRAHEDRON}
+Arrays = dict[str, np.ndarray]
 RAW = re.compile(rb"<AppendedData[^>]*\bencoding\s*=\s*[\"']raw[\"'][^>]*>\s*_")
 
 
@@ -43,7 +56,12 @@ class _Packing:
                 f"Arrays of a VTU file must be of numbers; {name!r} is of {array.get('type')!r}."
             )
         if array.get("format", "ascii") == "ascii":
-            found = _text_numbers(array.text or "", name)
+            try:
+                found = numbers_of((array.text or "").encode().split())
+            except ValueError as err:
+                raise FileFormatError(
+                    f"Arrays of a VTU file must be of numbers; {name!r} is not: {err}."
+                ) from err
         else:
             dtype = np.dtype(self.order + kind)
             data = self._data(array, None if count is None else count * dtype.itemsize, name)
@@ -68,28 +86,54 @@ class _Packing:
             text, is_raw = self.appended[int(offset) :], self.is_raw
         else:
             text, is_raw = (array.text or "").strip().encode(), False
-        source = _Source(text, is_raw, name)
+        n_head = self.size.itemsize
+
+        def counts(number: int) -> list[int]:
+            found: list[int] = np.frombuffer(first(text, number * n_head), self.size).tolist()
+            return found
+
+        def first(text: bytes, length: int) -> bytes:
+            """Return the first bytes that a text holds, raw or in base64."""
+            found = text[:length]
+            if not is_raw:
+                try:
+                    found = base64.b64decode(text[: _n_characters(length)], validate=True)[:length]
+                except binascii.Error as err:
+                    raise FileFormatError(
+                        f"Arrays of a VTU file must be in base64; {name!r} is not: {err}."
+                    ) from err
+            if len(found) < length:
+                raise FileFormatError(
+                    f"A VTU file must hold what it declares; {name!r} lacks {length - len(found)} of {length} bytes."
+                )
+            return found
+
         if self.compressor is None:
-            (length,) = source.counts(self.size, 1)
+            (length,) = counts(1)
             _require_size(length, size, name)
-            return source.after_counts(length, joined=True)
+            head = text[: _n_characters(n_head)]
+            if not is_raw and b"=" in head:  # the count is encoded apart from the data
+                return first(text[len(head) :], length)
+            return first(text, n_head + length)[n_head:]
         if self.compressor not in COMPRESSORS:
             raise FileFormatError(
                 f"A VTU file must be compressed by {' or '.join(COMPRESSORS)}, or not at all; it is by "
                 f"{self.compressor[:40]!r}. Save it uncompressed."
             )
-        (n_blocks,) = source.counts(self.size, 1)
+        (n_blocks,) = counts(1)
         if n_blocks > len(text):
             raise FileFormatError(
                 f"A VTU file must hold what it declares; {name!r} is of {n_blocks} blocks."
             )
-        _, usual, last, *packed = source.counts(self.size, 3 + n_blocks)
+        _, usual, last, *packed = counts(3 + n_blocks)
         sizes = [usual] * n_blocks
         if n_blocks and last:  # 0 means that the last block is as large as the others
             sizes[-1] = last
         _require_size(sum(sizes), size, name)
         require_reasonable(sum(sizes), self.n_bytes)
-        data = source.after_counts(sum(packed), joined=False)
+        # In base64, the compressed blocks are encoded apart from the counts.
+        n_counts = (3 + n_blocks) * n_head
+        data = first(text[n_counts if is_raw else _n_characters(n_counts) :], sum(packed))
         pieces = []
         start = 0
         for length, n_packed in zip(sizes, packed, strict=True):
@@ -98,46 +142,7 @@ class _Packing:
         return b"".join(pieces)
 
 
-class _Source:
-    """Counts and then data, raw or in base64."""
-
-    def __init__(self, text: bytes, is_raw: bool, name: str) -> None:
-        self.text, self.is_raw, self.name = text, is_raw, name
-        self.n_counts = 0  # bytes of all counts
-
-    def counts(self, kind: np.dtype, count: int) -> list[int]:
-        """Return the first `count` numbers."""
-        self.n_counts = count * kind.itemsize
-        return np.frombuffer(self._first(self.text, self.n_counts), kind).tolist()
-
-    def after_counts(self, length: int, *, joined: bool) -> bytes:
-        """Return the bytes after the counts.
-
-        In base64 they are encoded together with the counts if `joined`, otherwise separately.
-        """
-        if self.is_raw:
-            return self._first(self.text[self.n_counts :], length)
-        if joined and b"=" not in self.text[: _count_characters(self.n_counts)]:
-            return self._first(self.text, self.n_counts + length)[self.n_counts :]
-        return self._first(self.text[_count_characters(self.n_counts) :], length)
-
-    def _first(self, text: bytes, length: int) -> bytes:
-        found = text[:length]
-        if not self.is_raw:
-            try:
-                found = base64.b64decode(text[: _count_characters(length)], validate=True)[:length]
-            except binascii.Error as err:
-                raise FileFormatError(
-                    f"Arrays of a VTU file must be in base64; {self.name!r} is not: {err}."
-                ) from err
-        if len(found) < length:
-            raise FileFormatError(
-                f"A VTU file must hold what it declares; {self.name!r} lacks {length - len(found)} of {length} bytes."
-            )
-        return found
-
-
-def _count_characters(length: int) -> int:
+def _n_characters(length: int) -> int:
     """Return the number of base64 characters for a number of bytes."""
     return -(-length // 3) * 4
 
@@ -149,16 +154,7 @@ def _require_size(found: int, expected: int | None, name: str) -> None:
         )
 
 
-def _text_numbers(text: str, name: str) -> np.ndarray:
-    try:
-        return numbers_of(text.encode().split())
-    except ValueError as err:
-        raise FileFormatError(
-            f"Arrays of a VTU file must be of numbers; {name!r} is not: {err}."
-        ) from err
-
-
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarray, "_ _"]]]:
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Cells]:
     """Return points and cells by kind; attribute data are not unpacked.
 
     Raises
@@ -167,10 +163,20 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], dict[str, Int[np.ndarr
         If the content differs from the tags, or they declare more than the file can hold.
     """
     piece, packing, n_points, n_cells = _parse_piece(data)
-    return _points(piece, packing, n_points), _cells(piece, packing, n_cells)
+    array = piece.find("./Points/DataArray")
+    if array is None:
+        raise FileFormatError("A VTU file must have points; it has none.")
+    width = (array.get("NumberOfComponents") or "3").strip()
+    if width not in ("1", "2", "3"):
+        raise FileFormatError(
+            f"Points of a VTU file must have 1 to 3 coordinates each; they have {width[:30]!r}."
+        )
+    numbers = packing.numbers(array, n_points * int(width))
+    points = numbers.reshape(n_points, int(width)).astype(np.float64)
+    return points, _cells(piece, packing, n_cells)
 
 
-def parse_fields(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     """Return the functions on points and those on cells, by name; arrays of text are left out.
 
     Raises
@@ -254,24 +260,7 @@ def _parse_tags(data: bytes) -> tuple[ElementTree.Element, _Packing]:
     return root, _Packing(size, ORDERS[order], compressor, appended, raw is not None, len(data))
 
 
-def _points(
-    piece: ElementTree.Element, packing: _Packing, n_points: int
-) -> Float[np.ndarray, "n d"]:
-    array = piece.find("./Points/DataArray")
-    if array is None:
-        raise FileFormatError("A VTU file must have points; it has none.")
-    width = (array.get("NumberOfComponents") or "3").strip()
-    if width not in ("1", "2", "3"):
-        raise FileFormatError(
-            f"Points of a VTU file must have 1 to 3 coordinates each; they have {width[:30]!r}."
-        )
-    numbers = packing.numbers(array, n_points * int(width))
-    return numbers.reshape(n_points, int(width)).astype(np.float64)
-
-
-def _cells(
-    piece: ElementTree.Element, packing: _Packing, n_cells: int
-) -> dict[str, Int[np.ndarray, "_ _"]]:
+def _cells(piece: ElementTree.Element, packing: _Packing, n_cells: int) -> Cells:
     arrays = {array.get("Name"): array for array in piece.findall("./Cells/DataArray")}
     if not n_cells:
         return {}
@@ -290,3 +279,34 @@ def _cells(
         packing.numbers(arrays["connectivity"], int(starts[-1])), "connectivity of a VTU file"
     )
     return cells_of_types(CellLists(starts, corners), types)
+
+
+def format_fields(mesh: Mesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:
+    """Write a mesh and functions on its vertices and cells."""
+    names = {kind: name for name, kind in NUMBERS.items()}
+
+    def element(name: str, values: np.ndarray) -> str:
+        data = values.astype(values.dtype.newbyteorder("<")).tobytes()
+        text = base64.b64encode(struct.pack("<Q", len(data)) + data).decode()
+        width = f'NumberOfComponents="{values.shape[1]}" ' if values.ndim == 2 else ""
+        return (
+            f'<DataArray type="{names[values.dtype.str[1:]]}" Name={quoteattr(name)} '
+            f'{width}format="binary">{text}</DataArray>'
+        )
+
+    n_cells, n_corners = mesh.simplices.shape
+    ends = n_corners * np.arange(1, n_cells + 1)
+    types = np.full(n_cells, SIMPLEX_TYPES[n_corners], np.uint8)
+    places = np.zeros((mesh.n_points, 3))  # VTK has no points in the plane
+    places[:, : mesh.points.shape[1]] = mesh.points
+    lines = [
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
+        "<UnstructuredGrid>",
+        f'<Piece NumberOfPoints="{mesh.n_points}" NumberOfCells="{n_cells}">',
+        "<PointData>", *(element(name, values) for name, values in of_vertices.items()), "</PointData>",
+        "<CellData>", *(element(name, values) for name, values in of_faces.items()), "</CellData>",
+        "<Points>", element("Points", places), "</Points>",
+        "<Cells>", element("connectivity", mesh.simplices.ravel()), element("offsets", ends),
+        element("types", types), "</Cells>", "</Piece>", "</UnstructuredGrid>", "</VTKFile>", "",
+    ]  # fmt: skip
+    return "\n".join(lines).encode()

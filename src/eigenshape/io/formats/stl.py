@@ -5,7 +5,7 @@ import numpy as np
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import weld
-from eigenshape.io.text import coordinates, lines_of, quote_line
+from eigenshape.io.formats.text import coordinates, lines_of, quote_line
 
 HEADER = 84  # bytes before the triangles of a binary file: 80 of text, 4 of their number
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -14,39 +14,28 @@ FACET = (b"facet", b"outer", b"vertex", b"vertex", b"vertex", b"endloop", b"endf
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Read triangles; corners with the same coordinates become one vertex, since the format cannot share them."""
-    corners = _parse_text(data) if _is_text(data) else _parse_binary(data)
+    n_declared = int.from_bytes(data[80:HEADER], "little")
+    expected = HEADER + RECORD.itemsize * n_declared
+    is_text = data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:HEADER]
+    # Many binary files also begin with "solid".
+    if is_text and (len(data) < HEADER or len(data) != expected):
+        corners = _parse_text(data)
+    elif len(data) < HEADER:
+        raise FileFormatError(
+            f"A binary STL file must have {HEADER} bytes of header; it has {len(data)} in all."
+        )
+    elif len(data) != expected:
+        raise FileFormatError(
+            f"A binary STL file must hold the triangles it declares; "
+            f"{n_declared} take {expected} bytes and it has {len(data)}."
+        )
+    else:
+        rows = np.frombuffer(data, dtype=RECORD, offset=HEADER)
+        corners = rows["corners"].reshape(-1, 3).astype(np.float64)
     if not len(corners):
         raise FileFormatError("An STL file must hold triangles; it holds none.")
     welded = weld(TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3))).mesh
     return welded.vertices, welded.faces
-
-
-def _is_text(data: bytes) -> bool:
-    if len(data) >= HEADER and len(data) == HEADER + RECORD.itemsize * _count_triangles(data):
-        return False  # many binary files also begin with "solid"
-    return data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:HEADER]
-
-
-def _count_triangles(data: bytes) -> int:
-    return int.from_bytes(data[80:HEADER], "little")
-
-
-def _parse_binary(data: bytes) -> np.ndarray:
-    if len(data) < HEADER:
-        raise FileFormatError(
-            f"A binary STL file must have {HEADER} bytes of header; it has {len(data)} in all."
-        )
-    expected = HEADER + RECORD.itemsize * _count_triangles(data)
-    if len(data) != expected:
-        raise FileFormatError(
-            f"A binary STL file must hold the triangles it declares; "
-            f"{_count_triangles(data)} take {expected} bytes and it has {len(data)}."
-        )
-    return (
-        np.frombuffer(data, dtype=RECORD, offset=HEADER)["corners"]
-        .reshape(-1, 3)
-        .astype(np.float64)
-    )
 
 
 def _parse_text(data: bytes) -> np.ndarray:

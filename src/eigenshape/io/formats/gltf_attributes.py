@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 from scipy.sparse import csr_array
 
 from eigenshape._errors import FileFormatError
@@ -18,7 +18,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
+    WriteJob,
     corner_normals,
     linear_colors,
     plain_attributes,
@@ -26,17 +26,21 @@ from eigenshape.io.attributes import (
     unit_rows,
 )
 from eigenshape.io.carrying import interpolate
-from eigenshape.io.glb import pack, read_gltf, read_scene
-from eigenshape.io.gltf import (
+from eigenshape.io.formats.gltf import (
     SURFACES,
     Gltf,
     Scene,
     decode_buffers,
     file_beside,
+    pack,
     raw_accessor,
     read_accessor,
+    read_gltf,
+    read_scene,
+    view_of,
 )
-from eigenshape.io.stl import single_precision
+from eigenshape.io.formats.stl import single_precision
+from eigenshape.io.sources import SourceFile
 
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -45,6 +49,7 @@ EXTRAS = ("skins", "animations", "cameras", "extensions")
 TANGENTS = "tangents, which viewers compute anew"
 MADE_ANEW = ("POSITION", "NORMAL", "TANGENT")
 DRACO = "KHR_draco_mesh_compression"
+Columns = dict[str, tuple[np.ndarray, bool]]  # numbers, and whether whole ones mean shares of one
 
 
 def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
@@ -54,13 +59,15 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     corner_rows = scene.piece.rows[scene.piece.faces]
     found: dict[str, Any] = {}
     materials = [_material(gltf, source, entry) for entry in gltf.tree.get("materials", [])]
-    face_materials, face_parts = np.full((2, n_faces), -1)
-    for part, (_, _, primitive, chosen) in enumerate(_placed_primitives(gltf, scene)):
-        face_parts[chosen] = part
+    nodes = list(scene.matrices)
+    face_materials, face_groups, face_parts = np.full((3, n_faces), -1)
+    for part, (node, _, primitive, chosen) in enumerate(_placed_primitives(gltf, scene)):
         named = primitive["attributes"]
         number = primitive.get("material", -1)
-        face_materials[chosen] = number
-        coordinate = f"TEXCOORD_{_texture(gltf, number).get('texCoord', 0)}"
+        face_materials[chosen], face_groups[chosen] = number, nodes.index(node)
+        face_parts[chosen] = part
+        pbr = {} if number < 0 else _base_color(gltf.entry("materials", number))
+        coordinate = f"TEXCOORD_{pbr.get('baseColorTexture', {}).get('texCoord', 0)}"
         columns = {"normals": ("NORMAL", (3,)), "texture_coordinates": (coordinate, (2,)),
                    "colors": ("COLOR_0", (3, 4))}  # fmt: skip
         for key, (name, widths) in columns.items():
@@ -82,14 +89,16 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     if "colors" in found:
         found["colors"][..., :3] = screen_colors(found["colors"][..., :3])
         found["colors"] = np.rint(255 * found["colors"].clip(0, 1)).astype(np.uint8)
-    owners = np.array(list(scene.matrices), dtype=np.int64)
-    names = [_node_name(gltf, int(node)) for node in owners]
-    groups = np.searchsorted(np.sort(owners), scene.nodes)
+    entries = [gltf.entry("nodes", node) for node in nodes]
+    names = [
+        str(entry.get("name") or gltf.entry("meshes", entry["mesh"]).get("name", ""))
+        for entry in entries
+    ]
     return replace(
         plain_attributes(mesh),
         face_parts=face_parts,
         face_materials=face_materials,
-        face_groups=np.argsort(owners)[groups],
+        face_groups=face_groups,
         materials=tuple(materials),
         groups=tuple(names),
         others=_others(gltf),
@@ -124,16 +133,13 @@ def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
     return rows[corners]
 
 
-def _texture(gltf: Gltf, material: int) -> dict[str, Any]:
-    if material < 0:
-        return {}
-    pbr = gltf.entry("materials", material).get("pbrMetallicRoughness", {})
-    texture: dict[str, Any] = pbr.get("baseColorTexture", {})
-    return texture
+def _base_color(material: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = material.get("pbrMetallicRoughness", {})
+    return found
 
 
 def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material:
-    pbr = entry.get("pbrMetallicRoughness", {})
+    pbr = _base_color(entry)
     *light, alpha = pbr.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])
     red, green, blue = screen_colors(np.array(light, dtype=np.float64)).tolist()
     image, image_name = None, ""
@@ -153,7 +159,7 @@ def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material
 def _image(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> tuple[bytes | None, str]:
     """Return the bytes of an image, None if its file is missing, and its type."""
     if "bufferView" in entry:
-        return _view_bytes(gltf, entry["bufferView"]), entry.get("mimeType", "image/png")
+        return bytes(view_of(gltf, entry["bufferView"])[0]), entry.get("mimeType", "image/png")
     uri = str(entry.get("uri", ""))
     kind = entry.get("mimeType") or mimetypes.guess_type(uri)[0] or "image/png"
     if uri.startswith("data:"):
@@ -164,17 +170,6 @@ def _image(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> tuple[bytes
         return read_regular(file_beside(0, uri, source.path.parent), "an image"), kind
     except (OSError, FileFormatError):
         return None, kind
-
-
-def _view_bytes(gltf: Gltf, index: int) -> bytes:
-    view = gltf.entry("bufferViews", index)
-    start = view.get("byteOffset", 0)
-    return bytes(gltf.buffers[view["buffer"]][start : start + view["byteLength"]])
-
-
-def _node_name(gltf: Gltf, node: int) -> str:
-    entry = gltf.entry("nodes", node)
-    return str(entry.get("name") or gltf.entry("meshes", entry["mesh"]).get("name", ""))
 
 
 def _others(gltf: Gltf) -> tuple[str, ...]:
@@ -188,7 +183,7 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
         names.append("lines and points")
     plain_pbr = {"baseColorFactor", "baseColorTexture", "metallicFactor"}
     for entry in tree.get("materials", []):
-        pbr = entry.get("pbrMetallicRoughness", {})
+        pbr = _base_color(entry)
         is_metal = pbr.get("metallicFactor", 1.0) != 0.0  # our own files say 0
         is_clear = pbr.get("baseColorFactor", [1.0])[-1] < 1
         plain = {"name", "pbrMetallicRoughness", *(["alphaMode"] if is_clear else [])}
@@ -203,62 +198,60 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
 class _Document:
     """A glTF tree and its one buffer, to which accessors are added."""
 
-    def __init__(self, tree: dict[str, Any], binary: bytes = b"") -> None:
-        self.tree, self.pieces, self.length = tree, [binary], len(binary)
+    def __init__(self, tree: dict[str, Any], binary: bytes | bytearray = b"") -> None:
+        self.tree, self.binary = tree, bytearray(binary)
 
     def add_view(self, data: bytes, **entry: Any) -> int:
-        padding = -self.length % 4
-        self.pieces += [b"\0" * padding, data]
-        views = self.tree.setdefault("bufferViews", [])
-        start = self.length + padding
-        views.append({"buffer": 0, "byteOffset": start, "byteLength": len(data), **entry})
-        self.length = start + len(data)
+        self.binary += b"\0" * (-len(self.binary) % 4)
+        views: list[Any] = self.tree.setdefault("bufferViews", [])
+        place = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}
+        views.append({**place, **entry})
+        self.binary += data
         return len(views) - 1
 
-    def add_accessor(self, rows: np.ndarray, *, name: str = "", normalized: bool = False) -> int:
-        """Add the rows of an attribute, or without a name indices."""
-        kind = rows.dtype.str[1:]
-        size = rows.dtype.itemsize * rows.shape[1]
-        entry: dict[str, Any] = {
-            "componentType": COMPONENTS[kind],
-            "count": len(rows),
-            "type": TYPES[rows.shape[1]],
-        }
-        if name:
+    def add_accessor(self, rows: np.ndarray, view: int, **entry: Any) -> int:
+        accessors: list[Any] = self.tree.setdefault("accessors", [])
+        kind = {"componentType": COMPONENTS[rows.dtype.str[1:]], "type": TYPES[rows.shape[1]]}
+        accessors.append({"bufferView": view, "count": len(rows), **kind, **entry})
+        return len(accessors) - 1
+
+    def add_columns(self, columns: Columns, chosen: Int[np.ndarray, " n"]) -> dict[str, int]:
+        """Add some rows of each column, and return the accessors by name."""
+        found = {}
+        for name, (values, is_normalized) in columns.items():
+            rows = np.ascontiguousarray(values[chosen])
+            size = rows.dtype.itemsize * rows.shape[1]
             step = size + -size % 4  # rows of attributes begin at multiples of four bytes
             padded = np.zeros((len(rows), step), np.uint8)
-            padded[:, :size] = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), size)
-            entry["bufferView"] = self.add_view(padded.tobytes(), byteStride=step, target=34962)
-        else:
-            entry["bufferView"] = self.add_view(rows.tobytes(), target=34963)
-        if name == "POSITION":
-            entry |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
-        if normalized:
-            entry["normalized"] = True
-        accessors = self.tree.setdefault("accessors", [])
-        accessors.append(entry)
-        return len(accessors) - 1
+            padded[:, :size] = rows.view(np.uint8).reshape(len(rows), size)
+            view = self.add_view(padded.tobytes(), byteStride=step, target=34962)
+            facts: dict[str, Any] = {"normalized": True} if is_normalized else {}
+            if name == "POSITION":
+                facts |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+            found[name] = self.add_accessor(rows, view, **facts)
+        return found
+
+    def add_indices(self, indices: Int[np.ndarray, " c"], n_vertices: int) -> int:
+        rows = indices.astype("<u2" if n_vertices < 2**16 - 1 else "<u4").reshape(-1, 1)
+        return self.add_accessor(rows, self.add_view(rows.tobytes(), target=34963))
 
     def pack(self) -> bytes:
         """Write the document, without the parts of its buffer that nothing uses."""
-        views, binary = self.tree.get("bufferViews", []), b"".join(self.pieces)
+        views = self.tree.get("bufferViews", [])
         users = list(_view_users(self.tree))
         used = sorted({user["bufferView"] for user in users})
-        kept: list[bytes] = []
-        length = 0
+        kept = bytearray()
         for index in used:
-            view = views[index]
-            start = view.get("byteOffset", 0)
-            data = binary[start : start + view["byteLength"]]
-            view["byteOffset"] = length
-            kept += [data, b"\0" * (-len(data) % 4)]
-            length += len(data) + -len(data) % 4
+            start = views[index].get("byteOffset", 0)
+            views[index]["byteOffset"] = len(kept)
+            kept += self.binary[start : start + views[index]["byteLength"]]
+            kept += b"\0" * (-len(kept) % 4)
         places = {index: place for place, index in enumerate(used)}
         for user in users:
             user["bufferView"] = places[user["bufferView"]]
         self.tree["bufferViews"] = [views[index] for index in used]
-        self.tree["buffers"] = [{"byteLength": length}]
-        return pack(self.tree, b"".join(kept))
+        self.tree["buffers"] = [{"byteLength": len(kept)}]
+        return pack(self.tree, bytes(kept))
 
 
 def _view_users(value: Any) -> Iterator[dict[str, Any]]:
@@ -272,26 +265,30 @@ def _view_users(value: Any) -> Iterator[dict[str, Any]]:
             yield from _view_users(part)
 
 
-def rewrite(
-    source: SourceFile, attributes: MeshAttributes, mesh: TriangleMesh
-) -> tuple[bytes, list[str]]:
+def write(job: WriteJob) -> dict[Path, bytes]:
+    """Write a GLB file: that of the source with other positions and triangles, or a new one."""
+    source = job.attributes.source
+    if source and source.suffix in (".glb", ".gltf"):
+        return {job.path: _rewrite(source, job)}
+    job.lose(["fields"])
+    return {job.path: write_new(job.attributes, job.mesh)}
+
+
+def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     """Write a glTF file again as GLB with other positions and triangles, and name what is lost.
 
     Everything else in the file stays as it is: nodes, materials, images, skins, animations and
     extensions. Every attribute of vertices is carried, whatever it means, but tangents.
     """
+    mesh, attributes = job.mesh, job.attributes
     gltf, scene = _open(source)
-    lost: list[str] = []
-    document = _copy_document(gltf, source, lost)
+    document = _copy_document(gltf, source, job.lost)
     file_rows = scene.piece.rows[scene.piece.faces.ravel()]
     parts = [(node, number) for node, number, _, _ in _placed_primitives(gltf, scene)]
     nodes, primitive_numbers = np.array(parts)[attributes.face_parts].T
-    places, normals = (
-        single_precision(mesh, "GLB").astype(np.float64),
-        corner_normals(attributes, mesh),
-    )
+    places = single_precision(mesh, "GLB").astype(np.float64)
+    normals = corner_normals(attributes, mesh)
     written: dict[int, list[dict[str, Any]]] = {}
-    old_entries: list[dict[str, Any]] = []
     for node, matrix in scene.matrices.items():
         primitives = gltf.entry("meshes", gltf.entry("nodes", node)["mesh"])["primitives"]
         # A reflection turns triangles over, and the reader has turned them back.
@@ -299,56 +296,47 @@ def rewrite(
         written[node] = [part for part in primitives if part.get("mode", 4) not in SURFACES]
         for numbers in _sharing(primitives):
             shared = primitives[numbers[0]]
-            old_entries += [primitives[number] for number in numbers]
             chosen = np.flatnonzero((nodes == node) & np.isin(primitive_numbers, numbers))
             if not chosen.size:
                 continue
             vertices = mesh.faces[chosen][:, order].ravel()
-            rows, blends = _sources(attributes, (3 * chosen[:, None] + order).ravel(), file_rows)
-            table: dict[str, Any] = {}
-            targets: list[dict[str, Any]] = [{} for _ in shared.get("targets", [])]
-            columns_of = [
-                (table, shared["attributes"]),
-                *zip(targets, shared.get("targets", []), strict=True),
-            ]
-            blended = [
-                (place, name, index, _blend(gltf, index, name, rows, blends))
-                for place, named in columns_of
-                for name, index in named.items()
-                if place is not table or name not in MADE_ANEW
-            ]
+            # The rows of the file that the corners come from, and what each gives to each corner
+            blends = attributes.corners[(3 * chosen[:, None] + order).ravel()]
+            used, inverse = np.unique(blends.indices, return_inverse=True)
+            rows = file_rows[used]
+            blends = csr_array((blends.data, inverse.ravel(), blends.indptr))
+            named = {name: i for name, i in shared["attributes"].items() if name not in MADE_ANEW}
+            table, *targets = (
+                {name: _blend(gltf, index, name, rows, blends) for name, index in columns.items()}
+                for columns in (named, *shared.get("targets", []))
+            )
             # Corners of the file agree if their rows do, others if all their values do.
-            are_old = blends.nnz == len(vertices)
-            values_of = (column for *_, values in blended for column in values.T)
-            columns = [rows[blends.indices]] if are_old else [*values_of]
-            normal = None
+            keys = [vertices, rows[blends.indices]]
+            if blends.nnz > len(vertices):
+                columns = [values for place in (table, *targets) for values, _ in place.values()]
+                keys = [vertices, *(column for values in columns for column in values.T)]
+            local = (places[vertices] - matrix[:3, 3]) @ np.linalg.pinv(matrix[:3, :3]).T
+            table["POSITION"] = local.astype("<f4"), False
             if normals is not None and "NORMAL" in shared["attributes"]:
                 normal = normals[chosen][:, order].reshape(-1, 3)
-            first, indices = _split_corners([vertices, *columns], normal)
-            local = (places[vertices[first]] - matrix[:3, 3]) @ np.linalg.pinv(matrix[:3, :3]).T
-            table["POSITION"] = document.add_accessor(local.astype("<f4"), name="POSITION")
-            if normal is not None:
-                local = unit_rows(normal[first] @ matrix[:3, :3])
-                table["NORMAL"] = document.add_accessor(local.astype("<f4"), name="NORMAL")
-            lost += [TANGENTS] if "TANGENT" in shared["attributes"] else []
-            for place, name, index, values in blended:
-                is_normalized = gltf.entry("accessors", index).get("normalized") is True
-                place[name] = document.add_accessor(
-                    values[first], name=name, normalized=is_normalized
-                )
+                keys += [*np.rint(normal.T * 1e5)]
+                table["NORMAL"] = unit_rows(normal @ matrix[:3, :3]).astype("<f4"), False
+            job.lost.extend([TANGENTS] if "TANGENT" in shared["attributes"] else [])
+            first, indices = _split_corners(keys)
+            changed: dict[str, Any] = {"attributes": document.add_columns(table, first)}
+            if targets:
+                changed["targets"] = [document.add_columns(place, first) for place in targets]
             for number in numbers:
                 of_part = np.repeat(primitive_numbers[chosen] == number, 3)
                 if not of_part.any():
                     continue
-                entry = copy.deepcopy(primitives[number])
+                entry = copy.deepcopy(primitives[number]) | changed
+                entry["indices"] = document.add_indices(indices[of_part], len(first))
                 entry.pop("mode", None)
                 entry.get("extensions", {}).pop(DRACO, None)
-                entry |= {"attributes": table, "indices": document.add_accessor(indices[of_part])}
-                if targets:
-                    entry["targets"] = targets
                 written[node].append(entry)
-    _replace_meshes(document, written, old_entries)
-    return document.pack(), lost
+    _replace_meshes(document.tree, written)
+    return document.pack()
 
 
 def _sharing(primitives: list[dict[str, Any]]) -> list[list[int]]:
@@ -361,44 +349,32 @@ def _sharing(primitives: list[dict[str, Any]]) -> list[list[int]]:
     return list(families.values())
 
 
-def _split_corners(
-    columns: list[np.ndarray], normals: Float[np.ndarray, "c 3"] | None
-) -> tuple[Int[np.ndarray, " n"], np.ndarray]:
-    """Make one vertex of all corners that agree; return its first corner, and the indices."""
-    keys = columns + ([] if normals is None else list(np.rint(normals.T * 1e5)))
+def _split_corners(keys: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Make one vertex of all corners whose keys agree; return its first corner, and the indices."""
     _, first, indices = np.unique(
         np.column_stack(keys), axis=0, return_index=True, return_inverse=True
     )
-    kind = "<u2" if len(first) < 2**16 - 1 else "<u4"
-    return first, indices.astype(kind).reshape(-1, 1)
-
-
-def _sources(
-    attributes: MeshAttributes, corners: Int[np.ndarray, " c"], file_rows: Int[np.ndarray, " r"]
-) -> tuple[Int[np.ndarray, " u"], csr_array]:
-    """Return the rows of the file that some corners come from, and what each gives to each corner."""
-    blends = attributes.corners[corners]
-    used, columns = np.unique(blends.indices, return_inverse=True)
-    return file_rows[used], csr_array((blends.data, columns.ravel(), blends.indptr))
+    return first, indices.ravel()
 
 
 def _blend(
     gltf: Gltf, index: int, name: str, rows: Int[np.ndarray, " r"], blends: csr_array
-) -> np.ndarray:
+) -> tuple[np.ndarray, bool]:
     """Interpolate an attribute; joints, whose weights go along, and numbers of things are only chosen."""
     values = _take(raw_accessor(gltf, index), rows, name)
     is_chosen = name.startswith(("JOINTS", "WEIGHTS"))
     is_chosen |= name.startswith("_") and values.dtype.kind in "iu"
-    return interpolate(blends, values, blend=not is_chosen)
+    is_normalized = gltf.entry("accessors", index).get("normalized") is True
+    return interpolate(blends, values, blend=not is_chosen), is_normalized
 
 
 def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document:
     """Copy a tree, with all buffers and images of other files in one buffer."""
     tree = copy.deepcopy(gltf.tree)
-    starts, binary = [], b""
+    starts, binary = [], bytearray()
     for data in gltf.buffers:
         starts.append(len(binary))
-        binary += bytes(data) + b"\0" * (-len(data) % 4)
+        binary += data + b"\0" * (-len(data) % 4)
     for view in tree.get("bufferViews", []):
         view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
         view["buffer"] = 0
@@ -417,46 +393,38 @@ def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document
     return document
 
 
-def _replace_meshes(
-    document: _Document, written: dict[int, list[dict[str, Any]]], old: list[dict[str, Any]]
-) -> None:
-    """Give each node a mesh of its new primitives, and empty the accessors of the old ones."""
-    tree = document.tree
-    users: dict[int, list[int]] = {}
-    for node, entry in enumerate(tree["nodes"]):
-        users.setdefault(entry.get("mesh", -1), []).append(node)
-    originals = copy.deepcopy(tree["meshes"])
+def _replace_meshes(tree: dict[str, Any], written: dict[int, list[dict[str, Any]]]) -> None:
+    """Give each node a mesh of its new primitives, and empty the accessors that they replace."""
+    nodes, meshes = tree["nodes"], tree["meshes"]
+    before = copy.deepcopy(meshes)
+    first_user: dict[int, int] = {}
+    for node, entry in enumerate(nodes):
+        first_user.setdefault(entry.get("mesh", -1), node)
     for node, primitives in written.items():
-        index = tree["nodes"][node]["mesh"]
+        index = nodes[node]["mesh"]
         if not primitives:
-            del tree["nodes"][node]["mesh"]  # all its faces were dropped
-            tree["nodes"][node].pop("skin", None)
-            continue
-        mesh = {**originals[index], "primitives": primitives}
-        if users[index][0] == node:
-            tree["meshes"][index] = mesh
-        else:  # several nodes shared a mesh, and each has its own positions now
-            tree["meshes"].append(mesh)
-            tree["nodes"][node]["mesh"] = len(tree["meshes"]) - 1
-    still_used = {
-        index
-        for mesh in tree["meshes"]
-        for part in mesh["primitives"]
-        for index in _accessors_of(part)
-    }
+            del nodes[node]["mesh"]  # all its faces were dropped
+            nodes[node].pop("skin", None)
+        elif first_user[index] == node:
+            meshes[index] = {**before[index], "primitives": primitives}
+        else:  # several nodes share a mesh, and each has its own positions now
+            nodes[node]["mesh"] = len(meshes)
+            meshes.append({**before[index], "primitives": primitives})
+    still_used = {index for mesh in meshes for index in _accessors_of(mesh)}
     for animation in tree.get("animations", []):
         still_used |= {s[key] for s in animation.get("samplers", []) for key in ("input", "output")}
     still_used |= {skin.get("inverseBindMatrices") for skin in tree.get("skins", [])}
-    before = {index for part in old for index in _accessors_of(part)}
-    for index in before - still_used:
+    for index in {index for mesh in before for index in _accessors_of(mesh)} - still_used:
         for key in ("bufferView", "byteOffset", "sparse", "min", "max"):
             tree["accessors"][index].pop(key, None)  # its data are left out when packed
 
 
-def _accessors_of(part: dict[str, Any]) -> list[int]:
-    values = [part.get("indices"), *part["attributes"].values()]
-    values += [index for target in part.get("targets", []) for index in target.values()]
-    return [index for index in values if type(index) is int]
+def _accessors_of(mesh: dict[str, Any]) -> Iterator[int]:
+    for part in mesh["primitives"]:
+        for columns in (part["attributes"], *part.get("targets", [])):
+            yield from columns.values()
+        if "indices" in part:
+            yield part["indices"]
 
 
 def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
@@ -467,39 +435,43 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
     places, normals = single_precision(mesh, "GLB"), corner_normals(attributes, mesh)
     if attributes.materials:
         tree["materials"] = [_write_material(document, m) for m in attributes.materials]
-    tables: dict[str, np.ndarray] = {}
+    tables: Columns = {}  # with a row for each corner
     if normals is not None:
-        tables["NORMAL"] = normals.astype("<f4")
+        tables["NORMAL"] = normals.astype("<f4"), False
     if attributes.texture_coordinates is not None:
-        tables["TEXCOORD_0"] = ([0, 1] + attributes.texture_coordinates * [1, -1]).astype("<f4")
+        flipped = [0, 1] + attributes.texture_coordinates * [1, -1]
+        tables["TEXCOORD_0"] = flipped.astype("<f4"), False
     if attributes.colors is not None:
         tints = attributes.colors / 255
         tints[..., :3] = linear_colors(tints[..., :3])
-        tables["COLOR_0"] = np.rint(tints * (2**16 - 1)).astype("<u2")
+        tables["COLOR_0"] = np.rint(tints * (2**16 - 1)).astype("<u2"), True
     groups = np.unique(attributes.face_groups)
     for group in groups:
         in_group = np.flatnonzero(attributes.face_groups == group)
         corners = mesh.faces[in_group].ravel()
-        rows = {name: table[in_group].reshape(-1, table.shape[2]) for name, table in tables.items()}
-        first, indices = _split_corners([corners, *(c for t in rows.values() for c in t.T)], None)
-        vertices = corners[first]
+        rows = {
+            name: (table[in_group].reshape(-1, table.shape[2]), is_normalized)
+            for name, (table, is_normalized) in tables.items()
+        }
         if not tables and len(groups) == 1:  # vertices keep their order, also those without a face
-            vertices, indices = np.arange(mesh.n_vertices), corners.astype("<u4").reshape(-1, 1)
-        table = {"POSITION": document.add_accessor(places[vertices].astype("<f4"), name="POSITION")}
-        for name, values in rows.items():
-            is_color = name == "COLOR_0"
-            table[name] = document.add_accessor(values[first], name=name, normalized=is_color)
+            first, indices, positions = np.arange(mesh.n_vertices), corners, places
+        else:
+            keys = [corners, *(column for values, _ in rows.values() for column in values.T)]
+            first, indices = _split_corners(keys)
+            positions = places[corners]
+        table = document.add_columns({"POSITION": (positions, False), **rows}, first)
         materials = attributes.face_materials[in_group]
         primitives: list[dict[str, Any]] = []
-        for material in np.unique(materials):
+        for material in np.unique(materials).tolist():
             of_part = np.repeat(materials == material, 3)
-            entry = {"attributes": table, "indices": document.add_accessor(indices[of_part])}
-            primitives.append(entry | ({"material": int(material)} if material >= 0 else {}))
-        named = (
-            {"name": attributes.groups[group]} if group >= 0 and attributes.groups[group] else {}
-        )
+            entry = {
+                "attributes": table,
+                "indices": document.add_indices(indices[of_part], len(first)),
+            }
+            primitives.append(entry | ({"material": material} if material >= 0 else {}))
+        name = attributes.groups[group] if group >= 0 else ""
         tree["scenes"][0]["nodes"].append(len(tree["nodes"]))
-        tree["nodes"].append({"mesh": len(tree["meshes"]), **named})
+        tree["nodes"].append({"mesh": len(tree["meshes"]), **({"name": name} if name else {})})
         tree["meshes"].append({"primitives": primitives})
     return document.pack()
 
