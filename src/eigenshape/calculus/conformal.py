@@ -357,12 +357,7 @@ def angle_distortion(mesh: MeshLike, positions: ArrayLike) -> Float[np.ndarray, 
 
 
 def _factor(matrix: sp.csr_array) -> LinearSolver:
-    """Factor the equations of a map, which are definite but for rounding.
-
-    Raises
-    ------
-    ConvergenceError
-    """
+    """Factor the equations of a map, which are definite but for rounding."""
     try:
         return factor_definite(matrix)
     except InvalidParameterError as err:
