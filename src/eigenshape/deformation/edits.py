@@ -166,10 +166,7 @@ def carry_edit(edit: Edit, source: TriangleMesh, target: TriangleMesh) -> Edit:
 def edits_to_json(edits: Sequence[Edit], mesh: TriangleMesh) -> dict[str, Any]:
     """Return the edits of a mesh as a dictionary for JSON, with regions as indices of vertices.
 
-    Raises
-    ------
-    InvalidParameterError
-        If a region does not fit the mesh.
+    Raise InvalidParameterError if a region does not fit the mesh.
     """
     entries = []
     for edit in edits:
@@ -205,12 +202,8 @@ def _to_json(value: Handle | BoxRegion | BrushRegion) -> dict[str, Any]:
 def edits_from_json(content: Any, mesh: TriangleMesh) -> list[Edit]:
     """Return the edits of a mesh from what `edits_to_json` returned.
 
-    Raises
-    ------
-    FileFormatError
-        If the content is of another form; the message names the first edit that cannot be read.
-    InvalidParameterError
-        If the edits belong to another mesh; the message names the size and digest of both.
+    Raise FileFormatError if the content is of another form, and InvalidParameterError if the edits
+    belong to another mesh.
     """
     if not isinstance(content, Mapping):
         raise FileFormatError(

@@ -151,10 +151,7 @@ def pose_rig(rig: EigenRig, vertices: ArrayLike) -> EigenRig:
 
     The modes are kept, because bending hardly changes them.
 
-    Raises
-    ------
-    InvalidShapeError
-        If a coordinate is not finite, or the shape of the array is not (n, 3).
+    Raise InvalidShapeError if a coordinate is not finite, or the shape of the array is not (n, 3).
     """
     return replace(rig, mesh=TriangleMesh(finite_rows(vertices, "vertices", 3), rig.mesh.faces))
 
