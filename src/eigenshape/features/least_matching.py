@@ -133,10 +133,7 @@ def _match_pairs(near: Pairs, first: Partners, n_others: int) -> Int[np.ndarray,
 def near_pairs(some: Points, others: Points, distance: float, norm: float) -> Pairs:
     """List the pairs of points whose distance is at most the given one.
 
-    Raises
-    ------
-    InvalidShapeError
-        If the pairs do not fit into half of the memory.
+    Raise InvalidShapeError if the pairs do not fit into half of the memory.
     """
     if not len(some) or not len(others):
         return Pairs(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
