@@ -117,10 +117,7 @@ def as_mesh(value: object, name: str = "mesh") -> TriangleMesh:
 def as_simplicial(value: object, name: str = "mesh") -> Mesh:
     """Convert a value to a mesh of any dimension: a SimplicialMesh, or whatever `as_mesh` takes.
 
-    Raises
-    ------
-    InvalidParameterError, InvalidShapeError
-        As in `as_mesh`.
+    Errors are those of `as_mesh`.
     """
     if isinstance(value, TriangleMesh | SimplicialMesh):
         return value

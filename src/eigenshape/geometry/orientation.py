@@ -83,10 +83,7 @@ def orient_closed_outward(mesh: TriangleMesh) -> TriangleMesh:
     An open mesh, whose signed volume says nothing, is returned as it is; `orient_outward` decides
     for those.
 
-    Raises
-    ------
-    InvalidShapeError
-        If two neighboring faces of a closed mesh are turned against each other.
+    Raise InvalidShapeError if two neighboring faces of a closed mesh are turned against each other.
     """
     if not is_closed(mesh) or enclosed_volume(mesh) >= 0:
         return mesh

@@ -158,13 +158,7 @@ def unreferenced_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
 
 
 def require_simplices_everywhere(mesh: Mesh) -> None:
-    """Raise an error if a point has no simplex.
-
-    Raises
-    ------
-    InvalidShapeError
-        With the index and coordinates of the first such point, and the number of such points.
-    """
+    """Raise an error if a point has no simplex."""
     loose = unreferenced_vertices(mesh)
     if loose.size:
         point, simplex = ("vertex", "face") if mesh.dim == 2 else ("point", "simplex")
