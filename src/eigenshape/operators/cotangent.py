@@ -84,12 +84,7 @@ def linear_mass(mesh: Mesh, mass: Mass) -> sp.csr_array:
 
 
 def require_mass(mass: str) -> None:
-    """Refuse a mass of another name.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
+    """Refuse a mass of another name."""
     if mass not in ("lumped", "consistent", "averaged"):
         raise InvalidParameterError(
             f"mass must be 'lumped', 'consistent' or 'averaged'; it is {mass!r}."

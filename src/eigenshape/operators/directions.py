@@ -41,11 +41,8 @@ class Directions:
 def vertex_directions(mesh: TriangleMesh) -> Directions:
     """Measure the directions of edges around each vertex (Sharp, Soliman, Crane 2019).
 
-    Raises
-    ------
-    InvalidShapeError
-        If the mesh is no manifold, two neighboring faces are turned against each other, a face has
-        no area or a vertex no face; the message names the first.
+    Raise InvalidShapeError if the mesh is no manifold, two neighboring faces are turned against
+    each other, a face has no area or a vertex no face.
     """
     require_sound(mesh)
     require_oriented_manifold(mesh)
@@ -103,11 +100,8 @@ def side_twins(mesh: TriangleMesh) -> Int[np.ndarray, " h"]:
 def require_oriented_manifold(mesh: TriangleMesh) -> None:
     """Raise an error if vertices have no tangent planes with a side to look at them from.
 
-    Raises
-    ------
-    InvalidShapeError
-        If an edge has more than two faces, a vertex more than one fan of faces, or two neighboring
-        faces are turned against each other.
+    An edge has at most two faces, a vertex one fan of faces, and neighboring faces are turned
+    alike.
     """
     edges, vertices = non_manifold_edges(mesh), non_manifold_vertices(mesh)
     if len(edges):

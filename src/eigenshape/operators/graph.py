@@ -172,13 +172,7 @@ def edge_graph(mesh: MeshLike, weights: EdgeWeights = "unit") -> sp.csr_array:
 
 
 def require_distinct_corners(mesh: Mesh) -> None:
-    """Refuse a mesh with a simplex that has a corner twice, naming the first.
-
-    Raises
-    ------
-    InvalidShapeError
-        With the index, corners and number of such simplices.
-    """
+    """Refuse a mesh with a simplex that has a corner twice, naming the first."""
     ordered = np.sort(mesh.simplices, axis=1)
     bad = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
     if bad.size:

@@ -211,10 +211,7 @@ def dirichlet_laplacian(
 def require_points(fixed: ArrayLike, n_points: int) -> Int[np.ndarray, " c"]:
     """Return `fixed` as an array of points, in its order and with its duplicates.
 
-    Raises
-    ------
-    InvalidParameterError
-        If an entry is no point number, or out of range.
+    Raise InvalidParameterError if an entry is no point number, or out of range.
     """
     points = np.atleast_1d(as_array(fixed, "fixed"))
     if points.size and points.dtype.kind not in "iu":
@@ -235,10 +232,6 @@ def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:
 
     The correction of a kernel changes eigenvalues after they are computed, so an equation with the
     matrices would silently be that of the uncorrected operator.
-
-    Raises
-    ------
-    InvalidParameterError
     """
     if laplacian.kernel is not None and laplacian.kernel.corrected:
         raise InvalidParameterError(

@@ -128,10 +128,7 @@ def robust_laplacian(
 def delaunay_cover(mesh: MeshLike, mollify: float = MOLLIFY) -> tuple[Triangulation, float]:
     """Return the Delaunay triangles of the tufted cover, and the unit of their lengths.
 
-    Raises
-    ------
-    InvalidShapeError, InvalidParameterError
-        As in `robust_laplacian`.
+    Errors are those of `robust_laplacian`.
     """
     mesh = as_mesh(mesh)
     if not 0 <= mollify < np.inf:

@@ -140,10 +140,7 @@ def _angles(
 def flip_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Triangulation:
     """Flip edges until the two angles opposite to each sum to 180° at most (Sharp and Crane 2020).
 
-    Raises
-    ------
-    ConvergenceError
-        If flips do not end, which for lengths of triangles they do.
+    Raise ConvergenceError if flips do not end, which for lengths of triangles they do.
     """
     tails, twins, lengths = cover.tails.copy(), cover.twins.copy(), cover.lengths.copy()
     most = MOST_FLIPS * len(tails)

@@ -128,10 +128,7 @@ def cloud_cover(
 
     Most triangles are there three times, once for each corner.
 
-    Raises
-    ------
-    InvalidShapeError, InvalidParameterError
-        As in `local_triangles`, or if `mollify` is not positive and finite.
+    Errors are those of `local_triangles`; `mollify` must be positive and finite.
     """
     if not 0 < mollify < np.inf:
         raise InvalidParameterError(

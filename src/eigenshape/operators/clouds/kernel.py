@@ -63,11 +63,8 @@ class KernelOptions:
 def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
     """Return the kernel of a heat time t, a width h = 2√t, or a width in mean edge lengths e (default 2e).
 
-    Raises
-    ------
-    InvalidParameterError
-        If more than one is given, one is not positive, another option is unknown, or the kernel is
-        narrower than the points lie.
+    Raise InvalidParameterError if more than one is given, one is not positive, another option is
+    unknown, or the kernel is narrower than the points lie.
     """
     scales = {"t": options.t, "h": options.h, "edge_factor": options.edge_factor}
     given = {name: value for name, value in scales.items() if value is not None}
@@ -99,10 +96,7 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
 def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
     """Return the mean distance to the m(m+1) nearest points: as many as touch a point of the lattice A_m.
 
-    Raises
-    ------
-    InvalidShapeError
-        If there are not so many points, or all are equal.
+    Raise InvalidShapeError if there are not so many points, or all are equal.
     """
     near = dim * (dim + 1)
     if len(points) <= near:
@@ -121,11 +115,8 @@ def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
 def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
     """Build the Laplacian of the kernel on weighted points.
 
-    Raises
-    ------
-    InvalidShapeError
-        If the matrix would not fit into memory or its entries into floats, or a point has no
-        partner.
+    Raise InvalidShapeError if the matrix would not fit into memory or its entries into floats, or a
+    point has no partner.
     """
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)
@@ -143,10 +134,7 @@ def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
 def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
     """Build the Laplacian of the kernel with distances along the surface.
 
-    Raises
-    ------
-    InvalidShapeError
-        As `kernel_laplacian`, and if the mesh is no surface.
+    Errors are those of `kernel_laplacian`; the mesh must be a surface.
     """
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)
