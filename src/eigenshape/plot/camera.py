@@ -210,10 +210,7 @@ def aim_camera(mesh: MeshLike, *, view: View = "auto", up: Up = "auto", size: in
 def upward_direction(mesh: TriangleMesh, up: Up) -> Float[np.ndarray, "3"]:
     """Return the upward direction of a shape, which "auto" guesses, as a unit vector.
 
-    Raises
-    ------
-    InvalidParameterError
-        If `up` is neither a name nor a direction.
+    Raise InvalidParameterError if `up` is neither a name nor a direction.
     """
     if isinstance(up, str) and up == "auto":
         up = _upright_axis(mesh)
@@ -225,10 +222,7 @@ def choose_camera(
 ) -> Camera:
     """Return the camera of a figure: the one that was passed, or one for the view.
 
-    Raises
-    ------
-    InvalidParameterError
-        If both a camera and a view or an upward direction were passed.
+    Raise InvalidParameterError if both a camera and a view or an upward direction were passed.
     """
     require_type(camera, Camera | None, "camera")
     if camera is None:
@@ -244,10 +238,7 @@ def choose_camera(
 def _direction(value: View, name: str, names: tuple[str, ...]) -> Float[np.ndarray, "3"]:
     """Return a unit vector for the name of an axis or for three numbers.
 
-    Raises
-    ------
-    InvalidParameterError
-        If it is not one of the names, not three finite numbers, or zero.
+    Raise InvalidParameterError if it is not one of the names, not three finite numbers, or zero.
     """
     if isinstance(value, str):
         if value not in UP_NAMES or value == "auto" or name != "up":

@@ -40,10 +40,7 @@ class Figure(matplotlib_figure.Figure):
 def require_picture_path(path: str | Path) -> Path:
     """Raise an error if no picture can be written to a path, before any work is done.
 
-    Raises
-    ------
-    InvalidParameterError
-        If the path does not end in .png, .svg or .pdf, or its folder does not exist.
+    The path must end in .png, .svg or .pdf, and its folder must exist.
     """
     path = as_path(path)
     if path.suffix.lower() not in SUFFIXES:
