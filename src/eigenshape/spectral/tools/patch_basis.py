@@ -95,10 +95,7 @@ def find_seed(laplacian: Float[np.ndarray, "p p"]) -> tuple[int, Float[np.ndarra
 
     Only the writer chooses, so two machines never choose differently.
 
-    Raises
-    ------
-    ConvergenceError
-        If no seed gives eigenvalues and signs that are far enough from a tie.
+    Raise ConvergenceError if no seed gives eigenvalues and signs that are far enough from a tie.
     """
     for seed in range(N_SEEDS):
         values, vectors, components = patch_basis(laplacian, seed)
