@@ -219,10 +219,7 @@ def preimages(
 
     Φ⁻¹ keeps the barycentric coordinates and takes the corresponding simplex.
 
-    Raises
-    ------
-    InvalidParameterError
-        If a point is in no simplex of N.
+    Raise InvalidParameterError if a point is in no simplex of N.
     """
     n = len(perturbation.regions_two)
     wrong = np.flatnonzero((points.simplices < 0) | (points.simplices >= n))
