@@ -126,7 +126,9 @@ def write_experiment_pages() -> None:
 
 def link_experiment_pages(_app: object, _name: str, text: list[str]) -> None:
     """Lead links to the READMEs of experiments, which lie outside the docs, to their pages."""
-    text[0] = re.sub(r"\]\(\.\./experiments/(\w+)/README\.md", r"](experiments/\1.md", text[0])
+    text[0] = re.sub(
+        r"\]\(\.\./((?:\.\./)?)experiments/(\w+)/README\.md", r"](\1experiments/\2.md", text[0]
+    )
     text[0] = text[0].replace("](../experiments/README.md", "](experiments/index.md")
 
 
