@@ -59,6 +59,8 @@ class Certificate:
         below it was, outside the space of this many eigenvectors.
     estimate : float or None
         Approximate method: estimated error of the eigenvalues, relative to the largest.
+    fallbacks : tuple of str
+        Methods that were tried first and failed, each with its error; empty as a rule.
 
     Examples
     --------
@@ -85,6 +87,7 @@ class Certificate:
     floor: float = -np.inf
     n_deflated: int = 0
     estimate: float | None = None
+    fallbacks: tuple[str, ...] = ()
 
     __repr__ = short_repr
     _repr_html_ = html_repr
@@ -114,7 +117,8 @@ class Certificate:
                 f"{self.shift:.6g} (1/length²), and {self.n_found} were found there."
             )
         what = f"{self._these()} of the operator: none is missing and none is extra."
-        return " ".join([what, self._how(), self._split()]).strip()
+        tried = f"Tried before, in vain: {' '.join(self.fallbacks)}" if self.fallbacks else ""
+        return " ".join(filter(None, [what, self._how(), self._split(), tried]))
 
     def _these(self) -> str:
         if self.first:

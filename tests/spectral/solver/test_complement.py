@@ -117,3 +117,4 @@ def test_what_filters_cannot_prove_factors_do(monkeypatch):
     certificate = solve_spectrum(laplacian, 12).certificate
     assert certificate.complete
     assert certificate.n_deflated == 0
+    assert certificate.fallbacks[0].startswith("a filter: Every eigenvalue that is counted must")
