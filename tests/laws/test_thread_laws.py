@@ -149,8 +149,8 @@ SMALL_WORK = {
     "eigenshape.sparse.basis.FEWEST_MULTIPLICATIONS": 1,
     "eigenshape.sparse.basis.ROWS": 64,
     "eigenshape.sparse.symmetric_factor.SHARED_HEIGHT": 48,
-    "eigenshape.spectral.multilevel.vcycle.ROWS": 64,
-    "eigenshape.spectral.multilevel.residuals.ROWS": 64,
+    "eigenshape.spectral.multilevel.vcycle.ROWS_A_THREAD": 64,
+    "eigenshape.spectral.multilevel.residuals.CHUNK_ROWS": 64,
 }
 
 

@@ -104,6 +104,10 @@ class Certificate:
 
     def explain(self) -> str:
         """Return a text that says what is proved, and how."""
+        tried = f"Tried before, in vain: {' '.join(self.fallbacks)}" if self.fallbacks else ""
+        return " ".join(filter(None, [self._what(), tried]))
+
+    def _what(self) -> str:
         if self.count is None:
             return (
                 f"These are approximations, {self.n_pairs} of them: by what the last round of refinement changed, each "
@@ -117,8 +121,7 @@ class Certificate:
                 f"{self.shift:.6g} (1/length²), and {self.n_found} were found there."
             )
         what = f"{self._these()} of the operator: none is missing and none is extra."
-        tried = f"Tried before, in vain: {' '.join(self.fallbacks)}" if self.fallbacks else ""
-        return " ".join(filter(None, [what, self._how(), self._split(), tried]))
+        return " ".join([what, self._how(), self._split()]).strip()
 
     def _these(self) -> str:
         if self.first:

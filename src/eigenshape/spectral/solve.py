@@ -16,8 +16,11 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.multilevel.approximate import approximate_pairs
-from eigenshape.spectral.multilevel.start import require_accuracy, require_lumped
+from eigenshape.spectral.multilevel.approximate import (
+    approximate_pairs,
+    require_accuracy,
+    require_lumped,
+)
 from eigenshape.spectral.solver.cache import content_key, keep, load_kept, require_writable
 from eigenshape.spectral.solver.certified import certified_pairs
 from eigenshape.spectral.solver.certify import in_user_units

@@ -14,7 +14,7 @@ from eigenshape.spectral.multilevel.vcycle import Tower, multiply
 R = TypeVar("R")
 
 # Rows in a chunk: two products of 32 columns then take 2 MiB, which fit into the cache.
-ROWS = 4096
+CHUNK_ROWS = 4096
 # Chunks of a group, which one thread sums up, at least; and groups at most, each of which keeps
 # sums of its own.
 CHUNKS_A_GROUP = 4
@@ -27,7 +27,7 @@ def map_groups(tower: Tower, function: Callable[[list[slice]], R]) -> list[R]:
     The groups depend on the number of rows alone, and so do sums over them.
     """
     n = tower.levels[0].n
-    chunks = [slice(start, min(start + ROWS, n)) for start in range(0, n, ROWS)]
+    chunks = [slice(start, min(start + CHUNK_ROWS, n)) for start in range(0, n, CHUNK_ROWS)]
     n_groups = min(max(len(chunks) // CHUNKS_A_GROUP, 1), MOST_GROUPS)
     ends = [len(chunks) * number // n_groups for number in range(n_groups + 1)]
     return map_in_threads(function, [chunks[low:high] for low, high in pairwise(ends)])
@@ -48,7 +48,7 @@ def images(
 ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
     """Yield A S and M S for columns S in chunks of rows, in double precision."""
     level = tower.levels[0]
-    room = [np.empty((min(ROWS, level.n), columns.shape[1])) for _ in range(2)]
+    room = [np.empty((min(CHUNK_ROWS, level.n), columns.shape[1])) for _ in range(2)]
     for rows in chunks:
         image, weighed = (part[: rows.stop - rows.start] for part in room)
         multiply(level.stiffness, columns, image, rows)

@@ -13,6 +13,15 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.diffusion.decay import exponential_decay
+from eigenshape.spectral.multilevel.approximate import (
+    MOST_ROUNDS,
+    SINGLE,
+    Start,
+    climb,
+    on_level,
+    require_accuracy,
+    require_lumped,
+)
 from eigenshape.spectral.multilevel.davidson import Goal, misses_pairs, refine
 from eigenshape.spectral.multilevel.residuals import (
     Interpolated,
@@ -21,15 +30,6 @@ from eigenshape.spectral.multilevel.residuals import (
     images,
     map_groups,
     residual_block,
-)
-from eigenshape.spectral.multilevel.start import (
-    ROUNDS,
-    SINGLE,
-    Start,
-    climb,
-    on_finest,
-    require_accuracy,
-    require_lumped,
 )
 from eigenshape.spectral.multilevel.vcycle import correct
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
@@ -160,7 +160,9 @@ def approximate_heat_signature(
         start = climb(pencil, wanted, report)
         if start is None:
             return _certified_signature(laplacian, wanted, clock, report)
-        goal = Goal(wanted, float(accuracy), np.inf, pencil.level / pencil.n, ROUNDS, strict=True)
+        goal = Goal(
+            wanted, float(accuracy), np.inf, pencil.level / pencil.n, MOST_ROUNDS, strict=True
+        )
         return _approximate_signature(pencil, start, goal, clock, report)
 
 
@@ -188,7 +190,9 @@ def _approximate_signature(
         or (estimate.errors > goal.accuracy * estimate.means).any()
         or misses_pairs(columns, ritz, goal.k, bound)
     ):
-        stored, ritz, _ = refine(start.tower, start.below, goal, on_finest(report, start))
+        stored, ritz, _ = refine(
+            start.tower, start.below, goal, on_level(report, 0, len(start.tower.levels))
+        )
         columns = Stored(start.tower, stored)
         estimate = _estimate(pencil, columns, ritz[: goal.k], times)
     report(0.95, "heat")
