@@ -9,8 +9,8 @@ from jaxtyping import Float, Int
 from eigenshape._errors import ConvergenceError
 from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.sparse.basis import Block
+from eigenshape.sparse.basis_loops import multiply_rows
 from eigenshape.sparse.largest import largest_ritz_value
-from eigenshape.sparse.product_loops import multiply_rows
 from eigenshape.spectral.solver.pencil import Pencil
 
 # What a filter gains between its first damped eigenvalue and 0 is about cosh of this. A higher one

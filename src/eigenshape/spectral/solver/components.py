@@ -181,7 +181,10 @@ def _solve_blocks(
     """Return all eigenpairs of consecutive parts of one size, and their residuals."""
     size = int(parts.sizes[first])
     inside = slice(int(parts.starts[first]), int(parts.starts[first]) + count * size)
-    stiffness, mass = (_blocks(matrix[inside, inside], size) for matrix in parts.block_diagonal)
+    stiffness, mass = np.zeros((2, count, size, size))
+    for blocks, matrix in zip((stiffness, mass), parts.block_diagonal, strict=True):
+        entries = matrix[inside, inside].tocoo()
+        blocks[entries.row // size, entries.row % size, entries.col % size] = entries.data
     diagonal = parts.pencil.mass_diagonal[parts.order[inside]].reshape(count, size, 1)
     if parts.pencil.mass_floor == 1.0:
         roots = np.sqrt(diagonal)
@@ -194,13 +197,6 @@ def _solve_blocks(
     rests = stiffness @ vectors - mass @ vectors * values[:, None, :]
     squares = np.square(rests) / diagonal / parts.pencil.mass_floor  # as in `residual_norms`
     return values, vectors, np.sqrt(squares.sum(axis=1))
-
-
-def _blocks(matrix: sp.csc_array, size: int) -> Float[np.ndarray, "c s s"]:
-    entries = matrix.tocoo()
-    blocks = np.zeros((matrix.shape[0] // size, size, size))
-    blocks[entries.row // size, entries.row % size, entries.col % size] = entries.data
-    return blocks
 
 
 def widths(

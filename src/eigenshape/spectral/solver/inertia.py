@@ -52,7 +52,10 @@ def count_beside(
         return not 2 * loss < np.abs(pairs.values - shift).min()
 
     factor, none, sigma = beside, np.zeros(pencil.n), value + step
-    slack = _slack_beside(pencil, beside) if beside else none
+    slack = none
+    if beside:
+        # What was enough for this factor, or would have been.
+        slack = beside.slack if beside.slack.any() else _pad(pencil, rounding(beside))
     if too_much(uncertainty(slack), sigma):
         slack = none
     for _ in range(COUNT_TRIALS):
@@ -73,11 +76,6 @@ def count_beside(
         f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it is "
         f"{np.ldexp(uncertainty(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
     )
-
-
-def _slack_beside(pencil: Pencil, factor: Factor) -> Float[np.ndarray, " n"]:
-    """Return the slack that was enough for a factor, or would have been."""
-    return factor.slack if factor.slack.any() else _pad(pencil, rounding(factor))
 
 
 def _pad(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

@@ -63,16 +63,13 @@ def require_readable(
             else f"k eigenvalues of a surface need n > 21 k t/e² points, and 72 k t/e² for errors below 10 %, as the "
             f"first {np.count_nonzero(shares <= BIASED)} have; or pass correct='log'"
         )
+        limit_name = "1/t" if kernel.volume == 1 else "1/(t × volume)"
         warnings.warn(
-            f"Eigenvalues from number {late} on are too close to {_limit_name(kernel)} = "
+            f"Eigenvalues from number {late} on are too close to {limit_name} = "
             f"{top:.4g} to represent those of the "
             f"shape: {advice}. Choose a smaller t, or more points.",
             stacklevel=stacklevel,
         )
-
-
-def _limit_name(kernel: GaussianKernel) -> str:
-    return "1/t" if kernel.volume == 1 else "1/(t × volume)"
 
 
 def from_pencil(

@@ -58,12 +58,14 @@ def walk_on(
         target = next_slice(k, known)
         last = known + target >= k
         above = max(known + target - factor.count, 1 if not last else 0) + (0 if last else OVERLAP)
-        share = (known - begin) / (k - begin), target / (k - begin)
         wanted = Wanted(below=factor.count - known, above=above, floor=floor)
         none = np.empty((pencil.n, 0))
-        values, vectors = block_lanczos(
-            pencil, factor, wanted, locked=none, report=_within(report, *share)
-        )
+        start, share = (known - begin) / (k - begin), target / (k - begin)
+
+        def within(done: float, start: float = start, share: float = share) -> None:
+            report(start + share * done)
+
+        values, vectors = block_lanczos(pencil, factor, wanted, locked=none, report=within)
         if last:
             return np.hstack([*parts, vectors]) if parts else vectors, factor
         kept, floor = _find_cut(values, factor.shift)
@@ -78,10 +80,6 @@ def next_slice(k: int, known: int) -> int:
     """Return the number of eigenvalues of the next slice, such that the remaining slices are equal."""
     remaining = k - known
     return -(-remaining // max(-(-remaining // SLICE), 1))
-
-
-def _within(report: Report, start: float, share: float) -> Report:
-    return lambda done: report(start + share * done)
 
 
 def _find_cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
