@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_limits
 
 import eigenshape as es
 from eigenshape.sparse.symmetric_factor import SymmetricFactor
-from eigenshape.spectral.solver import factor, lanczos, pairs, pencil
+from eigenshape.spectral.solver import eigenpairs, factor, lanczos, pencil
 from eigenshape.spectral.solver import inertia as count
 from eigenshape.spectral.solver import strategy as roads
 
@@ -101,7 +101,7 @@ PARTS: tuple[tuple[str, object, str, Callable[..., Work]], ...] = (
     ("orthogonalization", lanczos, "_orthonormalize", _orthogonal),
     ("Ritz values", lanczos, "_ritz_space", _eigh),
     ("Ritz vectors", lanczos.RitzSpace, "vectors", _combine),
-    ("residuals", pairs, "rayleigh_residuals", _residuals),
+    ("residuals", eigenpairs, "rayleigh_residuals", _residuals),
     ("proof", roads, "prove", _proof),
     ("proof", count, "rounding", _rounding),
 )

@@ -24,6 +24,7 @@ from eigenshape.spectral.multilevel.approximate import (
 from eigenshape.spectral.solver.cache import content_key, keep, load_kept, require_writable
 from eigenshape.spectral.solver.certified import certified_pairs
 from eigenshape.spectral.solver.certify import in_user_units
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.kernel_values import (
     from_pencil,
     require_readable,
@@ -31,7 +32,6 @@ from eigenshape.spectral.solver.kernel_values import (
     user_certificate,
     user_residuals,
 )
-from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, normalize, to_user_vectors
 from eigenshape.spectral.spectrum import Spectrum
 

@@ -6,8 +6,8 @@ from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import torus
 from eigenshape.spectral.solver import chebyshev
 from eigenshape.spectral.solver.chebyshev import chebyshev_filter
+from eigenshape.spectral.solver.eigenpairs import lowest_pairs
 from eigenshape.spectral.solver.lanczos import Wanted, grow_space
-from eigenshape.spectral.solver.pairs import lowest_pairs
 from eigenshape.spectral.solver.pencil import normalize
 
 PENCIL = normalize(mesh_laplacian(torus(48, 20)))

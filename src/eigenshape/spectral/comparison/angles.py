@@ -19,8 +19,8 @@ from eigenshape.spectral.comparison.eigenspaces import (
     separated_groups,
 )
 from eigenshape.spectral.solver.certify import quality
+from eigenshape.spectral.solver.eigenpairs import Pairs, error_bound
 from eigenshape.spectral.solver.kernel_values import to_pencil
-from eigenshape.spectral.solver.pairs import Pairs, error_bound
 from eigenshape.spectral.solver.pencil import Pencil, normalize, residual_norms
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 

@@ -15,8 +15,8 @@ from eigenshape.geometry.conversion import ShapeLike
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.laplacian import ASYMMETRY, Laplacian
-from eigenshape.spectral.laws.comparison import sizes_of
-from eigenshape.spectral.laws.report import (
+from eigenshape.spectral.laws.agreement import sizes_of
+from eigenshape.spectral.laws.outcomes import (
     DEFAULT_PROMISES,
     Law,
     OperatorReport,

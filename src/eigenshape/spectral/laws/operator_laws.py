@@ -14,7 +14,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.laws import transformations as changes
-from eigenshape.spectral.laws.comparison import (
+from eigenshape.spectral.laws.agreement import (
     MOST_ROUNDING,
     distance,
     lowest_eigenvalues,
@@ -25,7 +25,7 @@ from eigenshape.spectral.laws.comparison import (
     spectral_distance,
 )
 from eigenshape.spectral.laws.laplacian_laws import check_laplacian
-from eigenshape.spectral.laws.report import (
+from eigenshape.spectral.laws.outcomes import (
     DEFAULT_PROMISES,
     Law,
     OperatorReport,

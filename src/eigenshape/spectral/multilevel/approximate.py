@@ -17,7 +17,7 @@ from eigenshape.spectral.multilevel.aggregation import build_levels
 from eigenshape.spectral.multilevel.davidson import WIDTH, Goal, finish_vectors, refine
 from eigenshape.spectral.multilevel.vcycle import Coarsest, Tower
 from eigenshape.spectral.solver.certify import require_orthonormal
-from eigenshape.spectral.solver.pairs import Pairs
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, as_pencil, residual_norms
 from eigenshape.spectral.solver.shift import factorize_near
 from eigenshape.spectral.solver.strategy import solve_lowest

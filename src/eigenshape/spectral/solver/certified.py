@@ -10,8 +10,8 @@ from eigenshape._progress import Progress
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import take_pairs
 from eigenshape.spectral.solver.diagnosis import require_solvable
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.interval import count_interval, solve_interval
-from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import factor_below
 from eigenshape.spectral.solver.strategy import dense_serves, require_memory_for_pairs, solve_lowest

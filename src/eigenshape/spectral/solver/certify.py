@@ -12,10 +12,10 @@ from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.diagnosis import remedy_for
+from eigenshape.spectral.solver.eigenpairs import Pairs, error_bound
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.kernel_values import to_pencil, user_certificate
-from eigenshape.spectral.solver.pairs import Pairs, error_bound
 from eigenshape.spectral.solver.pencil import (
     Pencil,
     column_chunks,

@@ -22,7 +22,7 @@ LOWEST_DEGREE, HIGHEST_DEGREE = 2, 60
 # What the estimate of the largest eigenvalue is raised by.
 RAISED = 1.01
 # Rows that a thread multiplies at least.
-ROWS = 1024
+ROWS_A_THREAD = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class ChebyshevFilter:
         share: float,
         out: Float[np.ndarray, "n 8"],
     ) -> None:
-        rows = share_units(len(given), ROWS, free_threads())
+        rows = share_units(len(given), ROWS_A_THREAD, free_threads())
         map_in_threads(
             lambda part: multiply_rows(self.matrix, given, before, factor, share, *part, out), rows
         )

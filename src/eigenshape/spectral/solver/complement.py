@@ -13,17 +13,17 @@ import scipy.sparse as sp
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import distinct_from, quality, with_count
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.factor import Factor, rounding
-from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Entries below this share of the largest ones beside the diagonal, in their row and their column,
 # are left out: of a Gaussian kernel those beyond 2 widths, 75 % of them.
 SMALL_ENTRIES = 0.02
 # Rounding of a sum of entries of a row, relative.
-SUMS = 1e-12
+SUM_ROUNDING = 1e-12
 # Rounding of the form on the other pairs, relative to σ, a millionth of what they must differ by.
-ROUNDING = 1e-12
+FORM_ROUNDING = 1e-12
 
 
 def sparser_below(pencil: Pencil) -> Pencil:
@@ -38,7 +38,7 @@ def sparser_below(pencil: Pencil) -> Pencil:
     largest = np.zeros(pencil.n)
     np.maximum.at(largest, rows[beside], sizes[beside])
     small = beside & (sizes < SMALL_ENTRIES * np.sqrt(largest[rows] * largest[columns]))
-    lost = np.bincount(rows[small], sizes[small], minlength=pencil.n) * (1 + SUMS)
+    lost = np.bincount(rows[small], sizes[small], minlength=pencil.n) * (1 + SUM_ROUNDING)
     kept = sp.csc_array(
         (entries.data[~small], (rows[~small], columns[~small])), shape=entries.shape
     )
@@ -110,6 +110,6 @@ def _most_missing(
     form = others.T @ images - shift * (others.T @ of_others)
     form -= rests.T @ (rests / pencil.mass_diagonal[:, None]) / margin
     least = np.linalg.eigvalsh((form + form.T) / 2)[0]
-    if not (margin > 0 and least > ROUNDING * shift):
+    if not (margin > 0 and least > FORM_ROUNDING * shift):
         return None
     return below.count - int(np.count_nonzero(on_pairs < 0))

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from eigenshape._progress import Progress, silent
-from eigenshape.spectral.solver.pairs import Pairs
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, part_pencil, residual_norms
 from eigenshape.spectral.solver.shift import expected_values, factor_below
 from eigenshape.spectral.spectrum import ZERO_RESIDUALS

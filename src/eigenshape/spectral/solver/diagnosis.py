@@ -7,9 +7,9 @@ from jaxtyping import Float
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
-from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Ratio of W_ii/B_ii between two points beyond which rounding at the one hides the eigenvalues of

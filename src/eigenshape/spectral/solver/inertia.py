@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
+from eigenshape.spectral.solver.eigenpairs import Pairs, error_bound
 from eigenshape.spectral.solver.factor import Factor, factorize, rounding
-from eigenshape.spectral.solver.pairs import Pairs, error_bound
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Factor by which σ moves away from the eigenvalue if rounding could move it across.

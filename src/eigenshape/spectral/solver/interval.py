@@ -8,10 +8,10 @@ from jaxtyping import Float
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import quality
+from eigenshape.spectral.solver.eigenpairs import Pairs, error_bound, lowest_pairs, polish
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.solver.pairs import Pairs, error_bound, lowest_pairs, polish
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import factorize_near
 from eigenshape.spectral.solver.slices import (

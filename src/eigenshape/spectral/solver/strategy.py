@@ -16,8 +16,8 @@ from eigenshape.spectral.solver.certify import in_user_units, prove, take_pairs
 from eigenshape.spectral.solver.chebyshev import chebyshev_filter
 from eigenshape.spectral.solver.complement import prove_outside, sparser_below
 from eigenshape.spectral.solver.components import solve_parts
+from eigenshape.spectral.solver.eigenpairs import Pairs, lowest_pairs, polish
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos, grow_space
-from eigenshape.spectral.solver.pairs import Pairs, lowest_pairs, polish
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import factorize_near, shift_inside
 from eigenshape.spectral.solver.slices import walk

@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.symmetric_factor import EPS
-from eigenshape.spectral.laws.report import Law, Outcome, SkippedLaw, make_law
+from eigenshape.spectral.laws.outcomes import Law, Outcome, SkippedLaw, make_law
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
