@@ -16,7 +16,6 @@ from eigenshape.spectral.multilevel.residuals import (
     map_groups,
     norms_of_residuals,
     pick_columns,
-    residual_block,
 )
 from eigenshape.spectral.multilevel.vcycle import Tower, correct, multiply, smooth
 
@@ -161,7 +160,8 @@ def _corrections(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the corrections of some columns for their scaled residuals, and the norms of these unscaled."""
     picked = pick_columns(tower, columns, some)
-    block, norms = residual_block(tower, picked, values[some], scales)
+    block = np.empty(picked.shape, dtype=np.float32)
+    norms = norms_of_residuals(tower, picked, values[some], block, scales)
     found = solve(block, values[some].astype(np.float32))
     # If rows are negligible beside θM, with θ far below zero, smoothing makes columns grow.
     if not np.isfinite(found.sum()):
@@ -196,7 +196,8 @@ def misses_pairs(columns: Interpolated, values: np.ndarray, k: int, bound: float
     """
     tower, m = columns.tower, len(values)
     block = _inverse_iteration(columns, 0)
-    image, _ = residual_block(tower, block, np.zeros(PROBES), np.ones(PROBES))
+    image = np.empty(block.shape, dtype=np.float32)
+    norms_of_residuals(tower, block, np.zeros(PROBES), image)
     beside = columns.below.T @ columns.restrict(image)
     block = block.astype(np.float64)
     gram, projected = np.eye(m + PROBES), np.diag(np.append(values, np.zeros(PROBES)))

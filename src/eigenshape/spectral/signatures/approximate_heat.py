@@ -29,7 +29,7 @@ from eigenshape.spectral.multilevel.residuals import (
     change_rows,
     images,
     map_groups,
-    residual_block,
+    norms_of_residuals,
 )
 from eigenshape.spectral.multilevel.vcycle import correct
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
@@ -277,7 +277,8 @@ def _changes(
     """
     tower = columns.tower
     vectors, values, mass = columns.pick(sample), ritz[sample], tower.levels[0].weights
-    residual, _ = residual_block(tower, vectors, values, np.ones(len(sample)))
+    residual = np.empty(vectors.shape, dtype=np.float32)
+    norms_of_residuals(tower, vectors, values, residual)
     step = correct(tower, residual, values.astype(np.float32), CORRECTION_STEPS)
     columns.keep_outside(step)
     before, step = vectors.astype(np.float64), step.astype(np.float64)
