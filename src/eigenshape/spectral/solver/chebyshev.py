@@ -120,10 +120,7 @@ class ChebyshevFilter:
 def chebyshev_filter(pencil: Pencil, order: Int[np.ndarray, " n"], low: float) -> ChebyshevFilter:
     """Return a filter that damps the eigenvalues from `low` on; B is diagonal.
 
-    Raises
-    ------
-    ConvergenceError
-        If that is less than half of the spectrum.
+    Raises a ConvergenceError if that is less than half of the spectrum.
     """
     roots = np.sqrt(pencil.mass_diagonal)
     scaled = sp.csr_array(pencil.stiffness[order][:, order])

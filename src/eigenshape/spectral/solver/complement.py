@@ -49,6 +49,9 @@ def sparser_below(pencil: Pencil) -> Pencil:
 def prove_outside(pencil: Pencil, pairs: Pairs, k: int, below: Factor) -> tuple[Pairs, Certificate]:
     """Return the first k pairs, with the rest of the cluster of the k-th, and a certificate, complete or not.
 
+    Raises a ConvergenceError if the pairs are not B-orthonormal eigenvectors, or not precise enough
+    for a proof, or the cluster has no end among them.
+
     Parameters
     ----------
     pencil : Pencil
@@ -59,12 +62,6 @@ def prove_outside(pencil: Pencil, pairs: Pairs, k: int, below: Factor) -> tuple[
     k : int
     below : Factor
         Of W₀ - γB with γ above the cluster.
-
-    Raises
-    ------
-    ConvergenceError
-        If the pairs are not B-orthonormal eigenvectors, or not precise enough for a proof, or the
-        cluster has no end among them.
     """
     width = 2 * distinct_from(pencil, pairs.select(slice(k)))
     ends = np.flatnonzero(np.diff(pairs.values[k - 1 :]) > width)

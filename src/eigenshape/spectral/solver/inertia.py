@@ -32,10 +32,8 @@ def count_beside(
     stand above rounding (`rounding`). One at another shift, which is spent, tells the first what to
     expect.
 
-    Raises
-    ------
-    ConvergenceError
-        If rounding exceeds the distance to the nearest value found at every σ that is tried.
+    Raises a ConvergenceError if rounding exceeds the distance to the nearest value found at every σ
+    that is tried.
     """
     value, shape, side = (
         float(pairs.values[index]),

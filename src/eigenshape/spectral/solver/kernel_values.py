@@ -39,10 +39,7 @@ def require_readable(
 ) -> None:
     """Raise an error for corrected eigenvalues of 1/t or more, and warn of inaccurate ones.
 
-    Raises
-    ------
-    InvalidParameterError
-        With the first eigenvalue that has no counterpart of Δ.
+    Raises an InvalidParameterError with the first eigenvalue that has no counterpart of Δ.
     """
     if kernel is None:
         return

@@ -29,10 +29,7 @@ FAIR = (0.2, 0.9)
 def walk(pencil: Pencil, k: int, report: Report) -> tuple[Float[np.ndarray, "n j"], Factor]:
     """Return the lowest k eigenvectors as far as they were seen, and the factor at the last shift.
 
-    Raises
-    ------
-    ConvergenceError
-        If a slice does not converge, or has no gap to end in.
+    Raises a ConvergenceError if a slice does not converge, or has no gap to end in.
     """
     return walk_on(pencil, shift_inside(pencil, next_slice(k, 0)), 0, k, report)
 
@@ -47,10 +44,7 @@ def walk_on(
     lie between. What a slice does not see, copies of a multiple eigenvalue beyond the width of its
     block, is left out.
 
-    Raises
-    ------
-    ConvergenceError
-        If a slice does not converge, or has no gap to end in.
+    Raises a ConvergenceError if a slice does not converge, or has no gap to end in.
     """
     parts: list[Float[np.ndarray, "n j"]] = []
     begin, floor = known, -np.inf
@@ -98,10 +92,7 @@ def _find_cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float
 def factor_beyond(pencil: Pencil, floor: float, spacing: float, known: int, target: int) -> Factor:
     """Factor at a shift with about half of the next slice between `floor` and it.
 
-    Raises
-    ------
-    ConvergenceError
-        If none is found beyond `floor`.
+    Raises a ConvergenceError if none is found beyond `floor`.
     """
     step = spacing * target / 2
     for _ in range(SLICE_TRIALS):
