@@ -73,7 +73,7 @@ def subtract_combination(space, parts, columns, begin, end):
 
 @njit
 @no_type_check
-def multiply_rows(matrix, given, before, factor, share, begin, end, out):
+def multiply_lanes(matrix, given, before, factor, share, begin, end, out):
     """Fill rows begin to end - 1 of `out` with factor A given - share before.
 
     The matrix A is given by int64 pointers, int32 indices and entries. The columns have shape (n,

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from eigenshape._errors import ConvergenceError
 from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.sparse.basis import Block
-from eigenshape.sparse.basis_loops import multiply_rows
+from eigenshape.sparse.basis_loops import multiply_lanes
 from eigenshape.sparse.largest import largest_ritz_value
 from eigenshape.spectral.solver.pencil import Pencil
 
@@ -113,7 +113,7 @@ class ChebyshevFilter:
     ) -> None:
         rows = share_units(len(given), ROWS_A_THREAD, free_threads())
         map_in_threads(
-            lambda part: multiply_rows(self.matrix, given, before, factor, share, *part, out), rows
+            lambda part: multiply_lanes(self.matrix, given, before, factor, share, *part, out), rows
         )
 
 
