@@ -339,7 +339,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
 @pytest.mark.long
 def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch):
     monkeypatch.setattr("eigenshape.cli.steps.heat.LARGE", 1000)
-    monkeypatch.setattr("eigenshape.spectral.multilevel.start.COARSENED", 5)
+    monkeypatch.setattr("eigenshape.spectral.multilevel.approximate.COARSENED", 5)
     path = tmp_path / "large.ply"
     write_mesh(make_creature("hand", n_vertices=2500), path)
     assert (

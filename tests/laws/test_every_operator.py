@@ -35,7 +35,7 @@ from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.laws.operator_laws import check_operator
-from eigenshape.spectral.laws.report import DEFAULT_PROMISES
+from eigenshape.spectral.laws.outcomes import DEFAULT_PROMISES
 from eigenshape.spectral.laws.transformations import random_rotation
 
 seeds = st.integers(0, 2**32 - 1)

@@ -8,7 +8,7 @@ from eigenshape.plot.figure import save_figure
 from eigenshape.shapes.exact import sphere_eigenvalues
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.comparison.spectra import compare_spectra
+from eigenshape.spectral.comparison.eigenvalues import compare_spectra
 from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)

@@ -14,7 +14,7 @@ from eigenshape._typing import ArrayLike
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import palette
 from eigenshape.spectral.bounds.brackets import Brackets
-from eigenshape.spectral.comparison.spectra import (
+from eigenshape.spectral.comparison.eigenvalues import (
     SpectrumComparison,
     count_as_zero,
     relative_change,

@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.symmetric_factor import EPS
-from eigenshape.spectral.laws.report import Law, Outcome, SkippedLaw, make_law
+from eigenshape.spectral.laws.outcomes import Law, Outcome, SkippedLaw, make_law
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -37,22 +37,19 @@ def _other_rows(found: int, expected: int) -> str:
 
 def distance(expected: Laplacian, found: Laplacian) -> tuple[float, str]:
     """Return the largest change of an entry, relative to √(W_ii W_jj) or √(B_ii B_jj), and say where it is."""
-    sized = zip("WB", matrices(expected), matrices(found), strict=True)
-    return max((_largest_change(*each) for each in sized), key=lambda change: change[0])
-
-
-def _largest_change(name: str, expected: sp.csr_array, found: sp.csr_array) -> tuple[float, str]:
-    change = (found - expected).tocoo()
-    roots = sizes_of(expected)
-    relative = np.abs(change.data) / np.maximum(
-        roots[change.row] * roots[change.col], np.finfo(float).tiny
-    )
-    if not relative.any():
-        return 0.0, f"no entry of {name} changes"
-    worst = int(relative.argmax())
-    i, j = int(change.row[worst]), int(change.col[worst])
-    where = f"the largest change is that of {name}_ij at ({i}, {j}), from {expected[i, j]:.6g} to {found[i, j]:.6g}"
-    return float(relative[worst]), f"{where}, {relative[worst]:.1e} of √({name}_ii {name}_jj)"
+    largest, explanation = 0.0, "no entry of W changes"
+    for name, before, after in zip("WB", matrices(expected), matrices(found), strict=True):
+        change, roots = (after - before).tocoo(), sizes_of(before)
+        scales = np.maximum(roots[change.row] * roots[change.col], np.finfo(float).tiny)
+        relative = np.abs(change.data) / scales
+        if relative.max(initial=0.0) > largest:
+            worst = int(relative.argmax())
+            largest, i, j = float(relative[worst]), int(change.row[worst]), int(change.col[worst])
+            explanation = (
+                f"the largest change is that of {name}_ij at ({i}, {j}), from {before[i, j]:.6g} to {after[i, j]:.6g}, "
+                f"{largest:.1e} of √({name}_ii {name}_jj)"
+            )
+    return largest, explanation
 
 
 def same_eigenvalues(

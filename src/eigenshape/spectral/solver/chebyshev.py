@@ -9,8 +9,8 @@ from jaxtyping import Float, Int
 from eigenshape._errors import ConvergenceError
 from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.sparse.basis import Block
+from eigenshape.sparse.basis_loops import multiply_lanes
 from eigenshape.sparse.largest import largest_ritz_value
-from eigenshape.sparse.product_loops import multiply_rows
 from eigenshape.spectral.solver.pencil import Pencil
 
 # What a filter gains between its first damped eigenvalue and 0 is about cosh of this. A higher one
@@ -22,7 +22,7 @@ LOWEST_DEGREE, HIGHEST_DEGREE = 2, 60
 # What the estimate of the largest eigenvalue is raised by.
 RAISED = 1.01
 # Rows that a thread multiplies at least.
-ROWS = 1024
+ROWS_A_THREAD = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,19 +111,16 @@ class ChebyshevFilter:
         share: float,
         out: Float[np.ndarray, "n 8"],
     ) -> None:
-        rows = share_units(len(given), ROWS, free_threads())
+        rows = share_units(len(given), ROWS_A_THREAD, free_threads())
         map_in_threads(
-            lambda part: multiply_rows(self.matrix, given, before, factor, share, *part, out), rows
+            lambda part: multiply_lanes(self.matrix, given, before, factor, share, *part, out), rows
         )
 
 
 def chebyshev_filter(pencil: Pencil, order: Int[np.ndarray, " n"], low: float) -> ChebyshevFilter:
     """Return a filter that damps the eigenvalues from `low` on; B is diagonal.
 
-    Raises
-    ------
-    ConvergenceError
-        If that is less than half of the spectrum.
+    Raises a ConvergenceError if that is less than half of the spectrum.
     """
     roots = np.sqrt(pencil.mass_diagonal)
     scaled = sp.csr_array(pencil.stiffness[order][:, order])

@@ -172,10 +172,7 @@ def within_residuals(spectrum: Spectrum, k: int) -> Float[np.ndarray, "k 2"]:
 def within_brackets(brackets: Brackets, k: int, name: str) -> Float[np.ndarray, "k 2"]:
     """Return the lowest k brackets.
 
-    Raises
-    ------
-    InvalidParameterError
-        If there are fewer.
+    Raises an InvalidParameterError if there are fewer.
     """
     if len(brackets.upper) < k:
         raise InvalidParameterError(

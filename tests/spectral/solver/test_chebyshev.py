@@ -4,10 +4,10 @@ import pytest
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import torus
-from eigenshape.spectral.solver import filters
-from eigenshape.spectral.solver.filters import chebyshev_filter
+from eigenshape.spectral.solver import chebyshev
+from eigenshape.spectral.solver.chebyshev import chebyshev_filter
+from eigenshape.spectral.solver.eigenpairs import lowest_pairs
 from eigenshape.spectral.solver.lanczos import Wanted, grow_space
-from eigenshape.spectral.solver.pairs import lowest_pairs
 from eigenshape.spectral.solver.pencil import normalize
 
 PENCIL = normalize(mesh_laplacian(torus(48, 20)))
@@ -19,8 +19,8 @@ ORDER = np.random.default_rng(3).permutation(PENCIL.n)
 
 @pytest.mark.parametrize("degree", [2, 3, 6, 7])
 def test_the_image_is_the_chebyshev_polynomial(monkeypatch, degree):
-    monkeypatch.setattr(filters, "LOWEST_DEGREE", degree)
-    monkeypatch.setattr(filters, "HIGHEST_DEGREE", degree)
+    monkeypatch.setattr(chebyshev, "LOWEST_DEGREE", degree)
+    monkeypatch.setattr(chebyshev, "HIGHEST_DEGREE", degree)
     inner = chebyshev_filter(PENCIL, ORDER, float(VALUES[30]))
     low, high = inner.damped
     assert inner.degree == degree

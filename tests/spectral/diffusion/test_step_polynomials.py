@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.chebyshev import chebval
 
-from eigenshape.spectral.diffusion.implicit_steps import group_times, step_coefficients, step_time
+from eigenshape.spectral.diffusion.heat_flow import group_times, step_coefficients, step_time
 
 
 @pytest.mark.parametrize("accuracy", [0.1, 1e-4, 1e-10, 1e-12])

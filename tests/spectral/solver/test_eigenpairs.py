@@ -2,9 +2,9 @@ import numpy as np
 
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere
+from eigenshape.spectral.solver.eigenpairs import Pairs, lowest_pairs, polish
 from eigenshape.spectral.solver.factor import factorize
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.solver.pairs import Pairs, lowest_pairs, polish
 from eigenshape.spectral.solver.pencil import normalize, rayleigh_residuals
 
 PENCIL = normalize(cotangent_laplacian(icosphere(3)))

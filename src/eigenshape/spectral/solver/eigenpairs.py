@@ -25,7 +25,7 @@ SKEW, NEWTON_STEPS = 0.03, 4
 # Columns before one that it may lean on: more than a slice has.
 LEANING_COLUMNS = 384
 # Rows that are corrected at once.
-ROWS = 512
+CORRECTED_ROWS = 512
 # Residual, relative to the largest eigenvalue, above which a pair takes one more solve.
 POLISHED = 2e-10
 
@@ -135,4 +135,4 @@ def _subtract_half(
         step *= 0.5
         rows -= step
 
-    map_in_threads(correct, share_units(len(vectors), ROWS, len(vectors)))
+    map_in_threads(correct, share_units(len(vectors), CORRECTED_ROWS, len(vectors)))
