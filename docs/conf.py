@@ -2,11 +2,14 @@
 
 import inspect
 import re
+import sys
 from pathlib import Path
 
 import eigenshape as es
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+from command_line import command_line_page  # noqa: E402  a module of this folder
 
 project = "eigenshape"
 author = "The eigenshape founders"
@@ -88,7 +91,8 @@ def write_api_pages() -> None:
                 lines += ["", *[f"   {each}" for each in names], ""]
         write_if_changed(folder / f"{name}.rst", "\n".join(lines))
         pages.append(name)
-    listed = "\n".join(pages)
+    write_if_changed(folder / "command-line.md", command_line_page())
+    listed = "\n".join([*pages, "command-line"])
     write_if_changed(
         folder / "index.md",
         "# API\n\nNames of the short door are there as `es.name`; all others stand in their room, as "

@@ -5,21 +5,14 @@ import shutil
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from running import run
 
-from eigenshape.cli import app
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.labeled_shapes import read_labeled_shape, read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.retrieval.labels.transfer import transfer_labels
 from eigenshape.shapes.creatures import make_creature
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output
-    return done
 
 
 @pytest.fixture(scope="module")

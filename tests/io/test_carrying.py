@@ -63,7 +63,7 @@ def test_no_face_of_a_decimated_ball_runs_over_the_seam():
 def test_decimate_keeps_textures(tmp_path, suffix, target):
     save_mesh(BALL, tmp_path / f"a{suffix}", attributes=textured_ball())
     path = tmp_path / f"b{target}"
-    done = run("decimate", tmp_path / f"a{suffix}", "--faces", 300, "-o", path)
+    done = run("decimate", tmp_path / f"a{suffix}", "-n", 300, "-o", path)
     assert ("materials" in done.stderr) == (target == ".ply" != suffix)
     assert "images" not in done.stderr
     mesh, found = es.read_mesh(path, attributes=True)
@@ -111,7 +111,7 @@ def test_fields_go_along(tmp_path, suffix):
     es.io.write_fields(BALL, tmp_path / "a.vtu", fields)
     fewer, smaller, last = (tmp_path / f"{name}{suffix}" for name in "bcd")
     run("repair", tmp_path / "a.vtu", "--repair", "orient", "-o", fewer)
-    run("decimate", fewer, "--faces", 300, "-o", smaller)
+    run("decimate", fewer, "-n", 300, "-o", smaller)
     run("repair", smaller, "-o", last)
     mesh, found = es.read_mesh(last, attributes=True)
     np.testing.assert_allclose(found.fields["height"], mesh.vertices[:, 2], atol=0.03)

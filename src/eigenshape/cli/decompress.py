@@ -1,28 +1,26 @@
 """eigenshape decompress: the mesh of a file that `eigenshape compress` wrote."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 import eigenshape as es
 from eigenshape._files import read_regular
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
-from eigenshape.cli.inputs import MESHES_TO_WRITE
 
 
 def decompress(
-    packed: Annotated[Path, typer.Argument(help="File that `eigenshape compress` wrote (.esz).")],
+    packed: Path,
     *,
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", help=f"Mesh to write: {MESHES_TO_WRITE}."),
-    ],
+    output: Path,
 ) -> None:
     """Write the mesh of a file that `eigenshape compress` wrote.
 
     For instance: eigenshape decompress scan.esz -o scan.ply
+
+    Parameters
+    ----------
+    packed
+        File that `eigenshape compress` wrote (.esz).
     """
     steps.require_mesh_path(output)
     with progress_bar("decompress") as progress:

@@ -20,9 +20,17 @@ from eigenshape.retrieval.store.batch import (
     Callback,
     announce_learning,
     build_index,
+    read_stage,
     train_codebook_from_files,
 )
+from eigenshape.retrieval.store.filters import (
+    parse_filters,
+    require_attributes,
+)
 from eigenshape.retrieval.store.index import ShapeIndex
+
+# For the verbs, as they are, beside what is defined here
+__all__ = ["parse_filters", "read_stage", "require_attributes"]
 
 RETRIES = 3  # workers of a cluster that a task may lose before it counts as failed
 
