@@ -65,12 +65,8 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
 def format_fields(mesh: Mesh, suffix: str, fields: Mapping[str, ArrayLike]) -> bytes:
     """Write a mesh and its fields; each has a row for every vertex, or for every face.
 
-    Raises
-    ------
-    FileFormatError
-        If the format holds triangles only, and the mesh has other cells.
-    InvalidParameterError
-        If a field has another number of rows, or is not of numbers.
+    Raise FileFormatError if the format holds triangles only, and the mesh has other cells. Raise
+    InvalidParameterError if a field has another number of rows, or is not of numbers.
     """
     of_vertices: Fields = {}
     of_faces: Fields = {}

@@ -25,10 +25,7 @@ NAMES_FILE = "names.txt"  # in a folder of labeled shapes: the name of label k i
 def find_labels(path: Path) -> Path:
     """Return the file with the labels of a mesh: beside it, or a PLY file itself.
 
-    Raises
-    ------
-    FileFormatError
-        If there is no such file.
+    Raise FileFormatError if there is no such file.
     """
     for suffix in LABEL_SUFFIXES:
         beside = path.with_suffix(suffix)
@@ -179,12 +176,8 @@ def read_labels(path: Path) -> Int[np.ndarray, " f"]:
 
     A file has one label a line, the list "face_labels" in .json, or the property `label` in .ply.
 
-    Raises
-    ------
-    FileFormatError
-        If a line or an entry is not a whole number, or if there is no such list.
-    OSError
-        If the system cannot open the file.
+    Raise FileFormatError if a line or an entry is not a whole number, or if there is no such list.
+    Raise OSError if the system cannot open the file.
     """
     data = read_regular(path, "labels")
     try:
@@ -199,12 +192,8 @@ def read_labels(path: Path) -> Int[np.ndarray, " f"]:
 def read_map(path: Path) -> Int[np.ndarray, " n"]:
     """Read the corresponding vertex of another shape for each vertex, one a line, from 0.
 
-    Raises
-    ------
-    FileFormatError
-        If a line is not a whole number.
-    OSError
-        If the system cannot open the file.
+    Raise FileFormatError if a line is not a whole number. Raise OSError if the system cannot open
+    the file.
     """
     data = read_regular(path, "vertices that correspond")
     try:

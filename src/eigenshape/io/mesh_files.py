@@ -195,10 +195,8 @@ def require_finite(
     Returns the points and simplices that stay, the indices of these points in the file, and a
     report of one sentence or none.
 
-    Raises
-    ------
-    InvalidShapeError
-        If a point is not finite, and such points are not to be left out, or no face is without one.
+    Raise InvalidShapeError if a point is not finite, and such points are not to be left out, or no
+    face is without one.
     """
     is_surface = len(simplices) > 0 and simplices.shape[1] == points.shape[1] == 3
     noun = "vertex" if is_surface else "point"

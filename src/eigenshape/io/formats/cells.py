@@ -36,13 +36,7 @@ VTK_NAMES = {
 
 
 def require_kind(cells: str | None) -> CellKind | None:
-    """Return the kind of cells; raise an error if there is no such kind.
-
-    Raises
-    ------
-    InvalidParameterError
-        If the kind is unknown.
-    """
+    """Return the kind of cells; raise an error if there is no such kind."""
     if cells is not None and cells not in get_args(CellKind):
         raise InvalidParameterError(
             f"cells must be {', '.join(get_args(CellKind))} or None; it is {cells!r}."
@@ -51,13 +45,7 @@ def require_kind(cells: str | None) -> CellKind | None:
 
 
 def require_splittable(others: Sequence[str]) -> None:
-    """Raise an error that names the cells that can neither be taken nor split.
-
-    Raises
-    ------
-    FileFormatError
-        If there are such cells.
-    """
+    """Raise an error that names the cells that can neither be taken nor split."""
     if others:
         raise FileFormatError(
             "A file must hold simplices, quads, hexahedra, wedges or pyramids, with straight sides; "
@@ -73,12 +61,8 @@ def select_cells(
     The kind "quads" includes the triangles between them, and "tetrahedra" those of hexahedra,
     wedges and pyramids. Without cells the shape is (0, 3).
 
-    Raises
-    ------
-    FileFormatError
-        If the file has no cells of the requested kind.
-    InvalidShapeError
-        If a hexahedron, wedge or pyramid cannot be split.
+    Raise FileFormatError if the file has no cells of the requested kind. Raise InvalidShapeError if
+    a hexahedron, wedge or pyramid cannot be split.
     """
     if FOUR_CORNERED in blocks:
         blocks = dict(blocks)
@@ -229,10 +213,8 @@ class CellLists:
 def cells_of_types(lists: CellLists, types: Int[np.ndarray, " c"]) -> Cells:
     """Sort cells by their kind; ignore cells that are points.
 
-    Raises
-    ------
-    FileFormatError
-        If a cell has another type, or its number of corners does not match its type.
+    Raise FileFormatError if a cell has another type, or its number of corners does not match its
+    type.
     """
     others = np.setdiff1d(types, [VERTEX, POLY_VERTEX, POLYLINE, *VTK_KINDS])
     if others.size:

@@ -48,10 +48,7 @@ class Cursor:
     def take(self, kind: Any, count: int) -> np.ndarray:
         """Return the next `count` numbers; `kind` is their numpy type in a binary file.
 
-        Raises
-        ------
-        FileFormatError
-            If there are fewer, or a word of a text file is not a number.
+        Raise FileFormatError if there are fewer, or a word of a text file is not a number.
         """
         size = 2 if self.is_text else np.dtype(kind).itemsize  # a digit, and a space after it
         left = len(self.data) - self.place + self.is_text
@@ -116,10 +113,7 @@ class Cursor:
 def require_reasonable(size: int, n_bytes: int) -> None:
     """Raise an error for a declared size that no real file has, before memory is allocated.
 
-    Raises
-    ------
-    FileFormatError
-        If `size` bytes are more than a file of `n_bytes` may unpack to.
+    Raise FileFormatError if `size` bytes are more than a file of `n_bytes` may unpack to.
     """
     most = ALWAYS + MOST_TIMES * n_bytes
     if size > most:
@@ -132,10 +126,7 @@ def require_reasonable(size: int, n_bytes: int) -> None:
 def unpack_block(packed: bytes, size: int, compressor: str) -> bytes:
     """Unpack a block to its declared size, and not more.
 
-    Raises
-    ------
-    FileFormatError
-        If the block is damaged, or of another size.
+    Raise FileFormatError if the block is damaged, or of another size.
     """
     try:
         if compressor == ZLIB:

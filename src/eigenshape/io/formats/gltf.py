@@ -159,10 +159,7 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
 def decode_buffers(tree: dict[str, Any], binary: bytes, folder: Path | None = None) -> list[bytes]:
     """Return the buffers: the binary chunk, data URIs and, if a folder is given, files in it.
 
-    Raises
-    ------
-    FileFormatError
-        If a buffer is outside the file or the folder. Such a file is not opened.
+    Raise FileFormatError if a buffer is outside the file or the folder. Such a file is not opened.
     """
     return [
         _decode_buffer(index, entry, binary, folder)

@@ -29,11 +29,8 @@ Rows = list[tuple[int, Int[np.ndarray, "_ _"]]]  # gmsh's number of a type, and 
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells]:
     """Return points and cells by kind.
 
-    Raises
-    ------
-    FileFormatError
-        If a section is missing or occurs twice, nodes and elements are not as declared, or an
-        element has curved sides.
+    Raise FileFormatError if a section is missing or occurs twice, nodes and elements are not as
+    declared, or an element has curved sides.
     """
     words, _, order = _section(data, b"MeshFormat").partition(b"\n")
     version, form, n_bytes = [*words.split(), b"", b"", b""][:3]
@@ -185,10 +182,8 @@ def _require_total(found: int, declared: int, what: str) -> None:
 def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> Cells:
     """Return cells by kind, with the order of nodes in the file instead of their tags.
 
-    Raises
-    ------
-    FileFormatError
-        If tags are not positive and distinct, or an element refers to a tag without node.
+    Raise FileFormatError if tags are not positive and distinct, or an element refers to a tag
+    without node.
     """
     if tags.size and tags.min() < 1:
         raise FileFormatError(

@@ -45,11 +45,8 @@ Found = tuple[Float[np.ndarray, "n d"], Cells]
 def parse(data: bytes) -> Found:
     """Return the points, and the cells by kind; only binary files hold zero bytes.
 
-    Raises
-    ------
-    FileFormatError
-        If a keyword is unknown, a section does not hold what it declares, or a cell has curved sides
-        or any number of corners.
+    Raise FileFormatError if a keyword is unknown, a section does not hold what it declares, or a
+    cell has curved sides or any number of corners.
     """
     return _parse_binary(data) if b"\0" in data[:8] else _parse_text(data)
 

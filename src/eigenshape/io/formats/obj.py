@@ -76,10 +76,8 @@ def join_lines(data: bytes) -> bytes:
 def corner_index(word: bytes, line: Line, n_so_far: int) -> int:
     """Return the vertex of a corner, from 0, if `n_so_far` vertices precede it.
 
-    Raises
-    ------
-    FileFormatError
-        If there is no such vertex, or a negative index goes back beyond the first.
+    Raise FileFormatError if there is no such vertex, or a negative index goes back beyond the
+    first.
     """
     index = whole(word, line, "A corner")
     if index == 0 or index < -n_so_far:
@@ -122,10 +120,7 @@ class ObjSheet:
 def read_sheet(data: bytes) -> ObjSheet:
     """Read an OBJ file with its polygons, textures and groups.
 
-    Raises
-    ------
-    FileFormatError
-        If a vertex or a face cannot be read.
+    Raise FileFormatError if a vertex or a face cannot be read.
     """
     positions: list[Line] = []
     tails: list[str] = []

@@ -314,10 +314,7 @@ def _ragged_table(body: bytes, element: Element, order: str, start: int) -> tupl
 def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
     """Read the property `label` of faces: one whole number for each triangle that `parse` makes of them.
 
-    Raises
-    ------
-    FileFormatError
-        If faces have no such property, or it is not a whole number.
+    Raise FileFormatError if faces have no such property, or it is not a whole number.
     """
     tables = read_tables(data)
     labels = tables.get("face", {}).get(LABEL)

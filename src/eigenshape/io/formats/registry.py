@@ -106,10 +106,7 @@ def format_of(suffix: str) -> Format:
 def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> str:
     """Return the suffix that names the format, in lower case.
 
-    Raises
-    ------
-    FileFormatError
-        If the suffix is not one of the known ones, or the path is a folder.
+    Raise FileFormatError if the suffix is not one of the known ones, or the path is a folder.
     """
     suffix = path.suffix if file_format is None else f".{file_format.removeprefix('.')}"
     suffix = suffix.lower()

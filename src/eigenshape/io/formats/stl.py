@@ -79,10 +79,7 @@ def format_text(mesh: TriangleMesh) -> bytes:
 def format_binary(mesh: TriangleMesh) -> bytes:
     """Write binary STL in single precision.
 
-    Raises
-    ------
-    FileFormatError
-        If a coordinate does not fit into single precision.
+    Raise FileFormatError if a coordinate does not fit into single precision.
     """
     records = np.zeros(mesh.n_faces, dtype=RECORD)
     records["corners"] = single_precision(mesh, "Binary STL")[mesh.faces]

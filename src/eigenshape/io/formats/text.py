@@ -90,10 +90,7 @@ def whole(word: bytes, line: Line, what: str) -> int:
 def numbers_of(words: Sequence[bytes]) -> Float[np.ndarray, " k"]:
     """Read words as numbers.
 
-    Raises
-    ------
-    ValueError
-        If one is not a number.
+    Raise ValueError if one is not a number.
     """
     if b"_" in b" ".join(words):  # Python would read 1_0 as ten
         raise ValueError("numbers have no underscores")

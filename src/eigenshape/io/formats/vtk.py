@@ -55,10 +55,7 @@ def _kind_of(word: bytes) -> str:
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells]:
     """Return points and cells by kind.
 
-    Raises
-    ------
-    FileFormatError
-        If the content differs from the header.
+    Raise FileFormatError if the content differs from the header.
     """
     cursor = _open(data)
     dataset = cursor.line().split()
@@ -118,10 +115,7 @@ def _sections(cursor: Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[bytes
 def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     """Return the functions on points and those on cells, by name; see `parse`.
 
-    Raises
-    ------
-    FileFormatError
-        If the content differs from the header.
+    Raise FileFormatError if the content differs from the header.
     """
     cursor = _open(data)
     cursor.line()

@@ -157,10 +157,8 @@ def _require_size(found: int, expected: int | None, name: str) -> None:
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Cells]:
     """Return points and cells by kind; attribute data are not unpacked.
 
-    Raises
-    ------
-    FileFormatError
-        If the content differs from the tags, or they declare more than the file can hold.
+    Raise FileFormatError if the content differs from the tags, or they declare more than the file
+    can hold.
     """
     piece, packing, n_points, n_cells = _parse_piece(data)
     array = piece.find("./Points/DataArray")
@@ -179,10 +177,8 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Cells]:
 def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     """Return the functions on points and those on cells, by name; arrays of text are left out.
 
-    Raises
-    ------
-    FileFormatError
-        If the content differs from the tags, or they declare more than the file can hold.
+    Raise FileFormatError if the content differs from the tags, or they declare more than the file
+    can hold.
     """
     piece, packing, n_points, n_cells = _parse_piece(data)
     found: list[dict[str, np.ndarray]] = []
