@@ -16,7 +16,7 @@ ALWAYS = 2**25  # bytes that a file of any size may unpack to
 LZMA_MEMORY = 2**27  # bytes; level 9, the most that compressors use, needs 65 MiB
 ZLIB, LZMA = "vtkZLibDataCompressor", "vtkLZMADataCompressor"
 COMPRESSORS = (ZLIB, LZMA)
-USUAL_WORD = 32  # bytes that a number of a text file takes at most, with the space after it, as a rule
+USUAL_WORD = 32  # bytes that are enough for most numbers of a text file, with the space after them
 
 
 class Cursor:
