@@ -42,11 +42,8 @@ def write_archive(
 def read_archive(path: str | Path, key: str | None) -> dict[str, Any]:
     """Return what a spectrum is made from.
 
-    Raises
-    ------
-    FileFormatError
-        If the file is no spectrum, is cut off, its parts do not fit one another or hold what no
-        spectrum holds, or it has another key than the given one.
+    Raise FileFormatError if the file is no spectrum, is cut off, its parts do not fit one another
+    or hold what no spectrum holds, or it has another key than the given one.
     """
     require_regular(as_path(path))
     try:
