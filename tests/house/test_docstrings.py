@@ -63,7 +63,7 @@ def test_every_public_function_and_class_has_a_docstring_of_one_sentence_first()
 
 SOURCE = Path(es.__file__).parent
 # Written anew at the moment, and not read for this yet.
-NOT_YET = ("retrieval/store/", "cli/steps/")
+NOT_YET = ("retrieval/store/",)
 
 
 def docstrings(node, module, outer=""):

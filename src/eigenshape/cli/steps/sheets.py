@@ -115,10 +115,7 @@ def explanation(
 ) -> Figure:
     """Draw a query beside one match, with the points that correspond, surest first.
 
-    Raises
-    ------
-    StoreError, OSError
-        If the file of the match cannot be read.
+    Raise StoreError or OSError if the file of the match cannot be read.
     """
     mesh = _read_match(match, repairs)
     ours, theirs = match.correspondences[:N_EXPLAINED].T
