@@ -9,7 +9,6 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._arrays import ReadOnly, positive_values, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
-from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.grounded import (
     GroundedFactor,
@@ -84,8 +83,6 @@ class HeatGeodesics(ReadOnly):
     components: Int[np.ndarray, " n"]
     heat: SymmetricFactor
     poisson: GroundedFactor
-
-    _repr_html_ = html_repr
 
     @property
     def n_points(self) -> int:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from eigenshape._arrays import ReadOnly, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.grounded import factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -79,7 +79,6 @@ class HodgeDecomposition(ReadOnly):
     stream: Float[np.ndarray, " e"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def decompose_field(

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from eigenshape._arrays import ReadOnly, finite_values, freeze, point_functions, vertex_values
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
@@ -60,7 +60,6 @@ class LevelSet(ReadOnly):
     shares: Float[np.ndarray, " p"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def size(self) -> float:

@@ -10,7 +10,6 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import ReadOnly, freeze, point_functions, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import ASYMMETRY, find_zero_row_sums, require_points
@@ -79,8 +78,6 @@ class LinearSolver(ReadOnly):
     _factor: SymmetricFactor | None  # None if no point is free
     _refined: bool  # whether solutions take a step of refinement
     _constraints: "Constraints | None" = None
-
-    _repr_html_ = html_repr
 
     def __repr__(self) -> str:
         count = 0 if self._constraints is None else self._constraints.matrix.shape[0]

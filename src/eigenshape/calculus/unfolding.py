@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly, freeze
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import in_length, size_one
@@ -51,7 +51,6 @@ class GeodesicPath(ReadOnly):
     length: float
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,6 @@ from eigenshape._arrays import (
 )
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
-from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.grounded import (
     GroundedFactor,
@@ -78,8 +77,6 @@ class VectorHeat(ReadOnly):
     scalar_heat: SymmetricFactor
     vector_heat: SymmetricFactor
     poisson: GroundedFactor
-
-    _repr_html_ = html_repr
 
     @property
     def n_points(self) -> int:

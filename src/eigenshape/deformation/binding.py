@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.deformation.region import Region, region_mask, require_boundary
@@ -81,7 +81,6 @@ class Binding(ReadOnly):
     part: FreePart
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def held(self) -> Bool[np.ndarray, " n"]:

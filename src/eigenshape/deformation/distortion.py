@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.deformation.rigidity import edge_weights, fit_turns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, bounding_box, edge_lengths
@@ -53,7 +53,6 @@ class Distortion(ReadOnly):
     flipped: Int[np.ndarray, " k"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:

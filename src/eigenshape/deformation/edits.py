@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import describe_value, require_each
 from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.handles import Handle, Rotation, Translation, require_handle
@@ -81,7 +81,6 @@ class Move(ReadOnly):
     handle: Handle
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         require_handle(self.handle)
@@ -131,7 +130,6 @@ class Edit(ReadOnly):
     mode: Mode = "graded"
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         require_each(self.moves, Move, "moves")

@@ -10,7 +10,6 @@ from typing_extensions import TypeAliasType
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import ReadOnly, finite_values, freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 
 # Sine over cosine of two directions, below which they are parallel or opposite: far above the
@@ -54,8 +53,6 @@ class Rotation(ReadOnly):
     pivot: Float[np.ndarray, " 3"]
     axis: Float[np.ndarray, " 3"]
     angle: float
-
-    _repr_html_ = html_repr
 
     def __init__(self, pivot: ArrayLike, axis: ArrayLike, angle: float) -> None:
         direction = as_vector(axis, "axis")
@@ -116,8 +113,6 @@ class Translation(ReadOnly):
     """
 
     vector: Float[np.ndarray, " 3"]
-
-    _repr_html_ = html_repr
 
     def __init__(self, vector: ArrayLike) -> None:
         object.__setattr__(self, "vector", freeze(as_vector(vector, "vector")))

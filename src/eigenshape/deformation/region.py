@@ -19,7 +19,6 @@ from eigenshape._arrays import (
     whole_numbers,
 )
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.deformation.handles import as_vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -57,8 +56,6 @@ class BoxRegion(ReadOnly):
 
     low: Float[np.ndarray, " 3"]
     high: Float[np.ndarray, " 3"]
-
-    _repr_html_ = html_repr
 
     def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
         corners = [
@@ -110,8 +107,6 @@ class BrushRegion(ReadOnly):
 
     center: Float[np.ndarray, " 3"]
     radius: float
-
-    _repr_html_ = html_repr
 
     def __init__(self, center: ArrayLike, radius: float) -> None:
         object.__setattr__(self, "center", freeze(as_vector(center, "center")))

@@ -11,7 +11,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
@@ -68,7 +68,6 @@ class EigenRig(ReadOnly):
     edges: EdgeWeights
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def n_modes(self) -> int:

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset, require_handles
@@ -68,7 +68,6 @@ class SkeletonResponse(ReadOnly):
     weights: Float[np.ndarray, "r n 4"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @one_blas_thread()
@@ -284,7 +283,6 @@ class DetailedSkeleton(ReadOnly):
     second: FramedDetails
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @one_blas_thread()

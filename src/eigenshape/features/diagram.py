@@ -51,7 +51,6 @@ class PersistencePairs(ReadOnly):
     deaths: Float[np.ndarray, " p"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def persistence(self) -> Float[np.ndarray, " p"]:

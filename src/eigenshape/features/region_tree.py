@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arrays import ReadOnly
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.geometry.facet_lists import label_components
 
 
@@ -68,7 +68,6 @@ class MergeTree(RegionTree):
     saddles: Int[np.ndarray, "m 2"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +113,6 @@ class PartTree(RegionTree):
     """
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def number_regions(

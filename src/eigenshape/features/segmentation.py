@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.topology import edge_table, face_pairs
@@ -48,7 +48,6 @@ class FeaturePoints(ReadOnly):
     persistence: Float[np.ndarray, " m"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +79,6 @@ class Segmentation(ReadOnly):
     features: FeaturePoints
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def segment(

@@ -8,7 +8,6 @@ from typing_extensions import TypeAliasType
 
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.simplicial import Mesh
 
@@ -45,8 +44,6 @@ class PointCloud(ReadOnly):
 
     points: Float[np.ndarray, "n d"]
     dim: int
-
-    _repr_html_ = html_repr
 
     def __init__(self, points: ArrayLike, dim: Integer = 2) -> None:
         coordinates = finite_rows(points, "points")

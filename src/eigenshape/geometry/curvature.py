@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import scale_to_unit, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -128,7 +128,6 @@ class PrincipalCurvatures(ReadOnly):
     directions: Float[np.ndarray, "n 2 3"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def mean(self) -> Float[np.ndarray, " n"]:

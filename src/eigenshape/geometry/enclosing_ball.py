@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import ReadOnly, finite_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 
@@ -38,7 +38,6 @@ class EnclosingBall(ReadOnly):
     radius: float
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def enclosing_ball(points: ArrayLike) -> EnclosingBall:

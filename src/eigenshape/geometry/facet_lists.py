@@ -9,7 +9,7 @@ from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import ReadOnly
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 
 # The corners of a facet are packed into one integer while that stays below this bound: sorting
 # integers is several times as fast as sorting rows.
@@ -48,7 +48,6 @@ class FacetTable(ReadOnly):
     n_simplices: Int[np.ndarray, " q"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def boundary(self) -> Int[np.ndarray, " b"]:

@@ -8,7 +8,6 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_without_facets
 
@@ -54,8 +53,6 @@ class TriangleMesh(ReadOnly):
 
     vertices: Float[np.ndarray, "n 3"]
     faces: Int[np.ndarray, "f 3"]
-
-    _repr_html_ = html_repr
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
         points = finite_rows(vertices, "vertices", 3)

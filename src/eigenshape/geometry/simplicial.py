@@ -9,7 +9,6 @@ from typing_extensions import TypeAliasType
 
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_without_facets
 from eigenshape.geometry.mesh import TriangleMesh
@@ -51,8 +50,6 @@ class SimplicialMesh(ReadOnly):
 
     points: Float[np.ndarray, "n d"]
     simplices: Int[np.ndarray, "s corners"]
-
-    _repr_html_ = html_repr
 
     def __init__(self, points: ArrayLike, simplices: ArrayLike) -> None:
         coordinates = finite_rows(points, "points")

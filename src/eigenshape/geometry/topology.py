@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidShapeError, try_auto
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.facet_lists import label_components, shared_facets
 from eigenshape.geometry.facets import boundary_facets, corner_fans, facet_table
@@ -50,7 +50,6 @@ class EdgeTable(ReadOnly):
     n_faces: Int[np.ndarray, " e"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def edge_table(mesh: MeshLike) -> EdgeTable:

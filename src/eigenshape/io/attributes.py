@@ -100,7 +100,6 @@ class MeshAttributes(ReadOnly):
     source: SourceFile | None = None
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def from_file(self) -> Bool[np.ndarray, " f"]:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, finite_rows
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -82,7 +82,6 @@ class Registration(ReadOnly):
     score: float
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def move(self, points: ArrayLike) -> Float[np.ndarray, "n 3"]:
         """Return points of the first scan, placed on the second."""

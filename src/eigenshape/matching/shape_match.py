@@ -9,7 +9,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from eigenshape._arrays import ReadOnly, as_array
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 
 
@@ -85,7 +85,6 @@ class ShapeMatch(ReadOnly):
     report: tuple[str, ...]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def n_vertices(self) -> int:

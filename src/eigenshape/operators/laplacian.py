@@ -124,7 +124,6 @@ class Laplacian(ReadOnly):
     kernel: GaussianKernel | None = None
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass"):

@@ -11,7 +11,6 @@ from typing_extensions import TypeAliasType
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -99,8 +98,6 @@ class Camera(ReadOnly):
 
     rotation: Float[np.ndarray, "3 3"]
     size: int
-
-    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         super().__post_init__()

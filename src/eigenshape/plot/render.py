@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
@@ -60,7 +60,6 @@ class Drawing(ReadOnly):
     visible: Bool[np.ndarray, " n"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @one_blas_thread()

@@ -13,7 +13,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import ReadOnly, vertex_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
@@ -73,7 +73,6 @@ class Panel(ReadOnly):
     vertices: Int[np.ndarray, " m"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         super().__post_init__()

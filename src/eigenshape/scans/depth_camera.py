@@ -108,7 +108,6 @@ class DepthScan(ReadOnly):
     pixels: Int[np.ndarray, "n 2"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.spectral.archive import read_archive, write_archive
 from eigenshape.spectral.certificate import Certificate
 
@@ -67,7 +67,6 @@ class Spectrum(ReadOnly):
     certificate: Certificate
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def save(self, path: str | Path, *, key: str | None = None) -> None:
         """Write the spectrum to a .npz file; `load` reads it back bit for bit.

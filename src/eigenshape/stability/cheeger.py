@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
@@ -70,7 +70,6 @@ class CheegerEstimate(ReadOnly):
     part: Bool[np.ndarray, " n"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def cheeger_estimate(

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.geometry.enclosing_ball import enclosing_ball
 from eigenshape.geometry.simplices import require_volumes, size_one, volumes
 from eigenshape.stability.perturbation import Perturbation, vertex_pairs
@@ -65,7 +65,6 @@ class Closeness(ReadOnly):
     limited_by: Limit
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def explain(self) -> str:
         """Describe in plain words how close the shapes are, and what limits δ."""

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, positive_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.bipartite_loops import match_rows
 from eigenshape.features.least_matching import least_perfect, near_pairs
@@ -52,7 +52,6 @@ class MaximumMatching(ReadOnly):
     blocked: Int[np.ndarray, " b"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def n_matched(self) -> int:
@@ -92,7 +91,6 @@ class BottleneckMatching(ReadOnly):
     distance: float
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def matching_reach(mu: float) -> float:

@@ -8,7 +8,7 @@ from jaxtyping import Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, face_labels, freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
@@ -59,7 +59,6 @@ class Perturbation(ReadOnly):
     regions_two: Labels
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def n_regions(self) -> int:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arrays import ReadOnly
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.simplices import MEASURES
 from eigenshape.geometry.simplicial import Mesh
@@ -47,7 +47,6 @@ class RepairedMesh(ReadOnly, Generic[MeshT]):
     source_vertices: Int[np.ndarray, " n"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +77,6 @@ class RepairedCloud(ReadOnly):
     source_points: Int[np.ndarray, " n"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def count_nouns(number: int, noun: str) -> str:

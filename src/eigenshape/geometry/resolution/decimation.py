@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly, as_array, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, MissingExtraError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
@@ -60,7 +60,6 @@ class DecimatedMesh(ReadOnly):
     original: TriangleMesh
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def carry_values(self, values: ArrayLike) -> Float[np.ndarray, "n ..."]:
         """Interpolate values on the vertices of the original, linearly in the face of each place.

@@ -7,7 +7,6 @@ from jaxtyping import Float
 
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike, Integer
 
 
@@ -50,8 +49,6 @@ class Quadrature(ReadOnly):
     points: Float[np.ndarray, "n d"]
     weights: Float[np.ndarray, " n"]
     dim: int
-
-    _repr_html_ = html_repr
 
     def __init__(self, points: ArrayLike, weights: ArrayLike | None, dim: Integer) -> None:
         coordinates = finite_rows(points, "points")

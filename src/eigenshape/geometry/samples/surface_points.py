@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, whole_number
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
@@ -49,7 +49,6 @@ class SurfacePoints(ReadOnly):
     weights: Float[np.ndarray, "p corners"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def n_points(self) -> int:

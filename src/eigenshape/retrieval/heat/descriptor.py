@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly, freeze
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 
 
@@ -39,7 +39,6 @@ class HeatDescriptor(ReadOnly):
     recipe: HeatRecipe
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vectors", freeze(self.vectors))

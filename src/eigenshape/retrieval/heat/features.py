@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze, vertex_values
 from eigenshape._progress import Progress
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import map_in_threads
 from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_tree import merge_tree
@@ -86,7 +86,6 @@ class HeatFeatures(ReadOnly):
     fragments: Int[np.ndarray, " c"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def heat_descriptor(

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arrays import ReadOnly, face_labels, freeze
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.labels.label_points import LabelPoints, label_points
@@ -55,7 +55,6 @@ class LabeledShape(ReadOnly):
         object.__setattr__(self, "labels", freeze(labels.astype(np.int64)))
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @cached_property
     def points(self) -> LabelPoints:

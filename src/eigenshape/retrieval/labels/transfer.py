@@ -12,7 +12,7 @@ from eigenshape._arguments import require_each
 from eigenshape._arrays import ReadOnly, freeze, point_functions
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.linear_solver import factor_definite
@@ -93,7 +93,6 @@ class LabelTransfer(ReadOnly):
     weights: Float[np.ndarray, " s"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @one_blas_thread()

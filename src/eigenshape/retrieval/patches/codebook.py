@@ -12,7 +12,6 @@ from scipy.special import logsumexp
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze
-from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.patches import Patches
 
@@ -69,8 +68,6 @@ class PatchCodebook(ReadOnly):
     shares: Float32[np.ndarray, "b w"]
     centers: Float32[np.ndarray, "b w d"]
     variances: Float32[np.ndarray, "b w d"]
-
-    _repr_html_ = html_repr
 
     @cached_property
     def digest(self) -> str:

@@ -114,7 +114,6 @@ class PatchDescriptor(ReadOnly):
     recipe: PatchRecipe
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def vertices(self) -> Int[np.ndarray, " m"]:

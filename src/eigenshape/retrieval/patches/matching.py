@@ -8,7 +8,7 @@ from jaxtyping import Float, Float32, Int, UInt8
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whiten_numbers
 from eigenshape.retrieval.patches.matching_loops import (
@@ -77,7 +77,6 @@ class PatchPoints(ReadOnly):
     vertices: Int[np.ndarray, " m"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +122,6 @@ class PatchMatch(ReadOnly):
     step: int
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import shortest_path
 
 from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -81,7 +81,6 @@ class Patches(ReadOnly):
     distances: Float32[np.ndarray, "m m"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @one_blas_thread()

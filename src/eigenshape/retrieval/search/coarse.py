@@ -14,7 +14,7 @@ from jaxtyping import Float32, Int, Int8, Int64
 from numpy.lib.format import read_array, read_array_header_1_0, read_magic
 
 from eigenshape._arrays import ReadOnly, freeze
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.distance import SIZE_PRICE
 from eigenshape.retrieval.patches.packing import unpack_codes
@@ -80,7 +80,6 @@ class CoarseRows(ReadOnly):
     n_fitted: int
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def scores(self, codes: Int8[np.ndarray, "b s v"]) -> Float32[np.ndarray, " n"]:
         """Return distances of a query to all whole shapes, as far as the axes show them."""

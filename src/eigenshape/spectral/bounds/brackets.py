@@ -8,7 +8,7 @@ from jaxtyping import Float
 from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -74,7 +74,6 @@ class Brackets(ReadOnly):
     rounding: float
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def explain(self) -> str:
         """Return a text that says what is bounded, and how tightly."""

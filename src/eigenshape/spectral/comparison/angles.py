@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze, whole_numbers
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
@@ -70,7 +70,6 @@ class EigenspaceAngles(ReadOnly):
     bounds: Float[np.ndarray, " g"] | None
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def explain(self) -> str:
         """Return a text that says how far the spaces rotate, and how many angles are bounded."""

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import ReadOnly, finite_values, freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.bounds.brackets import Brackets
 from eigenshape.spectral.spectrum import NULL, Spectrum, require_lowest
@@ -57,7 +57,6 @@ class SpectrumComparison(ReadOnly):
     bracketed: bool
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def proved_changes(self) -> Bool[np.ndarray, " k"]:

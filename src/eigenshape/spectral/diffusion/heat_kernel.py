@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly, freeze, whole_numbers
 from eigenshape._memory import require_memory
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.diffusion.decay import decay_factors
@@ -120,7 +120,6 @@ class HeatTrace(ReadOnly):
     remainders: Float[np.ndarray, " q"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def heat_trace(spectrum: Spectrum, times: ArrayLike) -> HeatTrace:

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
@@ -61,7 +61,6 @@ class FunctionalMap(ReadOnly):
     target: Spectrum
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         require_one_constant(self.source, "source")

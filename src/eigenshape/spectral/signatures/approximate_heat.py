@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze, positive_values, whole_number
 from eigenshape._progress import Progress, silent
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.laplacian import Laplacian
@@ -87,7 +87,6 @@ class ApproximateSignature(ReadOnly):
     complete: bool
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def approximate_heat_signature(

@@ -25,7 +25,7 @@ from eigenshape._errors import (
 )
 from eigenshape._files import as_path
 from eigenshape._progress import Callback, Progress
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers, run_in_workers
 from eigenshape.geometry.cloud import PointCloud
@@ -100,7 +100,6 @@ class OperatorBundle(ReadOnly):
     gradient_y: sp.csr_array
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def operator_bundle(

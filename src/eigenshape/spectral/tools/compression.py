@@ -13,7 +13,7 @@ from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import FileFormatError
 from eigenshape._memory import available_memory
 from eigenshape._progress import Progress, silent
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -104,7 +104,6 @@ class CompressedMesh(ReadOnly):
     max_error: float
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @one_blas_thread()

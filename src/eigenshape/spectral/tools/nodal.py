@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze, vertex_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.level_sets import LevelSet, level_set
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -53,7 +53,6 @@ class NodalDomains(ReadOnly):
     sizes: Int[np.ndarray, " c"]
 
     __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def n_domains(self) -> int:
