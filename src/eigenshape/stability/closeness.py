@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze
@@ -133,46 +133,42 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
     (0.1, 'Jacobian')
     """
     require_type(perturbation, Perturbation, "perturbation")
-    require_volumes(perturbation.one)
-    here, there, scale = _scale_points(perturbation)
+    one, two = perturbation.one, perturbation.two
+    require_volumes(one)
+    # Both shapes are divided by one power of two, so that volumes neither overflow nor vanish.
+    points, scale = size_one(np.concatenate([one.points, two.points]))
+    here, there = points[: one.n_points], points[one.n_points :]
+    volumes_one, volumes_two = volumes(here[one.simplices]), volumes(there[two.simplices])
+    size = scale * float(volumes_one.sum()) ** (1 / one.dim)
+
+    # C1: how far Φ moves points outside the regions, and how it changes volumes.
     pairs = vertex_pairs(perturbation)
-    volumes_one, volumes_two = (
-        volumes(points[mesh.simplices])
-        for points, mesh in ((here, perturbation.one), (there, perturbation.two))
+    displacement = scale * np.linalg.norm(here[pairs[:, 0]] - there[pairs[:, 1]], axis=1)
+    jacobians = volumes_two[perturbation.outside_two] / volumes_one[perturbation.outside_one]
+
+    # C2: the ball around each region and its replacement, and the volumes of both.
+    radii = np.empty(perturbation.n_regions)
+    for region in range(perturbation.n_regions):
+        corners = here[np.unique(one.simplices[perturbation.regions_one == region])]
+        others = there[np.unique(two.simplices[perturbation.regions_two == region])]
+        radii[region] = scale * enclosing_ball(np.concatenate([corners, others])).radius
+    # Entry 0 is the outside, whose number is -1.
+    sums_one = np.bincount(perturbation.regions_one + 1, volumes_one, perturbation.n_regions + 1)
+    sums_two = np.bincount(perturbation.regions_two + 1, volumes_two, perturbation.n_regions + 1)
+    ratios = sums_two[1:] / sums_one[1:]
+
+    changes = _relative_changes(displacement, jacobians, radii, ratios, size)
+    largest = {name: _largest(change) for name, change in changes.items()}
+    limit = max(largest, key=lambda name: largest[name])
+    return Closeness(
+        displacement=freeze(displacement),
+        jacobians=freeze(jacobians),
+        radii=freeze(radii),
+        volume_ratios=freeze(ratios),
+        size=size,
+        delta=largest[limit],
+        limited_by=limit if largest[limit] else "nothing",
     )
-    radii = [
-        _enclosing_radius(perturbation, here, there, region)
-        for region in range(perturbation.n_regions)
-    ]
-    return _closeness(
-        scale * np.linalg.norm(here[pairs[:, 0]] - there[pairs[:, 1]], axis=1),
-        volumes_two[perturbation.outside_two] / volumes_one[perturbation.outside_one],
-        scale * np.array(radii),
-        _sums(volumes_two, perturbation.regions_two) / _sums(volumes_one, perturbation.regions_one),
-        scale * float(volumes_one.sum()) ** (1 / perturbation.one.dim),
-    )
-
-
-def _scale_points(
-    perturbation: Perturbation,
-) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "k d"], float]:
-    """Return the points of both shapes divided by one power of two, and that power."""
-    n = perturbation.one.n_points
-    points, scale = size_one(np.concatenate([perturbation.one.points, perturbation.two.points]))
-    return points[:n], points[n:], scale
-
-
-def _enclosing_radius(
-    perturbation: Perturbation,
-    here: Float[np.ndarray, "n d"],
-    there: Float[np.ndarray, "k d"],
-    region: int,
-) -> float:
-    corners_one = perturbation.one.simplices[perturbation.regions_one == region]
-    corners_two = perturbation.two.simplices[perturbation.regions_two == region]
-    return enclosing_ball(
-        np.concatenate([here[np.unique(corners_one)], there[np.unique(corners_two)]])
-    ).radius
 
 
 def _relative_changes(
@@ -188,34 +184,6 @@ def _relative_changes(
         "ball": radii / size,
         "volume": np.abs(volume_ratios - 1),
     }
-
-
-def _closeness(
-    displacement: Float[np.ndarray, " v"],
-    jacobians: Float[np.ndarray, " f"],
-    radii: Float[np.ndarray, " r"],
-    volume_ratios: Float[np.ndarray, " r"],
-    size: float,
-) -> Closeness:
-    parts = _relative_changes(displacement, jacobians, radii, volume_ratios, size)
-    largest = {name: _largest(part) for name, part in parts.items()}
-    limit = max(largest, key=lambda name: largest[name])
-    return Closeness(
-        displacement=freeze(displacement),
-        jacobians=freeze(jacobians),
-        radii=freeze(radii),
-        volume_ratios=freeze(volume_ratios),
-        size=size,
-        delta=largest[limit],
-        limited_by=limit if largest[limit] else "nothing",
-    )
-
-
-def _sums(
-    values: Float[np.ndarray, " s"], labels: Int[np.ndarray, " s"]
-) -> Float[np.ndarray, " r"]:
-    """Sum the values of each region."""
-    return np.bincount(labels + 1, weights=values, minlength=labels.max() + 2)[1:]
 
 
 def _largest(values: Float[np.ndarray, " _"]) -> float:
