@@ -21,6 +21,7 @@ from eigenshape.geometry.topology import boundary_vertices, edge_table, vertex_c
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
+from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.laws import agreement as sameness
@@ -580,3 +581,16 @@ def test_one_point_alone_is_judged_too():
         promises=["constants", "nonnegative_weights"],
     )
     assert report.passed, report.explain()
+
+
+def test_a_law_that_is_not_promised_is_skipped_for_that_reason_first():
+    graph = sp.csr_array(np.ones((3, 3)) - np.eye(3))
+    reasons = {
+        promises: {
+            law.name: law.reason
+            for law in check_operator(graph_laplacian, graph, promises=promises).skipped
+        }
+        for promises in ((), ("reflection",))
+    }
+    assert reasons[()]["reflection"] == "not promised"
+    assert reasons["reflection",]["reflection"] == "a graph lies nowhere"

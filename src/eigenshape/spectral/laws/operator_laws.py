@@ -213,7 +213,7 @@ def _rebuilding_laws(trial: Trial, promised: frozenset[Promise]) -> Iterator[Out
     }
     for name, law in laws.items():
         promise = name.replace(" ", "_")
-        if promise in get_args(Promise) and promise not in promised:
+        if promise in get_args(Promise.__value__) and promise not in promised:
             yield SkippedLaw(name, "not promised")
             continue
         try:
