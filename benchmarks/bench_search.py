@@ -44,7 +44,7 @@ from eigenshape.retrieval.patches.packing import unpack_codes
 from eigenshape.retrieval.search.candidates import Supplier, choose_candidates, n_compared
 from eigenshape.retrieval.search.coarse import CoarseRows, coarse_rows
 from eigenshape.retrieval.search.engines import FaissEngine, QdrantEngine, supply_from
-from eigenshape.retrieval.store.snapshot import ask_ahead
+from eigenshape.retrieval.store.state import ask_ahead
 
 FULL, QUICK = (10_000, 100_000), (2_500,)
 N_QUERIES = 40

@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from describers import keep
 from typer.testing import CliRunner
 
 from eigenshape.cli import app
@@ -15,7 +16,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.retrieval.heat.features import find_heat_features
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import icosphere
@@ -323,7 +324,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
         "changed": str(changed),
         "there": str(path),
     }.items():
-        index.add_descriptors(name, [descriptor], source=source)
+        keep(index, name, [descriptor], source=source)
     done = run("query", index.folder, path, "--picture", tmp_path / "sheet.png")
     for said in (
         "not drawn: loose: A match is drawn from its mesh file; it was added to the index without one",

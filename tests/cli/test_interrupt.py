@@ -9,7 +9,7 @@ import time
 import pytest
 
 from eigenshape.io.mesh_files import write_mesh
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import icosphere
 

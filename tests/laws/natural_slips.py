@@ -19,6 +19,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import scipy.sparse as sp
+from describers import keep
 from matplotlib.figure import Figure
 from public_names import public_things
 from typing_extensions import TypeAliasType
@@ -96,7 +97,7 @@ def patched() -> es.retrieval.PatchDescriptor:
 @cache
 def shelf() -> es.ShapeIndex:
     index = es.ShapeIndex.create(FOLDER / "index")
-    index.add_descriptors("body", [described().descriptor])
+    keep(index, "body", [described().descriptor])
     return index
 
 

@@ -147,7 +147,7 @@ def query(
         )
     with shelf.reader() as reader:
         # Before scans are described, which takes seconds
-        steps.require_attributes(reader.state.shapes, filters)
+        steps.choose_shapes(reader.state, filters)
         ask_index = partial(reader.query, where=filters, exact=exact)
         if is_file or is_folder:
             items = es.io.find_items(scan)
@@ -212,20 +212,20 @@ def _stored_descriptor(
     reader: es.retrieval.IndexReader, name: str, recipe: AnyRecipe
 ) -> Descriptor:
     """Return the descriptor of a whole shape, from the state of the index that is then searched."""
-    shape = reader.state.names.get(name)
-    if shape is None:
+    state = reader.state
+    facts = state.find(name)
+    if facts is None:
         raise InvalidParameterError(
             f"A query is a mesh file, a folder or the name of a shape of the index; {name} is none "
             "of them. `eigenshape index ls` lists the names."
         )
-    snapshot = reader.snapshot(recipe)
-    (places,) = (snapshot.shape_of == shape).nonzero()
-    if not len(places):
-        raise StoreError(
-            f"A shape must be described by the method of a query; {name} is not described by "
-            f"{recipe.name}. Choose another --method."
-        )
-    return snapshot.descriptor(int(places[0]))
+    for stored in state.stored(state.descriptor_ids(facts), name):
+        if stored.recipe == recipe:
+            return stored.restored()
+    raise StoreError(
+        f"A shape must be described by the method of a query; {name} is not described by "
+        f"{recipe.name}. Choose another --method."
+    )
 
 
 def _answer_stored(ask: Ask, name: str, descriptor: Descriptor, n_matches: int) -> _Answer:

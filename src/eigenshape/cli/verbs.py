@@ -61,7 +61,8 @@ INDEX_VERBS = {
     "verify": "Read every byte of an index and name what is damaged.",
     "compact": "Give back the space of removed and replaced shapes.",
     "export": "Write the descriptors of shapes, and what is known of them, for other programs.",
-    "merge": "Make one index of several, by copying them or by reference.",
+    "merge": "Make one index of several, by copying them.",
+    "convert": "Write an index of an older version anew, in the format of this one.",
     "duplicates": "List pairs of shapes that are nearly the same, wherever they lie and whatever "
     "their size.",
     "learn": "Learn a codebook from meshes, for indexes that are built in parts.",

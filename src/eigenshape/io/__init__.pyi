@@ -10,7 +10,6 @@ from .edits import write_edits as write_edits
 from .fields import read_fields as read_fields
 from .fields import write_fields as write_fields
 from .folders import find_items as find_items
-from .folders import index_folder as index_folder
 from .labeled_shapes import read_label_names as read_label_names
 from .labeled_shapes import read_labeled_shape as read_labeled_shape
 from .labeled_shapes import read_labeled_shapes as read_labeled_shapes

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import writer
-from describers import descriptor
+from describers import descriptor, keep
 
 import eigenshape as es
 from eigenshape.retrieval import DescribedShape
@@ -28,7 +28,7 @@ N_LINES = 5000  # of the store that the four kinds of steps run through, about
 def killed(folder, start, line, seconds):
     """Run steps in a process that dies, at a line or after a time; return the last step that it called done."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["eigenshape.retrieval.store.index"])
+    context.set_forkserver_preload(["eigenshape.retrieval.index"])
     ours, theirs = context.Pipe()
     process = context.Process(target=writer.change_in_all_ways, args=(folder, start, line, theirs))
     process.start()
@@ -196,7 +196,7 @@ def main(library, place, first, step):
     sound = es.ShapeIndex.create(place / "sound")
     sound.add_many(DescribedShape(f"s{seed}", [descriptor(seed)]) for seed in range(5))
     part = es.ShapeIndex.create(place / "part")
-    part.add_descriptors("part", [descriptor(77)], digest="part")
+    keep(part, "part", [descriptor(77)], digest="part")
     n_failed = 0
     for number in range(first, 200, step):
         index = es.ShapeIndex(Path(shutil.copytree(sound.folder, place / f"index {number}")))

@@ -7,11 +7,11 @@ from contextlib import closing, contextmanager
 
 import numpy as np
 import pytest
-from describers import RECIPE, descriptor
+from describers import RECIPE, descriptor, keep
 
 import eigenshape as es
 from eigenshape.retrieval import DescribedShape
-from eigenshape.retrieval.store.writing import describe_to_store
+from eigenshape.retrieval.description import describe_to_store
 
 PATCHES = es.retrieval.PatchRecipe()
 SHARED = "index.sqlite-shm"  # made anew by whoever opens the database first
@@ -47,11 +47,11 @@ def sound(tmp_path_factory):
         )
         for seed in range(40)
     )
-    index.add_descriptors("hand", describe_to_store(hand, PATCHES, 0), label="hand")
+    keep(index, "hand", describe_to_store(hand, PATCHES, 0), label="hand")
     with closing(sqlite3.connect(index.folder / "index.sqlite")) as reader:
         reader.execute("BEGIN")
         reader.execute("SELECT * FROM shape").fetchone()
-        index.add_descriptors("late", [descriptor(99)])
+        keep(index, "late", [descriptor(99)])
         index.remove(f"shape 7 {20 * 'n'}")  # stays in the log as long as somebody reads
         return shutil.copytree(index.folder, index.folder.with_name("with log"))
 
@@ -217,7 +217,7 @@ def test_a_damaged_row_of_the_catalog_is_named(sound, tmp_path):
         database.execute("UPDATE recipe SET fields = '{}' WHERE id = 1")
         database.execute("DELETE FROM seal WHERE id = 'shape'")
     with pytest.raises(es.StoreError, match="the seal of shape differs"):
-        index.add_descriptors("new", [descriptor(1)])
+        keep(index, "new", [descriptor(1)])
 
 
 def test_a_damaged_recipe_is_named(sound, tmp_path):
@@ -228,7 +228,7 @@ def test_a_damaged_recipe_is_named(sound, tmp_path):
     with pytest.warns(es.retrieval.StoreWarning, match="the codebook of recipe 2 differs"):
         assert index.query(descriptor(3), n_matches=1)[0].score == 0
     with pytest.raises(es.StoreError, match="An index must be whole to be changed; "):
-        index.add_descriptors("new", [descriptor(1)])
+        keep(index, "new", [descriptor(1)])
 
 
 def described_again(seed):
@@ -264,7 +264,7 @@ def test_a_torn_file_and_damaged_rows_of_the_catalog_are_mended_too(sound, tmp_p
     part.add_many([described_again(4), described_again(8)])
     assert index.merge([part]) == 2
     assert [damage.shape for damage in index.verify().damages] == ["late"]
-    index.add_descriptors("late", [descriptor(99)], digest="new", replace=True)
+    keep(index, "late", [descriptor(99)], digest="new", replace=True)
     assert index.verify().damages == ()
     assert index.query(descriptor(99), n_matches=1)[0].name == "late"
 

@@ -10,8 +10,8 @@ from eigenshape.cli.inputs import IndexArgument, JsonOption
 def compact(index: IndexArgument, *, as_json: JsonOption = False) -> None:
     """Give back the space of removed and replaced shapes.
 
-    Files are written anew beside the old ones, so the disk must hold both for a moment. Queries go
-    on meanwhile.
+    The last pages of the file move into free ones, so it takes as long as the removal. Queries go on
+    meanwhile.
     """
     n_bytes = es.ShapeIndex.open(index).compact()
     if as_json:

@@ -20,28 +20,20 @@ def merge(
     index: NewIndexArgument,
     others: Annotated[list[Path], typer.Argument(help="Folders of the indexes to add to it.")],
     *,
-    by_reference: Annotated[
-        bool,
-        typer.Option(
-            "--by-reference",
-            help="Leave the numbers in the folders of the other indexes, and refer to them. Do not "
-            "move or compact those.",
-        ),
-    ] = False,
     replace: Annotated[
         bool,
         typer.Option("--replace", help="Let a shape replace one of the same name."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make one index of several, by copying them or by reference.
+    """Make one index of several, by copying them.
 
     What is damaged in the others is left out with a warning. Shapes with different codebooks do not
     compare: build the others with --codebook.
     """
     parts = [es.ShapeIndex.open(other) for other in others]
     shelf = es.ShapeIndex.open_or_create(index)
-    n_added = shelf.merge(parts, copy=not by_reference, replace=replace)
+    n_added = shelf.merge(parts, replace=replace)
     recipe = shelf.default_recipe()
     apart = [record.name for record in shelf.records() if recipe not in record.recipes]
     if as_json:

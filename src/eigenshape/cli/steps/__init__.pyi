@@ -41,11 +41,12 @@ from .reading import read_partners as read_partners
 from .recipes import heat_recipe as heat_recipe
 from .recipes import index_recipe as index_recipe
 from .recipes import query_recipe as query_recipe
+from .records import choose_shapes as choose_shapes
+from .records import convert_index as convert_index
 from .records import count_shapes as count_shapes
 from .records import parse_filters as parse_filters
 from .records import read_stage as read_stage
 from .records import record_facts as record_facts
-from .records import require_attributes as require_attributes
 from .regions import parse_region as parse_region
 from .regions import parse_rotation as parse_rotation
 from .regions import parse_translation as parse_translation

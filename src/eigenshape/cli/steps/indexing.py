@@ -12,17 +12,17 @@ from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, err, progress_bar
 from eigenshape.cli.inputs import memory_bytes
 from eigenshape.io.surfaces import read_surface
-from eigenshape.retrieval.kinds import AnyRecipe
-from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
-from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.store.batch import (
+from eigenshape.retrieval.building.batch import (
     BatchReport,
     Callback,
     announce_learning,
     build_index,
     train_codebook_from_files,
 )
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
 
 RETRIES = 3  # workers of a cluster that a task may lose before it counts as failed
 

@@ -9,10 +9,10 @@ from eigenshape._errors import FileFormatError, InvalidParameterError, StoreErro
 from eigenshape.cli.console import err
 from eigenshape.cli.inputs import PATCHES, require_method
 from eigenshape.retrieval.heat.recipe import PRESETS, HeatRecipe
+from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import read_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.store.index import ShapeIndex
 
 
 def heat_recipe(name: str) -> HeatRecipe:

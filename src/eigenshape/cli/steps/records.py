@@ -2,11 +2,19 @@
 
 from typing import Any
 
-from eigenshape.retrieval.store.batch import read_stage
-from eigenshape.retrieval.store.filters import parse_filters, require_attributes
+from eigenshape.retrieval.building.batch import read_stage
+from eigenshape.retrieval.store.conversion import convert_index
+from eigenshape.retrieval.store.filters import choose_shapes, parse_filters
 from eigenshape.retrieval.store.records import Record
 
-__all__ = ["count_shapes", "parse_filters", "read_stage", "record_facts", "require_attributes"]
+__all__ = [
+    "choose_shapes",
+    "convert_index",
+    "count_shapes",
+    "parse_filters",
+    "read_stage",
+    "record_facts",
+]
 
 
 def record_facts(record: Record) -> dict[str, Any]:

@@ -18,14 +18,14 @@ from filelock import FileLock
 import eigenshape
 from eigenshape._errors import InvalidParameterError
 from eigenshape._workers import Item, Outcome, Workers
-from eigenshape.retrieval.description import describe
-from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.store.batch import (
+from eigenshape.retrieval.building.batch import (
     build_index,
     content_digest,
     train_codebook_from_files,
 )
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.description import describe
+from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
 
 
 @pytest.fixture

@@ -1,15 +1,13 @@
-"""A reader of an index: one state of it in memory, which any number of threads may ask."""
+"""A reader of an index: one state for many queries, which any number of threads may ask."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from threading import RLock
 from types import TracebackType
 from typing import Any, SupportsIndex
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Float, Int
 
 from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import whole_number
@@ -18,6 +16,7 @@ from eigenshape._text import html_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe
+from eigenshape.retrieval.patches.isolation import USUAL_ISOLATION
 from eigenshape.retrieval.search.candidates import (
     FEWEST_TO_SCAN,
     Candidates,
@@ -26,12 +25,12 @@ from eigenshape.retrieval.search.candidates import (
 )
 from eigenshape.retrieval.search.coarse import CoarseRows, coarse_rows
 from eigenshape.retrieval.search.engines import Engine, supply_from
+from eigenshape.retrieval.search.isolations import stored_isolations
+from eigenshape.retrieval.search.matches import Matches
+from eigenshape.retrieval.search.scoring import search_candidates
 from eigenshape.retrieval.store.damage import warn_of_damage
-from eigenshape.retrieval.store.filters import choose_shapes, require_attributes
-from eigenshape.retrieval.store.kept_tables import open_state
-from eigenshape.retrieval.store.records import Matches
-from eigenshape.retrieval.store.searching import search_candidates
-from eigenshape.retrieval.store.snapshot import IndexState, Snapshot, read_state
+from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.state import DamagedEntryError, IndexState, Snapshot, read_state
 
 # Return an engine that holds the vectors of all shapes, as `FaissEngine` does.
 EngineMaker = Callable[[CoarseRows], Engine]
@@ -49,7 +48,7 @@ class IndexReader:
     >>> import eigenshape as es
     >>> index = es.ShapeIndex.create(None)
     >>> fish = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
-    >>> index.add_descriptors("fish", [fish])
+    >>> index.add_many([es.retrieval.DescribedShape("fish", [fish])])
     >>> with index.reader() as reader:
     ...     len(reader), reader.query(fish)[0].name
     (1, 'fish')
@@ -62,8 +61,9 @@ class IndexReader:
             require_maker(engine)
         self._lock = RLock()
         self._engine = engine
-        self._scans: dict[PatchRecipe, _Scan] = {}
-        self._state: IndexState | None = open_state(folder)
+        self._scans: dict[AnyRecipe, _Scan] = {}
+        self._state: IndexState | None = read_state(folder)
+        self._state.descriptors  # noqa: B018 - read now, so that damage is named when it is opened
         warn_of_damage(str(folder), self._state.damages)
 
     def __reduce__(self) -> tuple[type["IndexReader"], tuple[Path, EngineMaker | None]]:
@@ -81,7 +81,7 @@ class IndexReader:
         self.close()
 
     def __len__(self) -> int:
-        return len(self.state.shapes.ids)
+        return len(self.state)
 
     def __repr__(self) -> str:
         if self._state is None:
@@ -97,12 +97,15 @@ class IndexReader:
         return state
 
     def close(self) -> None:
-        """Let go of the files; they stay mapped as long as a query runs."""
+        """Let go of the state; its transaction ends when the queries that use it have ended."""
         self._state = None
         self._scans = {}
 
     def refresh(self) -> bool:
         """See what was added to the index, or removed from it, since the reader was opened.
+
+        SQLite keeps a log of what is changed as long as a reader holds an older state, so refresh a
+        reader from time to time while others write.
 
         Returns
         -------
@@ -117,13 +120,12 @@ class IndexReader:
         with self._lock:
             before = self.state
             now = read_state(before.folder, before)
+            now.descriptors  # noqa: B018 - read now, so that damage is named here
             self._state = now
-        if now is before:
-            return False
         warn_of_damage(
             str(now.folder), [each for each in now.damages if each not in before.damages]
         )
-        return True
+        return now.seals != before.seals
 
     def snapshot(self, recipe: AnyRecipe) -> Snapshot:
         """Return all descriptors by a recipe, as arrays.
@@ -142,7 +144,7 @@ class IndexReader:
             If there are none.
         """
         require_type(recipe, AnyRecipe, "recipe")
-        return self.state.snapshot(recipe)
+        return self._scan(self.state, recipe).snapshot
 
     def default_recipe(self) -> AnyRecipe:
         """Return the recipe by which a mesh is described, as of `ShapeIndex.default_recipe`."""
@@ -179,50 +181,73 @@ class IndexReader:
         wanted = whole_number(n_matches, "n_matches", 1, 2**31)
         state = self.state
         # Before a mesh is described, which takes seconds
-        chosen = choose_shapes(state.shapes, where)
-        require_attributes(state.shapes, where)
+        chosen = choose_shapes(state, where)
+        left_out = -1
         if without is not None:
-            if without not in state.names:
+            facts = state.find(without)
+            if facts is None:
                 raise InvalidParameterError(
                     f"without must be the name of a shape of the index; {without!r} is none. "
                     "`records` lists them."
                 )
-            chosen[state.names[without]] = False
+            left_out = facts.id
         if isinstance(shape, Descriptor):
             descriptor = shape
         else:
             mesh, recipe = as_mesh(shape, "shape"), choose_recipe(list(state.recipes.values()))
             descriptor = kind_of(recipe).describe_query(mesh, recipe)
-        return self._search(state, descriptor, wanted, chosen, exact=exact)
+        return self.search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
 
-    def _search(
+    def search(  # noqa: PLR0913 - the choices of a query, each of which has a default
         self,
         state: IndexState,
         descriptor: Descriptor,
         n_matches: int,
-        chosen: Bool[np.ndarray, " n"],
+        chosen: Int[np.ndarray, " k"] | None = None,
         *,
+        left_out: int = -1,
         exact: bool = False,
         is_scaled: bool = True,
     ) -> Matches:
-        """Search one state for a descriptor, among the chosen ones of its n shapes.
+        """Search one state for a descriptor.
 
-        Scores may be scaled by how isolated each shape is.
+        Parameters
+        ----------
+        state : IndexState
+        descriptor : HeatDescriptor or PatchDescriptor
+        n_matches : int
+        chosen : (k,) int, optional
+            Numbers of the shapes that may be found; by default all.
+        left_out : int
+            Number of a shape that is not.
+        exact : bool
+            Whether all are compared.
+        is_scaled : bool
+            Whether scores are scaled by how isolated each shape is; otherwise they depend on the two
+            shapes alone.
         """
-        snapshot = state.snapshot(descriptor.recipe)
-        allowed = snapshot.mask(chosen)
-        candidates = self._candidates(snapshot, descriptor, allowed, n_matches, exact=exact)
-        matches, damages = search_candidates(
-            snapshot, descriptor, candidates, n_matches, is_scaled=is_scaled
-        )
-        warn_of_damage(str(state.folder), damages)
-        return matches
+        while True:
+            try:
+                scan = self._scan(state, descriptor.recipe)
+                snapshot = scan.snapshot
+                allowed = snapshot.mask(chosen)
+                if left_out >= 0:
+                    allowed &= snapshot.shape_of != left_out
+                candidates = self._candidates(scan, descriptor, allowed, n_matches, exact=exact)
+                usual = np.full(snapshot.n_shapes, USUAL_ISOLATION)
+                isolations = scan.isolations() if is_scaled else usual
+                return search_candidates(snapshot, descriptor, candidates, n_matches, isolations)
+            except DamagedEntryError as err:  # the rest is served
+                warn_of_damage(str(state.folder), err.damages)
+                state.leave_out(err.ids)
+                with self._lock:
+                    self._scans.pop(descriptor.recipe, None)
 
     def _candidates(
         self,
-        snapshot: Snapshot,
+        scan: "_Scan",
         descriptor: Descriptor,
-        allowed: Bool[np.ndarray, " k"],
+        allowed: np.ndarray,
         n_matches: int,
         *,
         exact: bool,
@@ -230,47 +255,83 @@ class IndexReader:
         if not isinstance(descriptor, PatchDescriptor):  # of which all are compared
             places = np.flatnonzero(allowed)
             return Candidates(places, "exact", len(places))
-        scan = partial(self._scan, snapshot, descriptor.recipe)
         supplier = None
-        if self._engine is not None and snapshot.n_shapes > FEWEST_TO_SCAN and not exact:
-            supplier = scan().supplier
+        if self._engine is not None and scan.snapshot.n_shapes > FEWEST_TO_SCAN and not exact:
+            scan.coarse(descriptor.recipe)
+            supplier = scan.supplier
         return choose_candidates(
             descriptor,
-            lambda: scan().coarse,
+            lambda: scan.coarse(descriptor.recipe),
             allowed,
             n_matches=n_matches,
             exact=exact,
             supplier=supplier,
         )
 
-    def _scan(self, snapshot: Snapshot, recipe: PatchRecipe) -> "_Scan":
-        """Return the short rows of a snapshot; they are made or read once a state."""
+    def _scan(self, state: IndexState, recipe: AnyRecipe) -> "_Scan":
+        """Return what search keeps of a state and a recipe."""
         with self._lock:
             kept = self._scans.get(recipe)
-            if kept is not None and kept.state is snapshot.state:
-                return kept
-            if kept is None:
-                coarse, engine = coarse_rows(snapshot, recipe), None
-            else:
-                coarse, engine = coarse_rows(snapshot, recipe, kept.coarse), kept.engine
-            # An engine holds the rows of the file, which stay until many shapes have changed.
-            is_new = kept is None or kept.coarse.numbers is not coarse.numbers
-            if self._engine is not None and is_new:
-                engine = self._engine(coarse)
-                require_type(engine, Engine, "the engine that was made")
-            supplier = None if engine is None else supply_from(engine, coarse)
-            found = self._scans[recipe] = _Scan(snapshot.state, coarse, engine, supplier)
-            return found
+            if kept is None or kept.snapshot.state is not state:
+                kept = _Scan(state.snapshot(recipe), self._engine, kept)
+                self._scans[recipe] = kept
+            return kept
 
 
-@dataclass(frozen=True, eq=False)
 class _Scan:
-    """What a reader keeps to choose candidates from one state of an index."""
+    """What a reader keeps to search one snapshot: each is made or read when it is needed first.
 
-    state: IndexState
-    coarse: CoarseRows
-    engine: Engine | None
-    supplier: Supplier | None
+    Parameters
+    ----------
+    snapshot : Snapshot
+    maker : callable, optional
+        Make an engine.
+    before : _Scan, optional
+        Of an earlier state.
+    """
+
+    def __init__(
+        self, snapshot: Snapshot, maker: EngineMaker | None, before: "_Scan | None"
+    ) -> None:
+        self.snapshot, self._maker = snapshot, maker
+        self.engine: Engine | None = None
+        self.supplier: Supplier | None = None
+        self._before: CoarseRows | None = None
+        self._coarse: CoarseRows | None = None
+        self._isolations: Float[np.ndarray, " n"] | None = None
+        self._lock = RLock()
+        if before is not None:
+            self.engine = before.engine
+            self._before = before._before if before._coarse is None else before._coarse
+            if np.array_equal(before.snapshot.columns, snapshot.columns):  # nothing has changed
+                self.supplier, self._coarse = before.supplier, before._coarse
+                self._isolations = before._isolations
+
+    def coarse(self, recipe: PatchRecipe) -> CoarseRows:
+        """Return the short rows of all shapes, and make an engine of them if one is wanted."""
+        with self._lock:
+            if self._coarse is None:
+                made = coarse_rows(self.snapshot, recipe, self._before)
+                # An engine holds the rows of the file, which stay until many shapes have changed.
+                is_new = self._before is None or self._before.numbers is not made.numbers
+                if self._maker is not None and is_new:
+                    self.engine = self._maker(made)
+                    require_type(self.engine, Engine, "the engine that was made")
+                if self.engine is not None:
+                    self.supplier = supply_from(self.engine, made)
+                self._coarse = made
+            return self._coarse
+
+    def isolations(self) -> Float[np.ndarray, " n"]:
+        """Return how isolated each shape is; 0 for heat, whose scores are not scaled."""
+        with self._lock:
+            if self._isolations is None:
+                recipe, columns = self.snapshot.recipe, self.snapshot.columns
+                found = np.zeros(len(columns))
+                if isinstance(recipe, PatchRecipe):
+                    found = stored_isolations(self.snapshot, recipe, columns["rows_checksum"])
+                self._isolations = found
+            return self._isolations
 
 
 def choose_recipe(recipes: list[AnyRecipe]) -> AnyRecipe:

@@ -1,0 +1,29 @@
+"""eigenshape index convert: an index of an older format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from eigenshape.cli import steps
+from eigenshape.cli.console import escape_text, out, print_json
+from eigenshape.cli.inputs import JsonOption
+
+
+def convert(
+    old: Annotated[Path, typer.Argument(help="Folder of an index of format 7 or 8.")],
+    new: Annotated[Path, typer.Argument(help="Folder for the new index: a new or an empty one.")],
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Write an index of an older version anew, in the format of this one.
+
+    The old index is not changed. Shapes whose numbers are damaged are left out with a warning.
+    """
+    n_shapes = steps.convert_index(old, new)
+    if as_json:
+        print_json({"index": str(new), "shapes": n_shapes})
+    else:
+        out.print(f"{steps.count_shapes(n_shapes)} converted; the index is {escape_text(new)}")
