@@ -1,7 +1,9 @@
 """What worker processes of the tests read; importable by name."""
 
 import os
+import sqlite3
 import time
+from contextlib import closing
 
 import numpy as np
 from filelock import FileLock
@@ -29,6 +31,15 @@ def descriptor(seed, recipe=RECIPE, m=2):
 def keep(index, name, descriptors, *, replace=False, **facts):
     """Add a shape that is described already."""
     index.add_many([DescribedShape(name, descriptors, **facts)], replace=replace)
+
+
+def spoil(folder, query):
+    """Change the database of an index behind the back of its checksums."""
+    with closing(sqlite3.connect(folder / "index.sqlite")) as database, database:
+        database.execute(query)
+
+
+SPOIL_ROWS = "UPDATE descriptor SET rows = zeroblob(length(rows)) WHERE id = 1"
 
 
 def mesh_of(number):

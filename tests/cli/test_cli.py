@@ -203,7 +203,7 @@ def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
     running = subprocess.Popen(
         [*command, "--views", "0", "--method", "scale-free"], stderr=subprocess.PIPE, text=True
     )
-    while running.poll() is None and not (db / "rows-1.bin").exists():
+    while running.poll() is None and not (db / "changes.txt").exists():
         time.sleep(0.01)
     running.send_signal(getattr(signal, how))
     told = running.communicate()[1]

@@ -570,9 +570,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "mean_side_length": lambda v: es.geometry.mean_side_length(v.many),
     "measure_closeness": lambda v: es.stability.measure_closeness(v.change),
     "measure_distortion": lambda v: es.deformation.measure_distortion(v.animal, v.pose),
-    "merge_matches": lambda v: es.retrieval.merge_matches(
-        [v.index.query(v.by_heat[0], n_matches=3)], n_matches=2
-    ),
     "merge_targets": lambda v: es.features.merge_targets(v.tree),
     "merge_tree": lambda v: es.merge_tree(v.animal, v.heat[:, 0]),
     "mesh_laplacian": lambda v: [
@@ -789,7 +786,6 @@ for _name, _entry in builders().items():
 LEFT_OUT = {
     "cache_operator_bundles": "It starts processes, which take seconds to import.",
     "build_index": "It starts processes, which take seconds to import; it writes to an index, which admits one writer.",
-    "index_folder": "It starts processes, which take seconds to import.",
     "set_threads": "It sets one number for all threads; test_thread_count.py calls it.",
     "train_codebook_from_files": "It starts processes, which take seconds to import.",
     "view": "It shows a widget of the studio, which is a package of its own.",

@@ -33,7 +33,7 @@ def ask(source, query, **options):
 
 
 def nearest(source, query, places, count=5):
-    distances = packed_distances(query, [source.rows(place) for place in places.tolist()])
+    distances = packed_distances(query, source.rows_of(places))
     return places[np.argsort(distances, kind="stable")[:count]].tolist()
 
 

@@ -126,7 +126,9 @@ def test_what_cannot_be_merged(index, tmp_path):
         index.merge([index])
     other = es.ShapeIndex.create(tmp_path / "other")
     keep(other, "s1", [descriptor(9)], digest="else")
-    with pytest.raises(es.StoreError, match=r"one shape; 's1' is in the index with digest 1, not e"):
+    with pytest.raises(
+        es.StoreError, match=r"one shape; 's1' is in the index with digest 1, not e"
+    ):
         index.merge([other])
     assert found(index) == {f"s{seed}": f"s{seed}" for seed in range(3)}
     assert index.merge([other], replace=True) == 1

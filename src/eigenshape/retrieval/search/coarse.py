@@ -45,9 +45,7 @@ class Rows(Protocol):
     def row_checksums(self) -> Int[np.ndarray, " n"]:
         """Return a checksum of the rows of each place, which tells whether they have changed."""
 
-    def rows_of(
-        self, places: Int[np.ndarray, " k"], *, checked: bool = False
-    ) -> list[np.ndarray]:
+    def rows_of(self, places: Int[np.ndarray, " k"], *, checked: bool = False) -> list[np.ndarray]:
         """Return the packed rows of some places: those of the whole shape first."""
 
     def beside(self, name: str) -> Path:

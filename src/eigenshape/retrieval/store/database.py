@@ -55,7 +55,6 @@ INTEGERS = (
     "details_checksum",
 )
 COLUMNS = np.dtype([(name, "<i8") for name in (*INTEGERS, "checksum")])
-FACTS = ("id", "name", "label", "source", "digest", "tags", "attributes", "n_descriptors")
 # A row of `descriptor` takes several pages, so its integers are also in an index of SQLite, from which
 # they come out in a microsecond a shape. AUTOINCREMENT: no number is used twice.
 SCHEMA = (
@@ -65,7 +64,7 @@ SCHEMA = (
     """CREATE TABLE shape (
     id INTEGER PRIMARY KEY AUTOINCREMENT, name TEXT NOT NULL UNIQUE, label TEXT, source TEXT,
     digest TEXT, tags TEXT NOT NULL, attributes TEXT NOT NULL, n_descriptors INTEGER NOT NULL,
-    checksum INTEGER NOT NULL)""",
+    n_pictures INTEGER NOT NULL, checksum INTEGER NOT NULL)""",
     """CREATE TABLE picture (
     id INTEGER PRIMARY KEY, data BLOB NOT NULL, checksum INTEGER NOT NULL)""",
     """CREATE TABLE descriptor (
@@ -93,7 +92,10 @@ SEALS = (
     UPDATE seal SET total = total + NEW.checksum - OLD.checksum, n_changes = n_changes + 1,
         guard = guard + NEW.checksum - OLD.checksum + {2} WHERE name = '{0}'; END""",
 )
-PRIME, FACTOR = 2**31 - 1, 1_000_003  # of checksums of integers, which NumPy makes of all rows at once
+PRIME, FACTOR = (
+    2**31 - 1,
+    1_000_003,
+)  # of checksums of integers, which NumPy makes of all rows at once
 
 
 class Seal(NamedTuple):
@@ -105,7 +107,11 @@ class Seal(NamedTuple):
 
 
 class Facts(NamedTuple):
-    """A row of `shape`; tags and attributes are JSON."""
+    """A row of `shape`; tags and attributes are JSON.
+
+    By the numbers of its descriptors and pictures, of which there is one or none, it is noticed if a
+    row of these is lost.
+    """
 
     id: int
     name: str
@@ -115,6 +121,7 @@ class Facts(NamedTuple):
     tags: str
     attributes: str
     n_descriptors: int
+    n_pictures: int
 
 
 # ---- checksums
@@ -138,25 +145,40 @@ def integer_checksums(rows: Int64[np.ndarray, "k c"]) -> Int64[np.ndarray, " k"]
     return found
 
 
-def read_seals(place: str, database: sqlite3.Connection) -> dict[str, Seal]:
+def read_seals(
+    place: str, database: sqlite3.Connection, damages: list[Damage] | None = None
+) -> dict[str, Seal]:
     """Read the seals of all tables.
+
+    Parameters
+    ----------
+    place : str
+    database : Connection
+    damages : list of Damage, optional
+        A seal that is damaged is noted there, and made of the rows that are found.
 
     Raises
     ------
     StoreError
-        If one is damaged or missing.
+        If one is damaged or missing, and no list is given.
     """
     seals = {}
     for name, *numbers, guard in database.execute("SELECT * FROM seal NOT INDEXED").fetchall():
-        n_rows, total, n_changes = numbers
-        if guard == total + PER_ROW * n_rows + PER_CHANGE * n_changes:
-            seals[name] = Seal(n_rows, total, n_changes)
+        n_rows, total, changes = numbers
+        if guard == total + PER_ROW * n_rows + PER_CHANGE * changes:
+            seals[name] = Seal(n_rows, total, changes)
     for name in TABLES:
-        if name not in seals:
+        if name in seals:
+            continue
+        if damages is None:
             raise StoreError(
-                f"{place} must hold what was written; the seal of {name} differs. Index the shapes "
-                "again, into another folder."
+                f"{place} must hold what was written; the seal of {name} differs. Merge the index "
+                "into a new one to keep what is whole."
             )
+        damages.append(Damage(DATABASE, f"the seal of table {name} differs"))
+        query = f"SELECT count(*), total(checksum) FROM {name}"
+        n_rows, total = database.execute(query).fetchone()
+        seals[name] = Seal(n_rows, int(total), 0)
     return seals
 
 
@@ -418,7 +440,10 @@ def read_rows(
 
 
 def read_integers(
-    database: sqlite3.Connection, seal: Seal, damages: list[Damage], before: np.ndarray | None = None
+    database: sqlite3.Connection,
+    seal: Seal,
+    damages: list[Damage],
+    before: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return the integers of all descriptors, by their numbers; damage is appended to a list.
 
@@ -443,7 +468,9 @@ def read_integers(
 
 def _whole_integers(database: sqlite3.Connection, source: str, last: int) -> np.ndarray:
     """Return the rows that agree with their checksums, up to the first that SQLite cannot read."""
-    query = f"SELECT {', '.join(COLUMNS.names or ())} FROM descriptor {source} WHERE id > ? ORDER BY id"
+    query = (
+        f"SELECT {', '.join(COLUMNS.names or ())} FROM descriptor {source} WHERE id > ? ORDER BY id"
+    )
     chunks = [np.empty((0, len(COLUMNS)), dtype=np.int64)]
     with suppress(*DAMAGE):
         cursor = database.execute(query, (last,))

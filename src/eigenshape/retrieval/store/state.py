@@ -21,7 +21,6 @@ from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
     DAMAGE,
     DATABASE,
-    FACTS,
     INTEGERS,
     Facts,
     Seal,
@@ -161,7 +160,7 @@ class IndexState:
         DamagedEntryError
             If some cannot be read, with all that are damaged.
         """
-        columns = ", ".join((*FACTS[1:], "checksum"))
+        columns = ", ".join((*Facts._fields[1:], "checksum"))
         found: dict[int, Facts] = {}
         for number, row in self.read("shape", columns, ids).items():
             if checksum(*row[:-1]) == row[-1]:
@@ -169,7 +168,9 @@ class IndexState:
         lost = sorted(set(np.asarray(ids).tolist()) - set(found))
         if lost:
             damages = [
-                Damage(DATABASE, f"row {number} of table shape is lost or differs from its checksum")
+                Damage(
+                    DATABASE, f"row {number} of table shape is lost or differs from its checksum"
+                )
                 for number in lost
             ]
             rows = self.descriptors
@@ -231,7 +232,7 @@ class IndexState:
             If anything of it is damaged.
         """
         descriptors = self.stored(self.descriptor_ids(facts), facts.name)
-        return StoredShape(*facts[1:-1], self.picture(facts), descriptors)
+        return StoredShape(*facts[1:7], self.picture(facts), descriptors)
 
     def descriptor_ids(self, facts: Facts) -> list[int]:
         """Return the numbers of the descriptors of a shape.
@@ -282,11 +283,11 @@ class IndexState:
         DamagedEntryError
             If it is damaged.
         """
-        row = self.read("picture", "data, checksum", [facts.id]).get(facts.id)
-        if row is None:
+        if not facts.n_pictures:
             return None
-        if checksum(row[0], row[1]) != row[2]:
-            what = "its picture differs from its checksum"
+        row = self.read("picture", "data, checksum", [facts.id]).get(facts.id)
+        if row is None or checksum(*row[:2]) != row[2]:
+            what = "its picture is lost or differs from its checksum"
             raise DamagedEntryError([], [Damage(DATABASE, what, facts.name)])
         return bytes(row[1])
 
@@ -362,9 +363,7 @@ class Snapshot:
         # With that of the details: of a million checksums of rows, a hundred pairs would be equal.
         return (self.columns["rows_checksum"] << 31) ^ self.columns["details_checksum"]
 
-    def rows_of(
-        self, places: Int[np.ndarray, " k"], *, checked: bool = False
-    ) -> list[np.ndarray]:
+    def rows_of(self, places: Int[np.ndarray, " k"], *, checked: bool = False) -> list[np.ndarray]:
         """Return the (m, q) rows of some places, compared with their checksums if that is wanted.
 
         It takes 25 microseconds a shape with views, more than reading them.
@@ -449,8 +448,9 @@ def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
     place, committed = str(folder / DATABASE), committed_changes(folder)
     with explained(folder):
         database = open_to_read(folder)
-        seals = read_seals(place, database)
-        damages = lost_changes(committed, seals)
+        damages: list[Damage] = []
+        seals = read_seals(place, database, damages)
+        damages += [] if damages else lost_changes(committed, seals)
         recipes = read_recipes(place, database, damages)
     columns = None if before is None or before.damages else before.descriptors
     state = IndexState(folder, database, seals, recipes, damages, columns)

@@ -77,7 +77,9 @@ def verify_index(folder: Path) -> IndexReport:
         with suppress(*DAMAGE):
             n_rows, total = state.database.execute(query).fetchone()
             if (n_rows, total or 0) != seal[:2]:
-                what = f"table {table} has {n_rows} rows of {seal.n_rows}, or others than were written"
+                what = (
+                    f"table {table} has {n_rows} rows of {seal.n_rows}, or others than were written"
+                )
                 damages.append(Damage(DATABASE, what))
     try:
         found = state.database.execute("PRAGMA integrity_check").fetchall()

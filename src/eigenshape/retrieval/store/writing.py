@@ -18,7 +18,6 @@ from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of, recipe_to
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
     DATABASE,
-    FACTS,
     Facts,
     checksum,
     integer_checksums,
@@ -260,7 +259,7 @@ class Writer:
         found = self.database.execute("SELECT id FROM shape WHERE name = ?", (name,)).fetchone()
         if found is None:
             return None
-        query = f"SELECT {', '.join(FACTS)} FROM shape WHERE id = ?"
+        query = f"SELECT {', '.join(Facts._fields)} FROM shape WHERE id = ?"
         row = self.database.execute(query, found).fetchone()
         if row is None or row[1] != name:  # a flipped bit in the list of names
             raise StoreError(
@@ -295,18 +294,19 @@ class Writer:
                 f"A shape must be in the index to be updated; {record.name!r} is not. Add it first."
             )
         facts = (record.label, record.source, record.digest, tags, attributes)
-        new = Facts(*old[:2], *facts, old.n_descriptors)
+        new = Facts(*old[:2], *facts, *old[7:])
         if new != old:
             self._update(new)
 
     def _update(self, facts: Facts) -> None:
-        fields = ", ".join(f"{name} = ?" for name in FACTS[1:])
+        fields = ", ".join(f"{name} = ?" for name in Facts._fields[1:])
         query = f"UPDATE shape SET {fields}, checksum = ? WHERE id = ?"
         self.database.execute(query, (*facts[1:], checksum(*facts), facts.id))
 
     def _insert_shape(self, shape: StoredShape) -> int:
         number = self._next("shape")
-        facts = Facts(number, *shape[:6], len(shape.descriptors))
+        n_pictures = int(shape.picture is not None)
+        facts = Facts(number, *shape[:6], len(shape.descriptors), n_pictures)
         self._insert("shape", *facts, checksum(*facts))
         if shape.picture is not None:
             self._insert("picture", number, shape.picture, checksum(number, shape.picture))

@@ -183,9 +183,8 @@ class ShelfReader:
         facts = state.find(name)
         if facts is None:
             return None
-        has_picture = bool(state.read("picture", "id", [facts.id]))
         told = (facts.name, facts.label, facts.source, *tags_and_attributes(facts))
-        return Shape(*told, has_picture)
+        return Shape(*told, bool(facts.n_pictures))
 
     def thumbnail(self, name: str) -> bytes | None:
         """Return the picture that the index holds of a shape, PNG or WebP; None if it holds none."""
