@@ -113,7 +113,9 @@ def _shapes(
                 details = piece(*where[3:])
                 found: Any = (recipes[recipe], view, n_rows, n_columns, rows, details)
                 descriptors.append(StoredDescriptor(*found))
-            yield StoredShape(*facts[:6], picture, descriptors)
+            name, label, source, digest, tags, attributes = facts[:6]
+            told = (name, label, source, digest, tags, attributes)
+            yield StoredShape(*told, picture, descriptors)
         except (OSError, ValueError, KeyError) as err:
             damages.append(Damage(DATABASE, str(err), facts[0]))
 

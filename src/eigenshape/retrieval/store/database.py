@@ -471,7 +471,8 @@ def _whole_integers(database: sqlite3.Connection, source: str, last: int) -> np.
     query = (
         f"SELECT {', '.join(COLUMNS.names or ())} FROM descriptor {source} WHERE id > ? ORDER BY id"
     )
-    chunks = [np.empty((0, len(COLUMNS)), dtype=np.int64)]
+    n_columns = len(INTEGERS) + 1
+    chunks = [np.empty((0, n_columns), dtype=np.int64)]
     with suppress(*DAMAGE):
         cursor = database.execute(query, (last,))
         while rows := cursor.fetchmany(ROWS_AT_ONCE):
@@ -479,7 +480,7 @@ def _whole_integers(database: sqlite3.Connection, source: str, last: int) -> np.
                 chunks.append(np.array(rows, dtype=np.int64))
             except (TypeError, ValueError):  # the type of a value is damaged
                 some = [row for row in rows if all(isinstance(each, int) for each in row)]
-                chunks.append(np.array(some, dtype=np.int64).reshape(-1, len(COLUMNS)))
+                chunks.append(np.array(some, dtype=np.int64).reshape(-1, n_columns))
     table = np.concatenate(chunks)
     whole = integer_checksums(table[:, :-1]) == table[:, -1]
     return np.ascontiguousarray(table[whole]).view(COLUMNS).reshape(-1)

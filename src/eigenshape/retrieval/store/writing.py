@@ -179,8 +179,9 @@ def described(shape: DescribedShape) -> StoredShape:
     for descriptor, rows in pairs:
         recipe = descriptor.recipe
         details = kind_of(recipe).details(descriptor)
-        each = StoredDescriptor(recipe, views[recipe], *rows.shape, rows.tobytes(), details)
-        stored.append(each)
+        n_rows, n_columns = rows.shape
+        view, data = views[recipe], rows.tobytes()
+        stored.append(StoredDescriptor(recipe, view, n_rows, n_columns, data, details))
         views[recipe] += 1
     return StoredShape(
         shape.name, shape.label, shape.source, shape.digest, *facts, shape.thumbnail, stored
@@ -293,8 +294,13 @@ class Writer:
             raise StoreError(
                 f"A shape must be in the index to be updated; {record.name!r} is not. Add it first."
             )
-        facts = (record.label, record.source, record.digest, tags, attributes)
-        new = Facts(*old[:2], *facts, *old[7:])
+        new = old._replace(
+            label=record.label,
+            source=record.source,
+            digest=record.digest,
+            tags=tags,
+            attributes=attributes,
+        )
         if new != old:
             self._update(new)
 
