@@ -25,7 +25,7 @@ def old(request, tmp_path):
 
 
 def test_an_old_index_is_converted(old, tmp_path):
-    with pytest.raises(es.StoreError, match="by an older version of eigenshape. Convert it: `eige"):
+    with pytest.raises(es.StoreError, match=r"by an older version of eigenshape. Convert it: `eige"):
         es.ShapeIndex.open(old)
     done = CliRunner().invoke(app, ["index", "convert", str(old), str(tmp_path / "new")])
     assert (done.exit_code, done.output.split(";")[0]) == (0, "3 shapes converted")
@@ -55,7 +55,7 @@ def test_what_is_damaged_is_left_out(old, tmp_path):
 
 def test_only_old_indexes_are_converted(tmp_path):
     index = es.ShapeIndex.create(tmp_path / "index")
-    with pytest.raises(es.StoreError, match="is of format 7 or 8; .* is of format 9"):
+    with pytest.raises(es.StoreError, match=r"is of format 7 or 8; .* is of format 9"):
         convert_index(index.folder, tmp_path / "new")
     with closing(sqlite3.connect(index.folder / "index.sqlite")) as database:
         database.execute("PRAGMA application_id = 1")
