@@ -240,7 +240,12 @@ def measure(folder: str, pickled: list[bytes], method: str) -> Row:
             start = time.process_time()
             supplier = scan.supplier if method != "staged" else None
             places = choose_candidates(
-                query, lambda: coarse, allowed, n_matches=N_MATCHES, supplier=supplier
+                query,
+                lambda: coarse,
+                allowed,
+                isolations,
+                n_matches=N_MATCHES,
+                supplier=supplier,
             ).places
             choosing.append(time.process_time() - start)
             start = time.process_time()

@@ -219,7 +219,7 @@ def _stored_descriptor(
             f"A query is a mesh file, a folder or the name of a shape of the index; {name} is none "
             "of them. `eigenshape index ls` lists the names."
         )
-    for stored in state.stored(state.descriptor_ids(facts), name):
+    for stored in state.stored(state.descriptor_ids(facts)):
         if stored.recipe == recipe:
             return stored.restored()
     raise StoreError(

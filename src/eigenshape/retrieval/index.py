@@ -512,8 +512,7 @@ class ShapeIndex:
         state = self._read()
         facts = state.find(name)
         ids = [] if facts is None else state.descriptor_ids(facts)
-        stored = state.stored(ids, name)
-        found = [each.restored() for each in stored if each.recipe == recipe]
+        found = [each.restored() for each in state.stored(ids) if each.recipe == recipe]
         if not found:
             state.snapshot(recipe)  # which tells which recipes there are
             raise StoreError(

@@ -25,7 +25,9 @@ def old(request, tmp_path):
 
 
 def test_an_old_index_is_converted(old, tmp_path):
-    with pytest.raises(es.StoreError, match=r"by an older version of eigenshape. Convert it: `eige"):
+    with pytest.raises(
+        es.StoreError, match=r"by an older version of eigenshape. Convert it: `eige"
+    ):
         es.ShapeIndex.open(old)
     done = CliRunner().invoke(app, ["index", "convert", str(old), str(tmp_path / "new")])
     assert (done.exit_code, done.output.split(";")[0]) == (0, "3 shapes converted")

@@ -53,7 +53,7 @@ class Match(ReadOnly):
     >>> index = es.ShapeIndex.create(tempfile.mkdtemp())
     >>> for name in ("fish", "biped"):
     ...     mesh = es.make_creature(name, n_vertices=500)
-    ...     index.add_descriptors(name, [es.describe(mesh, recipe)], label="creature")
+    ...     index.add(name, mesh, label="creature", recipe=recipe, n_views=0)
     >>> scan = es.make_creature("fish", pose=1, n_vertices=500)
     >>> match = index.query(es.describe(scan, recipe), n_matches=1)[0]
     >>> match.name, match.label, len(match.vertices)

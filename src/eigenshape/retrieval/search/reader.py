@@ -1,6 +1,7 @@
 """A reader of an index: one state for many queries, which any number of threads may ask."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from threading import RLock
 from types import TracebackType
@@ -233,40 +234,31 @@ class IndexReader:
                 allowed = snapshot.mask(chosen)
                 if left_out >= 0:
                     allowed &= snapshot.shape_of != left_out
-                candidates = self._candidates(scan, descriptor, allowed, n_matches, exact=exact)
                 usual = np.full(snapshot.n_shapes, USUAL_ISOLATION)
                 isolations = scan.isolations() if is_scaled else usual
+                places = np.flatnonzero(allowed)
+                candidates = Candidates(places, "exact", len(places))
+                if isinstance(descriptor, PatchDescriptor):  # by heat all are compared
+                    supplier = None
+                    is_large = snapshot.n_shapes > FEWEST_TO_SCAN
+                    if self._engine is not None and is_large and not exact:
+                        scan.coarse(descriptor.recipe)
+                        supplier = scan.supplier
+                    candidates = choose_candidates(
+                        descriptor,
+                        partial(scan.coarse, descriptor.recipe),
+                        allowed,
+                        isolations,
+                        n_matches=n_matches,
+                        exact=exact,
+                        supplier=supplier,
+                    )
                 return search_candidates(snapshot, descriptor, candidates, n_matches, isolations)
             except DamagedEntryError as err:  # the rest is served
                 warn_of_damage(str(state.folder), err.damages)
                 state.leave_out(err.ids)
                 with self._lock:
                     self._scans.pop(descriptor.recipe, None)
-
-    def _candidates(
-        self,
-        scan: "_Scan",
-        descriptor: Descriptor,
-        allowed: np.ndarray,
-        n_matches: int,
-        *,
-        exact: bool,
-    ) -> Candidates:
-        if not isinstance(descriptor, PatchDescriptor):  # of which all are compared
-            places = np.flatnonzero(allowed)
-            return Candidates(places, "exact", len(places))
-        supplier = None
-        if self._engine is not None and scan.snapshot.n_shapes > FEWEST_TO_SCAN and not exact:
-            scan.coarse(descriptor.recipe)
-            supplier = scan.supplier
-        return choose_candidates(
-            descriptor,
-            lambda: scan.coarse(descriptor.recipe),
-            allowed,
-            n_matches=n_matches,
-            exact=exact,
-            supplier=supplier,
-        )
 
     def _scan(self, state: IndexState, recipe: AnyRecipe) -> "_Scan":
         """Return what search keeps of a state and a recipe."""

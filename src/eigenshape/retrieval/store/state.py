@@ -231,7 +231,7 @@ class IndexState:
         DamagedEntryError
             If anything of it is damaged.
         """
-        descriptors = self.stored(self.descriptor_ids(facts), facts.name)
+        descriptors = self.stored(self.descriptor_ids(facts))
         return StoredShape(*facts[1:7], self.picture(facts), descriptors)
 
     def descriptor_ids(self, facts: Facts) -> list[int]:
@@ -255,8 +255,8 @@ class IndexState:
             raise DamagedEntryError(ids, [Damage(DATABASE, what, facts.name)])
         return ids
 
-    def stored(self, ids: Sequence[int], name: str) -> list[StoredDescriptor]:
-        """Return descriptors of a shape by their numbers, checked.
+    def stored(self, ids: Sequence[int]) -> list[StoredDescriptor]:
+        """Return descriptors by their numbers, checked.
 
         Raises
         ------
@@ -267,13 +267,23 @@ class IndexState:
         found = []
         for number in ids:
             row = rows.get(number)
-            what = _difference(row) if row else "its row cannot be read"
-            if row is None or what or row[2] not in self.recipes:
-                what = what or "its recipe is lost"
-                raise DamagedEntryError(ids, [Damage(DATABASE, what, name)])
-            recipe = self.recipes[row[2]]
-            found.append(StoredDescriptor(recipe, row[3], row[4], row[5], row[9], row[10]))
+            what = "its row cannot be read" if row is None else _difference(row)
+            if row is None or what:
+                raise self.damaged([number], what)
+            if row[2] not in self.recipes:
+                raise self.damaged([number], "its recipe is lost")
+            # id, shape, recipe, view, n_rows, n_columns, three checksums, rows, details
+            found.append(StoredDescriptor(self.recipes[row[2]], *row[3:6], *row[9:]))
         return found
+
+    def damaged(self, ids: Sequence[int], what: str) -> DamagedEntryError:
+        """Return the error of damaged descriptors, which names their shapes as far as it can."""
+        shapes = self.descriptors["shape"][np.isin(self.descriptors["id"], ids)]
+        names: dict[int, str] = {}
+        with suppress(DamagedEntryError):
+            names = {key: facts.name for key, facts in self.facts(np.unique(shapes)).items()}
+        damages = [Damage(DATABASE, what, names.get(shape)) for shape in shapes.tolist()]
+        return DamagedEntryError(ids, damages or [Damage(DATABASE, what)])
 
     def picture(self, facts: Facts) -> bytes | None:
         """Return the picture of a shape, or None if it has none.
@@ -313,19 +323,18 @@ class IndexState:
         return Snapshot(self, recipe, rows if mask.all() else rows[mask])
 
 
-def _difference(row: tuple[Any, ...]) -> str | None:
-    """Return how a row of the table of descriptors differs from its checksums, if it does."""
+def _difference(row: tuple[Any, ...]) -> str:
+    """Return how a row of the table of descriptors differs from its checksums; nothing if it does not."""
     integers, expected, rows, details = row[:8], row[8], row[9], row[10]
-    try:
-        if integer_checksums(np.array([integers], dtype=np.int64))[0] != expected:
-            return "its row differs from its checksum"
-    except (TypeError, ValueError, OverflowError):  # the type of a value is damaged
+    if not all(isinstance(value, int) for value in integers):
+        return "its row differs from its checksum"
+    if integer_checksums(np.array([integers], dtype=np.int64))[0] != expected:
         return "its row differs from its checksum"
     if not isinstance(rows, bytes) or crc32(rows) != integers[6]:
         return "its rows differ from their checksum"
     if not isinstance(details, bytes) or crc32(details) != integers[7]:
         return "its details differ from their checksum"
-    return None
+    return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -386,7 +395,7 @@ class Snapshot:
             else:
                 lost.append(number)
         if lost:
-            raise self._damaged(lost, "its rows cannot be read")
+            raise self.state.damaged(lost, "its rows cannot be read")
         return found
 
     def descriptor(self, place: int) -> Descriptor:
@@ -397,21 +406,8 @@ class Snapshot:
         DamagedEntryError
             If it is damaged.
         """
-        number = int(self.columns["id"][place])
-        row = self.state.read("descriptor", DESCRIPTOR, [number]).get(number)
-        what = _difference(row) if row else "its row cannot be read"
-        if row is None or what:
-            raise self._damaged([number], str(what))
-        return StoredDescriptor(self.recipe, *row[3:6], *row[9:]).restored()
-
-    def _damaged(self, ids: Sequence[int], what: str) -> DamagedEntryError:
-        """Return the error of descriptors, which names their shapes."""
-        shapes = self.columns["shape"][np.isin(self.columns["id"], ids)]
-        names: dict[int, str] = {}
-        with suppress(DamagedEntryError):  # if their names are damaged, too
-            names = {key: facts.name for key, facts in self.state.facts(np.unique(shapes)).items()}
-        damages = [Damage(DATABASE, what, names.get(shape)) for shape in shapes.tolist()]
-        return DamagedEntryError(ids, damages)
+        (stored,) = self.state.stored([int(self.columns["id"][place])])
+        return stored.restored()
 
     def facts(self, places: Int[np.ndarray, " k"]) -> list[Facts]:
         """Return what is known of the shapes of some places."""
