@@ -47,7 +47,7 @@ class Candidates:
     n_shapes: int
 
 
-def choose_candidates(
+def choose_candidates(  # noqa: PLR0913 - what is searched, and the choices of a query
     query: PatchDescriptor,
     coarse: Callable[[], CoarseRows],
     allowed: Bool[np.ndarray, " n"],
