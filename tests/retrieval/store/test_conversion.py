@@ -61,6 +61,6 @@ def test_only_old_indexes_are_converted(tmp_path):
         convert_index(index.folder, tmp_path / "new")
     with closing(sqlite3.connect(index.folder / "index.sqlite")) as database:
         database.execute("PRAGMA application_id = 1")
-    with pytest.raises(es.StoreError, match="is of format 7 or 8; .* is another program's"):
+    with pytest.raises(es.StoreError, match=r"is of format 7 or 8; .* is another program's"):
         convert_index(index.folder, tmp_path / "new")
     assert not (tmp_path / "new").exists()

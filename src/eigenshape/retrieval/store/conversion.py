@@ -27,7 +27,7 @@ from eigenshape.retrieval.store.database import (
 from eigenshape.retrieval.store.state import StoredDescriptor, StoredShape
 from eigenshape.retrieval.store.writing import Writer
 
-OLD_FORMATS = (7, 8)
+OLD_FORMATS = (7, 8)  # of the tables, as in PRAGMA user_version
 SHAPES = (
     "SELECT id, name, label, source, digest, tags, attributes, thumbnail_file, thumbnail_offset, "
     "thumbnail_size, thumbnail_checksum FROM shape ORDER BY id"
