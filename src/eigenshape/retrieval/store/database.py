@@ -202,7 +202,7 @@ def create(folder: Path, *, exist_ok: bool = False) -> None:
         ) from err
     has_database = (folder / DATABASE).is_file()
     if exist_ok and has_database:  # without the lock, which needs the right to write
-        with suppress(StoreError), reading(folder):
+        with suppress(StoreError), closing(open_to_read(folder)):
             return
     others = [path for path in folder.iterdir() if not path.name.startswith(DATABASE)]
     if others and not (exist_ok and has_database):
@@ -251,6 +251,7 @@ def writing(folder: Path) -> Iterator[sqlite3.Connection]:
         require_format(place, database)
         database.execute(WRITE_AHEAD)
         database.execute("PRAGMA synchronous = FULL")
+        database.execute(f"PRAGMA cache_size = -{CACHED}")
         # The lock of SQLite: the system takes it from a process that dies.
         database.execute("BEGIN IMMEDIATE")
         before = read_seals(place, database)
@@ -268,19 +269,6 @@ def writing(folder: Path) -> Iterator[sqlite3.Connection]:
                 (folder / CHANGES).write_text(f"{now}\n")
 
 
-@contextmanager
-def reading(folder: Path) -> Iterator[sqlite3.Connection]:
-    """Open an index to read one state of it, even if the folder is read-only.
-
-    Raises
-    ------
-    StoreError
-        If the folder is not an index of this format, or its database cannot be read at all.
-    """
-    with explained(folder), closing(open_to_read(folder)) as database:
-        yield database
-
-
 def open_to_read(folder: Path) -> sqlite3.Connection:
     """Return a connection in a transaction, which sees one state until it is closed.
 
@@ -293,13 +281,12 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
     Raises
     ------
     StoreError
-        As `reading`.
+        If the folder is not an index of this format, or its database cannot be read at all.
     """
     require_database(folder)
     with explained(folder):
         # Not mode=ro: whoever closes an index last moves the log into the database.
         database = _connect(folder, "mode=rw")
-        database.execute("PRAGMA query_only = ON")
         try:
             database.execute("SELECT count(*) FROM sqlite_master")
         except sqlite3.OperationalError:
@@ -316,6 +303,8 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
                 ) from None
             database = _connect(folder, "mode=ro&immutable=1")
         require_format(str(folder / DATABASE), database)
+        database.execute("PRAGMA query_only = ON")
+        database.execute(f"PRAGMA cache_size = -{CACHED}")
         database.execute(f"PRAGMA mmap_size = {MAPPED}")
         database.execute("BEGIN")
         database.execute("SELECT count(*) FROM recipe").fetchone()  # from here on, one state
@@ -324,11 +313,9 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
 
 def _connect(folder: Path, mode: str) -> sqlite3.Connection:
     uri = f"{(folder / DATABASE).absolute().as_uri()}?{mode}"
-    database = sqlite3.connect(
+    return sqlite3.connect(
         uri, LONGEST_WAIT, isolation_level=None, check_same_thread=False, uri=True
     )
-    database.execute(f"PRAGMA cache_size = -{CACHED}")
-    return database
 
 
 def require_database(folder: Path) -> None:
@@ -349,15 +336,16 @@ def require_format(place: str, database: sqlite3.Connection) -> None:
             f"{place} must be an index of eigenshape; it belongs to another program. Choose "
             "another folder."
         )
-    if version < FORMAT:
+    if version != FORMAT:
+        age, remedy = "a newer", "Install that version, or index the shapes again."
+        if version < FORMAT:
+            age, remedy = (
+                "an older",
+                "Convert it: `eigenshape index convert OLD_FOLDER NEW_FOLDER`.",
+            )
         raise StoreError(
-            f"{place} must be an index of format {FORMAT}; it is of format {version}, by an older "
-            "version of eigenshape. Convert it: `eigenshape index convert OLD_FOLDER NEW_FOLDER`."
-        )
-    if version > FORMAT:
-        raise StoreError(
-            f"{place} must be an index of format {FORMAT}; it is of format {version}, by a newer "
-            "version of eigenshape. Install that version, or index the shapes again."
+            f"{place} must be an index of format {FORMAT}; it is of format {version}, by {age} "
+            f"version of eigenshape. {remedy}"
         )
 
 
