@@ -197,9 +197,9 @@ class IndexReader:
         else:
             mesh, recipe = as_mesh(shape, "shape"), choose_recipe(list(state.recipes.values()))
             descriptor = kind_of(recipe).describe_query(mesh, recipe)
-        return self.search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
+        return self._search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
 
-    def search(  # noqa: PLR0913 - the choices of a query, each of which has a default
+    def _search(  # noqa: PLR0913 - the choices of a query, each of which has a default
         self,
         state: IndexState,
         descriptor: Descriptor,
