@@ -85,7 +85,7 @@ def test_verify_names_shapes(index, tmp_path):
 
 
 def test_rows_that_are_lost_are_counted(index):
-    spoil(index.folder, "DROP TRIGGER shape_out")
+    spoil(index.folder, "DROP TRIGGER shape_delete")
     spoil(index.folder, "DELETE FROM shape WHERE id = 12")
     with pytest.warns(es.retrieval.StoreWarning, match="row 12 of table shape is lost"):
         names = {record.name for record in index.records()}

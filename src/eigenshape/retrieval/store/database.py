@@ -80,18 +80,15 @@ SCHEMA = (
 )
 # `guard` is a sum of the other numbers of a seal by which a change of one of them is noticed.
 PER_ROW, PER_CHANGE = 1_000_003, 31
-SEALS = (
-    "INSERT INTO seal VALUES ('{0}', 0, 0, 0, 0)",
-    """CREATE TRIGGER {0}_in AFTER INSERT ON {0} BEGIN
-    UPDATE seal SET n_rows = n_rows + 1, total = total + NEW.checksum, n_changes = n_changes + 1,
-        guard = guard + NEW.checksum + {1} + {2} WHERE name = '{0}'; END""",
-    """CREATE TRIGGER {0}_out AFTER DELETE ON {0} BEGIN
-    UPDATE seal SET n_rows = n_rows - 1, total = total - OLD.checksum, n_changes = n_changes + 1,
-        guard = guard - OLD.checksum - {1} + {2} WHERE name = '{0}'; END""",
-    """CREATE TRIGGER {0}_new AFTER UPDATE ON {0} BEGIN
-    UPDATE seal SET total = total + NEW.checksum - OLD.checksum, n_changes = n_changes + 1,
-        guard = guard + NEW.checksum - OLD.checksum + {2} WHERE name = '{0}'; END""",
-)
+TRIGGER = """CREATE TRIGGER {table}_{event} AFTER {event} ON {table} BEGIN
+    UPDATE seal SET n_rows = n_rows + {rows}, total = total + {sum}, n_changes = n_changes + 1,
+        guard = guard + {sum} + {rows} * {per_row} + {per_change} WHERE name = '{table}'; END"""
+# What each event adds to the rows of a table and to the sum of their checksums
+EVENTS = {
+    "insert": (1, "NEW.checksum"),
+    "delete": (-1, "(-OLD.checksum)"),
+    "update": (0, "NEW.checksum - OLD.checksum"),
+}
 PRIME, FACTOR = (
     2**31 - 1,
     1_000_003,
@@ -220,8 +217,10 @@ def create(folder: Path, *, exist_ok: bool = False) -> None:
         for statement in SCHEMA:
             database.execute(statement)
         for table in TABLES:
-            for statement in SEALS:
-                database.execute(statement.format(table, PER_ROW, PER_CHANGE))
+            database.execute("INSERT INTO seal VALUES (?, 0, 0, 0, 0)", (table,))
+            names = {"table": table, "per_row": PER_ROW, "per_change": PER_CHANGE}
+            for event, (rows, total) in EVENTS.items():
+                database.execute(TRIGGER.format(event=event, rows=rows, sum=total, **names))
         database.execute(f"PRAGMA application_id = {APPLICATION}")
         database.execute(f"PRAGMA user_version = {FORMAT}")
         database.execute("COMMIT")

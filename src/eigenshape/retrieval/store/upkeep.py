@@ -91,18 +91,14 @@ def verify_index(folder: Path) -> IndexReport:
 
 def find_damaged(folder: Path, names: Sequence[str]) -> set[str]:
     """Return which of some shapes of an index differ from their checksums, or are not there."""
-    state = read_state(folder)
-    damaged = set()
+    state, whole = read_state(folder), set[str]()
     for name in names:
-        try:
+        with suppress(DamagedEntryError):
             facts = state.find(name)
-            if facts is None:
-                damaged.add(name)
-            else:
+            if facts is not None:
                 state.shape(facts)
-        except DamagedEntryError:
-            damaged.add(name)
-    return damaged
+                whole.add(name)
+    return set(names) - whole
 
 
 def compact_index(folder: Path) -> int:
