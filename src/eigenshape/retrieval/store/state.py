@@ -167,12 +167,8 @@ class IndexState:
                 found[number] = Facts(*row[:-1])
         lost = sorted(set(np.asarray(ids).tolist()) - set(found))
         if lost:
-            damages = [
-                Damage(
-                    DATABASE, f"row {number} of table shape is lost or differs from its checksum"
-                )
-                for number in lost
-            ]
+            what = "row {} of table shape is lost or differs from its checksum"
+            damages = [Damage(DATABASE, what.format(number)) for number in lost]
             rows = self.descriptors
             raise DamagedEntryError(rows["id"][np.isin(rows["shape"], lost)].tolist(), damages)
         return found
@@ -184,7 +180,7 @@ class IndexState:
             try:
                 yield from self.facts(some).values()
             except DamagedEntryError as err:
-                self.damages.extend(err.damages)
+                self.damages += [each for each in err.damages if each not in self.damages]
                 damaged = np.isin(self.descriptors["id"], err.ids)
                 lost = self.descriptors["shape"][damaged]
                 yield from self.facts(some[~np.isin(some, lost)]).values()
@@ -309,8 +305,7 @@ class IndexState:
         StoreError
             If there are none.
         """
-        with self.lock:
-            rows = self.descriptors
+        rows = self.descriptors
         numbers = [number for number, other in self.recipes.items() if other == recipe]
         mask = np.isin(rows["recipe"], numbers)
         if not mask.any():
