@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_limits
 
 import eigenshape as es
 from eigenshape.sparse.symmetric_factor import SymmetricFactor
-from eigenshape.spectral.solver import factor, lanczos, pairs, pencil
+from eigenshape.spectral.solver import eigenpairs, factor, lanczos, pencil
 from eigenshape.spectral.solver import inertia as count
 from eigenshape.spectral.solver import strategy as roads
 
@@ -69,14 +69,13 @@ def _orthogonal(
     return 2.0 * known.nbytes, 4.0 * known.size * groups * columns.shape[2]
 
 
-def _eigh(krylov: Any, _shift: float) -> Work:
-    return 0.0, 10 / 3 * float(
-        len(krylov.projected)
-    ) ** 3  # to a tridiagonal matrix and back; in between it is cheap
+def _eigh(_inner: object, _basis: object, projected: np.ndarray, *_: object) -> Work:
+    # To a tridiagonal matrix and back; in between it is cheap.
+    return 0.0, 10 / 3 * float(len(projected)) ** 3
 
 
-def _combine(krylov: Any, _ritz: object, chosen: np.ndarray) -> Work:
-    n, m, j = krylov.space.shape[1], krylov.space.shape[0] * krylov.space.shape[2], len(chosen)
+def _combine(space: Any, numbers: np.ndarray) -> Work:
+    n, m, j = space.basis.shape[1], space.basis.shape[0] * space.basis.shape[2], len(numbers)
     return REAL * float(n) * (m + j), 2.0 * n * m * j
 
 
@@ -100,9 +99,9 @@ PARTS: tuple[tuple[str, object, str, Callable[..., Work]], ...] = (
     ("factors", factor, "factorize_symmetric", _factor),
     ("solves", SymmetricFactor, "solve_lanes", _solve),
     ("orthogonalization", lanczos, "_orthonormalize", _orthogonal),
-    ("Ritz values", lanczos, "_ritz", _eigh),
-    ("Ritz vectors", lanczos, "_vectors", _combine),
-    ("residuals", pairs, "rayleigh_residuals", _residuals),
+    ("Ritz values", lanczos, "_ritz_space", _eigh),
+    ("Ritz vectors", lanczos.RitzSpace, "vectors", _combine),
+    ("residuals", eigenpairs, "rayleigh_residuals", _residuals),
     ("proof", roads, "prove", _proof),
     ("proof", count, "rounding", _rounding),
 )

@@ -2,11 +2,14 @@
 
 import inspect
 import re
+import sys
 from pathlib import Path
 
 import eigenshape as es
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+from command_line import command_line_page  # noqa: E402  a module of this folder
 
 project = "eigenshape"
 author = "The eigenshape founders"
@@ -88,7 +91,8 @@ def write_api_pages() -> None:
                 lines += ["", *[f"   {each}" for each in names], ""]
         write_if_changed(folder / f"{name}.rst", "\n".join(lines))
         pages.append(name)
-    listed = "\n".join(pages)
+    write_if_changed(folder / "command-line.md", command_line_page())
+    listed = "\n".join([*pages, "command-line"])
     write_if_changed(
         folder / "index.md",
         "# API\n\nNames of the short door are there as `es.name`; all others stand in their room, as "
@@ -126,7 +130,9 @@ def write_experiment_pages() -> None:
 
 def link_experiment_pages(_app: object, _name: str, text: list[str]) -> None:
     """Lead links to the READMEs of experiments, which lie outside the docs, to their pages."""
-    text[0] = re.sub(r"\]\(\.\./experiments/(\w+)/README\.md", r"](experiments/\1.md", text[0])
+    text[0] = re.sub(
+        r"\]\(\.\./((?:\.\./)?)experiments/(\w+)/README\.md", r"](\1experiments/\2.md", text[0]
+    )
     text[0] = text[0].replace("](../experiments/README.md", "](experiments/index.md")
 
 

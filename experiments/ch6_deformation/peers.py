@@ -12,7 +12,7 @@ from scipy.linalg import lu_factor, lu_solve
 from scipy.spatial.transform import Rotation
 
 import eigenshape as es
-from eigenshape.deformation.graded_bend import move_by_shares, quaternions
+from eigenshape.deformation.deform import move_by_shares, quaternions
 from eigenshape.deformation.rigidity import factor_equations, relax
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 

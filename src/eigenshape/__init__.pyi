@@ -47,7 +47,7 @@ from .operators.laplacian import Laplacian as Laplacian
 from .operators.robust import robust_laplacian as robust_laplacian
 from .plot.fields import figure_field as figure_field
 from .plot.fields import figure_segments as figure_segments
-from .plot.save import save_figure as save_figure
+from .plot.figure import save_figure as save_figure
 from .plot.view import view as view
 from .retrieval.description import describe as describe
 from .retrieval.index import ShapeIndex as ShapeIndex

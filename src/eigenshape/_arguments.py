@@ -81,10 +81,7 @@ CONVERSIONS = {
 def require_type(value: object, kind: type | UnionType, name: str) -> None:
     """Raise an error if an argument is not an instance of `kind`.
 
-    Raises
-    ------
-    InvalidParameterError
-        The message names the type of the value and says what to pass instead.
+    The message names the type of the value and says what to pass instead.
     """
     if not isinstance(value, kind):
         raise InvalidParameterError(
@@ -94,13 +91,7 @@ def require_type(value: object, kind: type | UnionType, name: str) -> None:
 
 
 def require_each(values: object, kind: type | UnionType, name: str) -> None:
-    """Raise an error if an argument is not a list of instances of `kind`.
-
-    Raises
-    ------
-    InvalidParameterError
-        If it is not a list, or an entry is not an instance of `kind`.
-    """
+    """Raise an error if an argument is not a list of instances of `kind`."""
     if (
         isinstance(values, kind)
         or not isinstance(values, Iterable)

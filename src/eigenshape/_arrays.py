@@ -74,13 +74,9 @@ def as_array(
 ) -> NDArray[Any]:
     """Return `value` as an array. All arrays that callers pass go through here.
 
-    Raises
-    ------
-    InvalidShapeError or InvalidParameterError
-        If an entry is masked, or if checking and copying would take more than half of the memory.
-        A broadcast array can be far larger than the memory that it occupies itself.
-    ValueError
-        If rows differ in length.
+    Raise InvalidShapeError or InvalidParameterError if an entry is masked, or if checking and
+    copying would take more than half of the memory: a broadcast array can be far larger than the
+    memory that it occupies. Raise ValueError if rows differ in length.
     """
     nested = isinstance(value, list | tuple) and any(
         isinstance(row, np.ma.MaskedArray) for row in value
@@ -256,12 +252,7 @@ def _require_finite(values: NDArray[np.float64], name: str) -> None:
 
 
 def require_finite_rows(rows: NDArray[np.float64], name: str, noun: str) -> None:
-    """Raise an error if a number is not finite; `noun` says what each row belongs to.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
+    """Raise an error if a number is not finite; `noun` says what each row belongs to."""
     bad = np.argwhere(~np.isfinite(rows))
     if len(bad):
         row = bad[0][0]
@@ -283,10 +274,7 @@ def _list_of_numbers(value: ArrayLike, name: str) -> NDArray[np.float64]:
 def real_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
     """Return `value` as an array of real numbers of any shape, without changing its type.
 
-    Raises
-    ------
-    InvalidParameterError
-        If it contains anything else, or rows differ in length.
+    Raise InvalidParameterError if it contains anything else, or rows differ in length.
     """
     try:
         numbers = as_array(value, name)

@@ -217,10 +217,8 @@ def temporary_folder() -> Path:
 def make_private(folder: Path) -> None:
     """Make a folder that nobody else may write to: what is kept there is unpickled, which can run any code.
 
-    Raises
-    ------
-    PermissionError
-        If it is there already and is a link, or belongs to somebody else, or is open to others.
+    Raise PermissionError if the folder is there and is a link, belongs to somebody else, or is open
+    to others.
     """
     folder.mkdir(mode=0o700, exist_ok=True)
     found = folder.lstat()

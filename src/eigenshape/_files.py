@@ -16,10 +16,7 @@ from eigenshape._errors import FileFormatError, InvalidParameterError
 def as_path(value: object, name: str = "path") -> Path:
     """Return a path that the system can open.
 
-    Raises
-    ------
-    InvalidParameterError
-        If it is no text, or holds a NUL, which ends a name for the system.
+    Raise InvalidParameterError if it is no text or holds a NUL.
     """
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     if not isinstance(text, str):
@@ -38,12 +35,7 @@ def read_regular(path: Path, what: str = "a mesh") -> bytes:
 
     Reading a pipe or a device could block or never end, so other files raise an error.
 
-    Raises
-    ------
-    FileNotFoundError, PermissionError
-        As raised by the system.
-    FileFormatError
-        If the path is not a regular file, or the file is empty.
+    Raise FileFormatError if the file is not a regular one or is empty.
     """
     require_regular(path)
     data = path.read_bytes()
@@ -53,15 +45,7 @@ def read_regular(path: Path, what: str = "a mesh") -> bytes:
 
 
 def require_regular(path: Path) -> None:
-    """Raise an error if a path is not a regular file.
-
-    Raises
-    ------
-    FileNotFoundError, PermissionError
-        As raised by the system.
-    FileFormatError
-        The message says what the path is instead.
-    """
+    """Raise an error if a path is not a regular file."""
     mode = path.stat().st_mode
     if not stat.S_ISREG(mode):
         kinds = {
@@ -80,12 +64,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
     So no reader ever sees half of the file.
 
-    Raises
-    ------
-    OSError
-        If the system cannot write there.
-    FileFormatError
-        If `path` exists and is not a regular file.
+    Raise FileFormatError if `path` exists and is not a regular file.
     """
     replaced = path.exists()
     if replaced:

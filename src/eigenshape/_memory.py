@@ -46,11 +46,6 @@ def require_memory(
         Largest share of the memory of the machine.
     error : type
         Class of the error.
-
-    Raises
-    ------
-    InvalidParameterError or InvalidShapeError
-        With the size of each part.
     """
     available = available_memory(share)
     if sum(sizes.values()) > available:

@@ -9,10 +9,7 @@ from eigenshape._errors import MissingExtraError
 def studio_module(name: str) -> ModuleType:
     """Return a module of the studio.
 
-    Raises
-    ------
-    MissingExtraError
-        If the studio, or what this module needs, is not installed.
+    Raise MissingExtraError if the studio, or what this module needs, is not installed.
     """
     try:
         return import_module(f"eigenshape_studio.{name}")

@@ -8,13 +8,14 @@ from contextlib import contextmanager
 from functools import cache
 from itertools import pairwise
 from threading import Lock, local
-from typing import Any, Generic, SupportsIndex, TypeVar
+from typing import Any, Generic, TypeVar
 
 import scipy.linalg  # noqa: F401  SciPy's BLAS must be loaded before libraries are looked for
 from threadpoolctl import ThreadpoolController
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import Integer
 
 VARIABLE = "EIGENSHAPE_NUM_THREADS"
 
@@ -22,7 +23,7 @@ A = TypeVar("A")
 R = TypeVar("R")
 
 
-def set_threads(n: SupportsIndex | None) -> int:
+def set_threads(n: Integer | None) -> int:
     """Set how many threads a computation may use.
 
     Results do not depend on the number, to the last digit: the work is divided in the same way for

@@ -150,10 +150,7 @@ def run_in_workers(
     A new process must be able to import `work` by name. Close the generator to stop all workers at
     once.
 
-    Raises
-    ------
-    EigenshapeError
-        If no worker can start, as in a script without a main guard.
+    Raise EigenshapeError if no worker can start, as in a script without a main guard.
     """
     if workers.executor is not None:
         yield from _run_in_executor(work, items, workers.executor, workers)

@@ -13,7 +13,7 @@ from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.choices import Condition
-from eigenshape.spectral.laws.report import Promise
+from eigenshape.spectral.laws.outcomes import Promise
 
 __all__ = [
     "Condition",

@@ -9,9 +9,8 @@ import time
 import numpy as np
 import pytest
 from describers import keep
-from typer.testing import CliRunner
+from running import run, run_json
 
-from eigenshape.cli import app
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -29,16 +28,6 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where a back
 from eigenshape_command import main
 main()
 """
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output
-    return done
-
-
-def run_json(*arguments, code=0):
-    return json.loads(run(*arguments, "--json", code=code).stdout)
 
 
 @pytest.fixture
@@ -69,23 +58,6 @@ def database(zoo, tmp_path_factory):
     assert "broken: " in done.output
     assert "vertex 2 is [2.0, 0.0, nan]" in done.output
     return db
-
-
-def test_help_names_the_verbs():
-    text = run("--help").stdout
-    for verb in (
-        "info",
-        "spectrum",
-        "operators",
-        "features",
-        "segment",
-        "label",
-        "index",
-        "query",
-        "demo",
-    ):
-        assert verb in text
-        assert "--help" in run(verb, "--help").stdout
 
 
 def test_info(sphere):
@@ -130,8 +102,8 @@ def test_spectrum(sphere, tmp_path):
     options = (
         "-k",
         9,
-        "--mass",
-        "averaged",
+        "--set",
+        "mass=averaged",
         "--picture",
         plot,
         "--eigenfunctions",
@@ -250,10 +222,6 @@ def test_errors_are_one_line_and_exit_code_1(sphere, arguments, message):
         (("spectrum", "{sphere}", "-k", "0"), "k must lie in 1..162; it is 0"),
         (("spectrum", "{sphere}", "--picture", "plot.bmp"), "A picture must end in"),
         (
-            ("features", "{sphere}", "--method", "best"),
-            "--method takes scale-free, thesis; it is 'best'",
-        ),
-        (
             ("info", "{sphere}", "--repair", "everything"),
             "Names of --repair must be among auto, drop_missing, weld",
         ),
@@ -339,8 +307,8 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
 
 @pytest.mark.long
 def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch):
-    monkeypatch.setattr("eigenshape.cli.steps.heat.LARGE", 1000)
-    monkeypatch.setattr("eigenshape.spectral.multilevel.start.COARSENED", 5)
+    monkeypatch.setattr("eigenshape.cli.steps.parts.LARGE", 1000)
+    monkeypatch.setattr("eigenshape.spectral.multilevel.approximate.COARSENED", 5)
     path = tmp_path / "large.ply"
     write_mesh(make_creature("hand", n_vertices=2500), path)
     assert (

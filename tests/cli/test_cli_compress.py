@@ -4,16 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from running import run
 
 import eigenshape as es
-from eigenshape.cli import app
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output
-    return done
 
 
 @pytest.fixture

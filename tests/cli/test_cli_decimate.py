@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from test_cli import run, run_json
+from running import run, run_json
 
-from eigenshape.io.labels import read_labels
+from eigenshape.io.labeled_shapes import read_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.shapes.surfaces import icosphere
 
@@ -22,7 +22,7 @@ def ball(tmp_path):
 
 def test_colors_and_labels_go_along(ball, tmp_path):
     output = tmp_path / "small.ply"
-    done = run("decimate", ball, "--faces", 200, "-o", output)
+    done = run("decimate", ball, "-n", 200, "-o", output)
     assert "decimate kept 200 of 1,280 faces and 102 of 642 vertices" in done.stdout
     small, attributes = read_mesh(output, attributes=True)
     red = np.zeros(small.n_vertices, dtype=np.uint8)
@@ -42,8 +42,8 @@ def test_the_report_is_json_too(ball, tmp_path):
 
 
 def test_what_is_asked_must_be_one_number(ball, tmp_path):
-    for options in ((), ("--faces", 9, "--ratio", 0.5)):
+    for options in ((), ("-n", 9, "--ratio", 0.5)):
         done = run("decimate", ball, *options, "-o", tmp_path / "small.ply", code=2)
-        assert "must be given by one of --faces and --ratio" in done.stderr
-    done = run("decimate", ball, "--faces", 5000, "-o", tmp_path / "small.ply", code=2)
+        assert "must be given by one of --n-faces and --ratio" in done.stderr
+    done = run("decimate", ball, "-n", 5000, "-o", tmp_path / "small.ply", code=2)
     assert "n_faces must lie in 4..1279; it is 5000" in done.stderr

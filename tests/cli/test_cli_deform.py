@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from running import run
 
-from eigenshape.cli import app
-from eigenshape.cli.steps.regions import parse_region, parse_rotation, parse_translation
+from eigenshape.cli.deform import parse_region, parse_rotation
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.region import BoxRegion, BrushRegion, region_boundary, region_mask
@@ -20,12 +19,6 @@ from eigenshape.shapes.creatures import make_creature
 
 PNG = b"\x89PNG\r\n\x1a\n"
 QUIET = lambda share, what: None  # noqa: E731
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output
-    return done
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +130,7 @@ def test_words_for_regions(giraffe, tmp_path):
     assert parse_region("vertex 7 within 0.25", mesh, QUIET).radius == 0.25
     listed = tmp_path / "some.txt"
     listed.write_text("3\n1\n4\n")
-    assert parse_region(str(listed), mesh, QUIET).tolist() == [3, 1, 4]
+    assert parse_region(str(listed), mesh, QUIET) == [3, 1, 4]
     n_parts = len(find_parts(mesh).parts.features.vertices)
     masks = [
         region_mask(mesh, parse_region(f"part {number}", mesh, QUIET)) for number in range(n_parts)
@@ -155,7 +148,6 @@ def test_words_for_handles(giraffe):
     rim = region_boundary(mesh, region_mask(mesh, region))
     np.testing.assert_allclose(turn.pivot, mesh.vertices[rim].mean(axis=0))
     np.testing.assert_allclose(parse_rotation("z by 720 @ 1,2,3", mesh, region).pivot, [1, 2, 3])
-    np.testing.assert_allclose(parse_translation("0, -1e-1 ,2").vector, [0, -0.1, 2])
 
 
 @pytest.mark.parametrize(
@@ -191,14 +183,14 @@ def test_words_for_handles(giraffe):
         ),
         (
             ["--region", "y>70%", "--move", "0,1,0", "--mode", "soft"],
-            "mode must be 'graded', 'uncrossed'",
+            "'soft' is not one of 'graded', 'uncrossed'",
         ),
         (["--region", "y>70%", "--move", "0,1,0", "-n", "999"], "n_modes must lie in 1"),
     ],
 )
 def test_what_is_wrong_is_named(giraffe, words, message):
     done = run("deform", giraffe, *words, code=2)
-    assert message in " ".join(done.stderr.split())
+    assert message in " ".join(done.stderr.replace("│", " ").split())
 
 
 def test_a_list_that_is_none_is_named(giraffe, tmp_path):

@@ -5,22 +5,14 @@ import shutil
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from running import run
 
-from eigenshape.cli import app
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.labeled_shapes import read_labeled_shape
-from eigenshape.io.labels import read_labels, write_labels
+from eigenshape.io.labeled_shapes import read_labeled_shape, read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.retrieval.labels.transfer import transfer_labels
 from eigenshape.shapes.creatures import make_creature
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output
-    return done
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +126,7 @@ def test_label_takes_what_segment_prints(poses, tmp_path):
         (("--labels", "{bad}", "--picture", "a.bmp"), "A picture must end in"),
         (
             ("--labels", "{bad}", "-o", "a.off"),
-            "written to a file that ends in .ply, .glb, .obj, .seg, .txt; a.off ends in '.off'",
+            "written to a file that ends in .obj, .ply, .glb, .seg, .txt; a.off ends in '.off'",
         ),
         (
             ("--labels", "{bad}", "-o", "{bad}/no/a.seg"),

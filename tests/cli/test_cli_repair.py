@@ -5,14 +5,13 @@ import json
 import meshio
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from running import run
 
 from eigenshape import TriangleMesh, deform, read_mesh, read_shape, repair, rig_shape, write_mesh
-from eigenshape.cli import app
 from eigenshape.deformation.handles import Translation
 from eigenshape.geometry.repairs.repair import REPAIRS
 from eigenshape.io.folders import find_items
-from eigenshape.io.labels import read_labels
+from eigenshape.io.labeled_shapes import read_labels
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.spheres import icosphere
 
@@ -20,12 +19,6 @@ BALL = icosphere(2)
 SOUP = TriangleMesh(
     BALL.vertices[BALL.faces].reshape(-1, 3), np.arange(3 * BALL.n_faces).reshape(-1, 3)
 )
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output
-    return done
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".off", ".obj", ".stl", ".glb"])

@@ -13,9 +13,8 @@ from broken_meshes import (
     with_loose_points,
     with_specks,
 )
-from typer.testing import CliRunner
+from running import run
 
-from eigenshape.cli import app
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import write_mesh
@@ -23,12 +22,6 @@ from eigenshape.io.shape_files import write_points
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output + done.stderr
-    return done
 
 
 def info(path, *options):

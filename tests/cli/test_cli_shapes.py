@@ -4,9 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from running import run, run_json
 
-from eigenshape.cli import app
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.io.shape_files import write_points
@@ -15,16 +14,6 @@ from eigenshape.shapes.domains import box, disc
 from eigenshape.shapes.exact import box_eigenvalues, disc_eigenvalues
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output + done.stderr
-    return done
-
-
-def run_json(*arguments):
-    return json.loads(run(*arguments, "--json").stdout)
 
 
 @pytest.fixture(scope="module")
@@ -89,20 +78,34 @@ def test_spectra_by_other_operators(folder):
     )
     np.testing.assert_allclose(drum["eigenvalues"], disc_eigenvalues(4, "dirichlet"), rtol=0.01)
     points = run_json(
-        "spectrum", folder / "sphere.xyz", "-k", 4, "--correct", "log", "--edge-factor", 1.8
+        "spectrum",
+        folder / "sphere.xyz",
+        "-k",
+        4,
+        "--set",
+        "correct=log",
+        "--set",
+        "edge_factor=1.8",
     )
     np.testing.assert_allclose(points["eigenvalues"], [0, 2, 2, 2], rtol=0.03, atol=1e-9)
     assert points["operator"] == "point-cloud"
     assert points["edge_factor"] == 1.8
     usual, thesis = (
         run_json("spectrum", folder / "sphere.xyz", "-k", 4, *options)
-        for options in ((), ("--correct", "none", "--form", "literal"))
+        for options in ((), ("--set", "correct=none", "--set", "form=literal"))
     )
     np.testing.assert_allclose(usual["eigenvalues"], [0, 2, 2, 2], rtol=0.03, atol=1e-9)
     assert (thesis["correct"], thesis["form"]) == (None, "literal")
     assert thesis["eigenvalues"][3] < 0.99 * usual["eigenvalues"][3]  # the bias of the kernel
     tufted = run_json(
-        "spectrum", folder / "sphere.xyz", "-k", 4, "--operator", "robust", "--n-neighbors", 20
+        "spectrum",
+        folder / "sphere.xyz",
+        "-k",
+        4,
+        "--operator",
+        "robust",
+        "--set",
+        "n_neighbors=20",
     )
     np.testing.assert_allclose(tufted["eigenvalues"], [0, 2, 2, 2], rtol=0.05, atol=1e-9)
 
@@ -163,10 +166,23 @@ def test_a_plot_of_any_spectrum(folder, tmp_path):
 
 
 def test_operators_are_listed():
-    assert run_json("operators").keys() == OPERATORS.keys()
+    found = run_json("operators")
+    assert {name: tuple(entry["options"]) for name, entry in found.items()} == {
+        name: entry.options for name, entry in OPERATORS.items()
+    }
+    assert found["mesh"]["options"]["t"] == ["NUMBER", "pointwise", "none"]
     text = run("operators").stdout
     assert "Gaussian kernel, weighted by volumes" in text
-    assert "for triangles, points; --mollify --n-neighbors" in text
+    assert "for triangles, points" in text
+    assert "--set mass=lumped|consistent|averaged|none" in text
+
+
+def test_an_operator_is_explained():
+    text = run("operators", "mesh").stdout
+    assert "--set correct=log|none" in text
+    assert "Distance in the kernel. Geodesic distance (on surfaces) does not leak" in text
+    assert "cotangent" not in text
+    assert "NAME must be one of cotangent, p2" in run("operators", "best", code=2).stderr
 
 
 @pytest.mark.parametrize(
@@ -178,9 +194,31 @@ def test_operators_are_listed():
         ),
         (("spectrum", "disc.off", "--operator", "best"), "operator must be one of cotangent, p2"),
         (
-            ("spectrum", "disc.off", "--operator", "p2", "--mass", "lumped"),
-            "p2 operator takes no options; the option mass was given",
+            ("spectrum", "disc.off", "--operator", "p2", "--set", "mass=lumped"),
+            "the p2 operator has the options none, and it is 'mass=lumped'",
         ),
+        (
+            ("spectrum", "disc.off", "--set", "masses=lumped"),
+            "the cotangent operator has the options mass, and it is 'masses=lumped'",
+        ),
+        (
+            ("spectrum", "disc.off", "--set", "mass"),
+            "--set takes NAME=VALUE; the cotangent operator has",
+        ),
+        (
+            ("spectrum", "disc.off", "--set", "mass=heavy"),
+            "--set gives an option one of its values; those of mass are lumped, consistent, "
+            "averaged, none, and it is 'heavy'",
+        ),
+        (
+            ("spectrum", "sphere.xyz", "--set", "t=wide"),
+            "those of t are NUMBER, none, and it is 'wide'",
+        ),
+        (
+            ("spectrum", "sphere.xyz", "--operator", "robust", "--set", "n_neighbors=2.5"),
+            "those of n_neighbors are NUMBER, none, and it is '2.5'",
+        ),
+        (("spectrum", "disc.off", "--operator", "best", "--set", "t=1"), "operator must be one of"),
         (
             ("spectrum", "sphere.xyz", "--boundary", "dirichlet"),
             "--boundary dirichlet is for meshes; a point cloud",
@@ -237,7 +275,7 @@ def test_faces_at_missing_vertices_are_left_out_when_asked(tmp_path):
 
 
 def test_a_warning_is_one_line_and_no_error(folder):
-    done = run("spectrum", folder / "sphere.xyz", "-k", 3, "--edge-factor", 1.2, "--json")
+    done = run("spectrum", folder / "sphere.xyz", "-k", 3, "--set", "edge_factor=1.2", "--json")
     assert done.stderr.startswith("warning: A kernel of width h = 1.2 e suits regular points only")
     assert len(done.stderr.strip().splitlines()) == 1
     assert len(json.loads(done.stdout)["eigenvalues"]) == 3

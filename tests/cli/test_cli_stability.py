@@ -4,19 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from running import run
 
 import eigenshape as es
-from eigenshape.cli import app
 
 PNG = b"\x89PNG\r\n\x1a\n"
 FEW = ("-k", "6", "-n", "200")
-
-
-def run(*arguments, code=0):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert done.exit_code == code, done.output
-    return done
 
 
 @pytest.fixture(scope="module")
@@ -81,9 +74,9 @@ def test_a_map_and_a_scale_can_be_given(folder):
         folder / "one.ply",
         folder / "two.ply",
         *FEW,
-        "--scale",
+        "--normalize",
         "area",
-        "--t",
+        "-t",
         "0.01",
         "--json",
     )
@@ -104,8 +97,8 @@ def test_what_cannot_be_compared_is_named(folder, tmp_path):
     points = tmp_path / "points.xyz"
     np.savetxt(points, np.random.default_rng(0).random((300, 3)))
     assert (
-        "--scale is for triangle meshes"
-        in run("stability", points, one, "--scale", "area", code=2).stderr
+        "--normalize is for triangle meshes"
+        in run("stability", points, one, "--normalize", "area", code=2).stderr
     )
     assert "A picture must end" in run("stability", one, one, "--picture", "a.gif", code=2).stderr
     assert run("stability", one, code=2)

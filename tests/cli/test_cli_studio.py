@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 import eigenshape as es
-from eigenshape.cli.app import app
+from eigenshape.cli import app
 
 
 def run(*arguments):

@@ -1,7 +1,7 @@
 """Shapes of a few points through every verb: no default may ask for more than there is."""
 
 import pytest
-from test_cli import run, run_json
+from running import run, run_json
 
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh

@@ -79,7 +79,7 @@ def herd(tmp_path):
     ("module", "said"),
     [
         ("typer", "stopped\n"),
-        ("eigenshape.cli.app", "stopped\n"),
+        ("eigenshape.cli.verbs", "stopped\n"),
         ("numba", "stopped; what was finished is kept\n"),  # the verb has begun
     ],
 )

@@ -1,22 +1,23 @@
+from importlib import import_module
+
 import numpy as np
 import pytest
 from bent_shapes import bumpy, lump, lump_rig, tube, tube_rig
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.deformation import graded_bend
 from eigenshape.deformation.binding import bind
-from eigenshape.deformation.deform import bend, deform, require_mode
-from eigenshape.deformation.details import (
-    blend_details,
-    frame_details,
-    turn_by_frames,
-    turn_by_handles,
-)
-from eigenshape.deformation.graded_bend import move_by_shares
+from eigenshape.deformation.deform import bend, deform, move_by_shares, require_mode
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import region_boundary
 from eigenshape.deformation.rig import eigen_skeleton, rig_shape
-from eigenshape.deformation.skeleton import move_skeleton, skeleton_response
+from eigenshape.deformation.thesis import (
+    blend_details,
+    frame_details,
+    move_skeleton,
+    skeleton_response,
+    turn_by_frames,
+    turn_by_handles,
+)
 from eigenshape.geometry.distances.crossings import self_intersections
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -334,7 +335,8 @@ def test_no_pull_is_tried_if_all_pairs_cross_with_an_infinite_one_too(bar, monke
     upper = both.vertices[:, 2] >= 3
     upper[bar.mesh.n_vertices :] = False
     binding = bind(rig_shape(both), [upper], n_modes=20)
-    monkeypatch.setattr(graded_bend, "pull_binding", None)  # a call would raise an error
+    module = import_module("eigenshape.deformation.deform")
+    monkeypatch.setattr(module, "pull_binding", None)  # a call would raise an error
     with pytest.warns(UserWarning, match="Faces cross at every strength"):
         bend(binding, [Translation([0, 0, 1])], mode="uncrossed")
 

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation as Turn
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.deformation import rigidity
 from eigenshape.deformation.binding import bind
-from eigenshape.deformation.graded_bend import bend_graded, move_by_shares, quaternions
+from eigenshape.deformation.deform import bend_graded, move_by_shares, quaternions
 from eigenshape.deformation.handles import Rotation
 from eigenshape.deformation.rigidity import (
     edge_weights,

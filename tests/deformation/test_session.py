@@ -6,14 +6,13 @@ import pytest
 from bent_shapes import lump, lump_rig
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape.deformation.deform import deform
+from eigenshape.deformation.deform import deform, move_by_shares
 from eigenshape.deformation.edits import Edit, Move
-from eigenshape.deformation.graded_bend import move_by_shares
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import BoxRegion, BrushRegion
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import DeformationSession, replay
-from eigenshape.deformation.skeleton import move_skeleton
+from eigenshape.deformation.thesis import move_skeleton
 from eigenshape.geometry.resolution.subdivision import subdivide
 
 HEAD = np.flatnonzero(lump().vertices[:, 0] > 0.6)

@@ -239,7 +239,7 @@ def test_a_ragged_boundary_becomes_straight():
 
 def network_of(mesh):
     tensors = curvature_tensors(mesh, boundaries.CONCAVITY, concave=True)
-    return boundaries._build_network(mesh, tensors)
+    return boundaries.build_network(mesh, tensors)
 
 
 def test_a_coarse_cut_that_is_refined_costs_hardly_more(monkeypatch):

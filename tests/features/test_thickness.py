@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from eigenshape.features.thickness import inscribed_radii
+from eigenshape.features.part_contrast import inscribed_radii
 from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.shapes.surfaces import icosphere

@@ -10,7 +10,7 @@ from eigenshape.geometry.orientation import orient_outward, outward_vote
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_steps import orient
 from eigenshape.geometry.union import disjoint_union
-from eigenshape.operators.curvature import mean_curvature
+from eigenshape.operators.cotangent import mean_curvature
 from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.scans.partial import (
     cut_by_planes,

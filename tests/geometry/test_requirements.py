@@ -19,7 +19,7 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.curvature import gaussian_curvature
-from eigenshape.geometry.distances.average_distance import average_geodesic_distance
+from eigenshape.geometry.distances.geodesic import average_geodesic_distance
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import REPAIRS, repair
 from eigenshape.geometry.requirements import require_joined

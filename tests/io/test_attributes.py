@@ -13,9 +13,9 @@ from PIL import Image
 import eigenshape as es
 from eigenshape import FileFormatError, InvalidParameterError
 from eigenshape.io.attributes import linear_colors, plain_attributes, screen_colors
-from eigenshape.io.glb import pack, read_gltf
+from eigenshape.io.formats.gltf import pack, read_gltf
+from eigenshape.io.formats.obj import read_sheet
 from eigenshape.io.mesh_files import save_mesh
-from eigenshape.io.obj_sheet import read_sheet
 
 PNG = io.BytesIO()
 Image.fromarray(np.arange(192, dtype=np.uint8).reshape(8, 8, 3)).save(PNG, "PNG")

@@ -63,8 +63,9 @@ def test_no_face_of_a_decimated_ball_runs_over_the_seam():
 def test_decimate_keeps_textures(tmp_path, suffix, target):
     save_mesh(BALL, tmp_path / f"a{suffix}", attributes=textured_ball())
     path = tmp_path / f"b{target}"
-    done = run("decimate", tmp_path / f"a{suffix}", "--faces", 300, "-o", path)
-    assert ("materials, images" in done.stderr) == (target == ".ply" != suffix)
+    done = run("decimate", tmp_path / f"a{suffix}", "-n", 300, "-o", path)
+    assert ("materials" in done.stderr) == (target == ".ply" != suffix)
+    assert "images" not in done.stderr
     mesh, found = es.read_mesh(path, attributes=True)
     # In GLB vertices are double along the seam; the surface itself has not come apart there.
     assert es.geometry.is_closed(es.repair(mesh, ["weld"]).mesh)
@@ -110,7 +111,7 @@ def test_fields_go_along(tmp_path, suffix):
     es.io.write_fields(BALL, tmp_path / "a.vtu", fields)
     fewer, smaller, last = (tmp_path / f"{name}{suffix}" for name in "bcd")
     run("repair", tmp_path / "a.vtu", "--repair", "orient", "-o", fewer)
-    run("decimate", fewer, "--faces", 300, "-o", smaller)
+    run("decimate", fewer, "-n", 300, "-o", smaller)
     run("repair", smaller, "-o", last)
     mesh, found = es.read_mesh(last, attributes=True)
     np.testing.assert_allclose(found.fields["height"], mesh.vertices[:, 2], atol=0.03)
@@ -174,9 +175,30 @@ def test_ply_takes_its_image_along(tmp_path):
     (tmp_path / "grain.png").write_bytes(PNG)
     mesh, attributes = es.read_mesh(tmp_path / "a.ply", attributes=True)
     assert attributes.others == ("flags of face",)
-    assert "materials, images" in save_mesh(mesh, tmp_path / "b.ply", attributes=attributes)
     save_mesh(mesh, tmp_path / "b.glb", attributes=attributes)
     assert es.read_mesh(tmp_path / "b.glb", attributes=True)[1].materials[0].image == PNG
+
+
+def test_ply_in_another_folder_takes_its_image_along(tmp_path):
+    (tmp_path / "a.ply").write_text(PLY)
+    (tmp_path / "grain.png").write_bytes(PNG)
+    mesh, attributes = es.read_mesh(tmp_path / "a.ply", attributes=True)
+    far = tmp_path / "far"
+    far.mkdir()
+    for folder in (tmp_path, far):
+        lost = save_mesh(mesh, folder / "b.ply", attributes=attributes)
+        assert lost == "b.ply does not keep: flags of face."
+        again = es.read_mesh(folder / "b.ply", attributes=True)[1]
+        assert again.materials == attributes.materials
+    assert sorted(path.name for path in far.iterdir()) == ["b.ply", "grain.png"]
+    (far / "grain.png").write_bytes(b"another image")  # which stays as it is
+    save_mesh(mesh, far / "b.ply", binary=False, attributes=attributes)
+    assert es.read_mesh(far / "b.ply", attributes=True)[1].materials[0].image == PNG
+    assert (far / "grain.png").read_bytes() == b"another image"
+    named = replace(attributes, materials=(Material("oak", image=PNG, image_name="x.png"),))
+    assert "keep: flags of face, materials." in save_mesh(mesh, far / "c.ply", attributes=named)
+    mixed = replace(named, face_materials=np.array([0, -1]))
+    assert "materials, images." in save_mesh(mesh, far / "d.ply", attributes=mixed)
 
 
 def test_ply_wedges(tmp_path):
@@ -285,11 +307,15 @@ EXPORTS = [
 ]  # fmt: skip
 
 
+# Bending and cutting write files in the same way as repairs, so two files are enough there.
+PAIRS = [(verb, *file) for verb in ("repair", "decimate") for file in EXPORTS]
+PAIRS += [(verb, *file) for verb in ("deform", "segment") for file in EXPORTS[:3:2]]
+
+
 @pytest.mark.parametrize(
-    ("name", "export", "kind"), EXPORTS, ids=lambda value: getattr(value, "__name__", value)
+    ("verb", "name", "export", "kind"), PAIRS, ids=lambda value: getattr(value, "__name__", value)
 )
-@pytest.mark.parametrize("verb", VERBS)
-def test_files_of_exporters_keep_their_looks(tmp_path, name, export, kind, verb):
+def test_files_of_exporters_keep_their_looks(tmp_path, verb, name, export, kind):
     path = tmp_path / name
     export(path, kind)
     before = es.read_mesh(path, attributes=True)[1]

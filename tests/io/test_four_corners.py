@@ -14,8 +14,8 @@ from eigenshape import (
     read_mesh,
     read_shape,
 )
-from eigenshape.io.cells import four_cornered, require_kind
-from eigenshape.io.obj import parse as parse_obj
+from eigenshape.io.formats.cells import four_cornered, require_kind
+from eigenshape.io.formats.obj import parse as parse_obj
 from eigenshape.shapes.domains import box
 
 CUBE = box(3, 2, 2)

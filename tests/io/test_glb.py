@@ -9,8 +9,7 @@ from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES, read
 
 from eigenshape import FileFormatError, InvalidShapeError, read_mesh, write_mesh
 from eigenshape.geometry import enclosed_volume
-from eigenshape.io.glb import parse
-from eigenshape.io.gltf import Gltf, place_triangles
+from eigenshape.io.formats.gltf import Gltf, parse, place_triangles
 
 GOOD = FILES["glb"][1]
 

@@ -12,7 +12,7 @@ from test_glb import unpacked
 from tetrahedra import FACES, VERTICES
 
 from eigenshape import EigenshapeError, FileFormatError, read_mesh, read_shape
-from eigenshape.io.glb import parse
+from eigenshape.io.formats.gltf import parse
 
 TREE, BINARY = unpacked()
 

@@ -6,8 +6,8 @@ from eigenshape.io.labeled_shapes import (
     read_label_names,
     read_labeled_shape,
     read_labeled_shapes,
+    write_labels,
 )
-from eigenshape.io.labels import write_labels
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.shapes.surfaces import icosphere
 

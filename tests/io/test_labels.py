@@ -4,7 +4,7 @@ import trimesh
 from tetrahedra import TETRAHEDRON
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape.io.labels import read_labels, write_labels
+from eigenshape.io.labeled_shapes import read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 
 
@@ -111,7 +111,7 @@ def test_labels_of_polygons_are_those_of_their_triangles(tmp_path):
 def test_labels_that_do_not_fit_are_refused(tmp_path):
     with pytest.raises(
         InvalidParameterError,
-        match=r"face_labels must be \(4,\) and go to \.ply, \.glb, \.obj; .* go to \.off",
+        match=r"face_labels must be \(4,\) and go to \.obj, \.ply, \.glb; .* go to \.off",
     ):
         write_mesh(TETRAHEDRON, tmp_path / "a.off", face_labels=np.zeros(4, int))
     with pytest.raises(

@@ -3,7 +3,7 @@ import pytest
 from tetrahedra import FACES, VERTICES
 
 from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh
-from eigenshape.io.obj import parse
+from eigenshape.io.formats.obj import parse
 
 POINTS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
 TRIANGLES = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"

@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigenshape import FileFormatError, TriangleMesh
+from eigenshape import FileFormatError, TriangleMesh, read_mesh, write_mesh
 from eigenshape.geometry.repairs.repair import REPAIRS, repair
 from eigenshape.io.attributes import plain_attributes
-from eigenshape.io.obj import parse
-from eigenshape.io.obj_sheet import format_sheet, read_sheet
+from eigenshape.io.carrying import carry_attributes
+from eigenshape.io.formats.obj import parse, read_sheet
+from eigenshape.io.formats.obj_attributes import format_sheet
 
 CUBE = b"""# a cube, its last vertex twice, and one that nothing uses
 mtllib cube#1.mtl
@@ -42,8 +43,10 @@ p 1
 """
 
 
-def rewrite(sheet, mesh, moved=None):
-    return format_sheet(sheet, plain_attributes(mesh), mesh.vertices if moved is None else moved)
+def rewrite(data, mesh, moved=None):
+    read = plain_attributes(TriangleMesh(*parse(data)))
+    written = mesh if moved is None else TriangleMesh(moved, mesh.faces)
+    return format_sheet(read_sheet(data), carry_attributes(read, mesh), written)
 
 
 def turned(faces):
@@ -57,7 +60,7 @@ def lines(data, keyword):
 
 def test_a_file_that_nothing_changes_keeps_what_it_says():
     vertices, faces = parse(CUBE)
-    found = rewrite(read_sheet(CUBE), TriangleMesh(vertices, faces))
+    found = rewrite(CUBE, TriangleMesh(vertices, faces))
     assert lines(found, "f") == [
         "f 1/1 4/4 3/3 2/2", "f 5/1/1 6/2/2 7/3/3 9/4/4", "f 1//5 2//6 6//2 5//1",
         "f 2/1 3/2 7/3 6/4", "f 3 4 8 7", "f 4/1 1/2 5/3 9/4",
@@ -73,14 +76,14 @@ def test_a_file_that_nothing_changes_keeps_what_it_says():
 def test_vertices_move_and_polygons_stay():
     vertices, faces = parse(CUBE)
     moved = vertices * 2.5 + np.array([1, 2, 3])
-    found = rewrite(read_sheet(CUBE), TriangleMesh(vertices, faces), moved)
+    found = rewrite(CUBE, TriangleMesh(vertices, faces), moved)
     np.testing.assert_array_equal(parse(found)[0], moved)
     assert lines(found, "f")[0] == "f 1/1 4/4 3/3 2/2"
 
 
 def test_welded_and_dropped_vertices_are_renumbered():
     mesh = repair(TriangleMesh(*parse(CUBE)), ["weld", "drop_unreferenced"]).mesh
-    found = rewrite(read_sheet(CUBE), mesh)
+    found = rewrite(CUBE, mesh)
     assert len(lines(found, "v")) == 8
     assert lines(found, "f") == [
         "f 1/1 4/4 3/3 2/2", "f 5/1/1 6/2/2 7/3/3 8/4/4", "f 1//5 2//6 6//2 5//1",
@@ -91,16 +94,28 @@ def test_welded_and_dropped_vertices_are_renumbered():
 def test_polygons_turn_over_shrink_to_triangles_and_holes_are_sealed():
     vertices, faces = parse(CUBE)
     flipped = np.vstack([faces[:2, ::-1], faces[2:]])
-    assert (
-        lines(rewrite(read_sheet(CUBE), TriangleMesh(vertices, flipped)), "f")[0]
-        == "f 1/1 2/2 3/3 4/4"
-    )
-    half = rewrite(read_sheet(CUBE), TriangleMesh(vertices, np.vstack([faces[1:], [[0, 1, 9]]])))
+    assert lines(rewrite(CUBE, TriangleMesh(vertices, flipped)), "f")[0] == "f 1/1 2/2 3/3 4/4"
+    half = rewrite(CUBE, TriangleMesh(vertices, np.vstack([faces[1:], [[0, 1, 9]]])))
     assert lines(half, "f")[0] == "f 1/1 3/3 2/2"
     assert lines(half, "f")[-1] == "f 1 2 10"
     one_turned = np.vstack([faces[:1, ::-1], faces[1:]])
-    assert lines(rewrite(read_sheet(CUBE), TriangleMesh(vertices, one_turned)), "f")[:2] == [
+    assert lines(rewrite(CUBE, TriangleMesh(vertices, one_turned)), "f")[:2] == [
         "f 1/1 3/3 4/4", "f 1/1 3/3 2/2",
+    ]  # fmt: skip
+
+
+def test_faces_at_one_place_keep_their_own_materials(tmp_path):
+    """A label on a wall: two equal faces of two materials, beside a face that is dropped."""
+    path = tmp_path / "wall.obj"
+    path.write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nusemtl none\nf 2 4 3\nusemtl wall\nf 1 2 3\n"
+        "usemtl label\nf 1 2 3\n"
+    )
+    mesh, attributes = read_mesh(path, attributes=True)
+    kept = TriangleMesh(mesh.vertices[:3], mesh.faces[1:])
+    write_mesh(kept, tmp_path / "b.obj", attributes=carry_attributes(attributes, kept))
+    assert (tmp_path / "b.obj").read_text().splitlines()[3:] == [
+        "usemtl none", "usemtl wall", "f 1 2 3", "usemtl label", "f 1 2 3",
     ]  # fmt: skip
 
 
@@ -125,7 +140,7 @@ def test_what_is_written_reads_back_as_the_mesh_whatever_was_repaired(data):
             mesh = repair(mesh, [name]).mesh
         except ValueError:  # no face was left
             return
-    found = rewrite(read_sheet(text.encode()), mesh)
+    found = rewrite(text.encode(), mesh)
     vertices, faces = parse(found)
     np.testing.assert_array_equal(vertices, mesh.vertices)
     assert turned(faces) == turned(mesh.faces)
@@ -140,7 +155,7 @@ def test_real_files_come_back(data):
             mesh = TriangleMesh(*parse(text))
         except ValueError:
             continue
-        found = rewrite(read_sheet(text), mesh)
+        found = rewrite(text, mesh)
         np.testing.assert_array_equal(parse(found)[0], mesh.vertices)
         np.testing.assert_array_equal(parse(found)[1], mesh.faces)
         assert len(lines(found, "f")) == len(read_sheet(text).polygons)

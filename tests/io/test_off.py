@@ -3,7 +3,7 @@ import pytest
 from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES
 
 from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh
-from eigenshape.io.off import parse
+from eigenshape.io.formats.off import parse
 
 ROWS = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"
 COLUMNS = "0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 9 9 9\n0 0 1 9 9 9\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"

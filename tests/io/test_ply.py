@@ -5,7 +5,7 @@ import pytest
 from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES
 
 from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh
-from eigenshape.io.ply import format_binary, format_text, parse
+from eigenshape.io.formats.ply import format_binary, format_text, parse
 
 HEADER = """ply
 format {order} 1.0

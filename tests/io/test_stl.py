@@ -3,7 +3,7 @@ import pytest
 from tetrahedra import FILES, TETRAHEDRON, read
 
 from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh
-from eigenshape.io.stl import format_binary, format_text, parse, single_precision
+from eigenshape.io.formats.stl import format_binary, format_text, parse, single_precision
 
 TEXT = FILES["stl text"][1].decode()
 BINARY = FILES["stl binary"][1]

@@ -6,7 +6,7 @@ from pyvista import _vtk
 from test_declarations import XML
 
 from eigenshape import FileFormatError
-from eigenshape.io.vtu import parse
+from eigenshape.io.formats.vtu import parse
 from eigenshape.shapes.domains import box
 
 CUBE = box(2, 1, 1)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io import glb, glb_attributes, obj, obj_attributes, off, ply, stl
 from eigenshape.io.attributes import plain_attributes
+from eigenshape.io.formats import gltf, gltf_attributes, obj, obj_attributes, off, ply, stl
 
 VERTICES = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
@@ -48,11 +48,11 @@ STRIP = ply.format_text(TETRAHEDRON).replace(b"element face 4", b"element tristr
 STRIP = STRIP[: STRIP.index(b"3 0 2 1")] + b"6 0 2 1 3 0 2\n"
 
 FILES = {
-    "off": (off.parse, off.format_mesh(TETRAHEDRON)),
+    "off": (off.parse, off.format_text(TETRAHEDRON)),
     "off binary": (off.parse, OFF_BINARY),
     "off broken": (
         off.parse,
-        off.format_mesh(TETRAHEDRON)
+        off.format_text(TETRAHEDRON)
         .replace(b" 2 1\n3", b"\n2 1 3")
         .replace(b"0.0 1.0", b"0.0\n1.0"),
     ),
@@ -63,7 +63,7 @@ FILES = {
     "ply strip": (ply.parse, STRIP),
     "stl text": (stl.parse, stl.format_text(TETRAHEDRON)),
     "stl binary": (stl.parse, stl.format_binary(TETRAHEDRON)),
-    "glb": (glb.parse, glb_attributes.write_new(PLAIN, TETRAHEDRON)),
+    "glb": (gltf.parse, gltf_attributes.write_new(PLAIN, TETRAHEDRON)),
 }
 
 

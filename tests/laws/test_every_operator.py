@@ -22,7 +22,6 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
-from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.catalog import OPERATORS
 from eigenshape.operators.clouds.cloud_kernel import point_cloud_laplacian
 from eigenshape.operators.clouds.gaussian import gaussian_laplacian, mesh_laplacian
@@ -31,12 +30,12 @@ from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.operators.graph import graph_laplacian
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.laws.operator_laws import check_operator
-from eigenshape.spectral.laws.report import DEFAULT_PROMISES
+from eigenshape.spectral.laws.outcomes import DEFAULT_PROMISES
 from eigenshape.spectral.laws.transformations import random_rotation
 
 seeds = st.integers(0, 2**32 - 1)

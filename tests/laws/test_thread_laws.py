@@ -147,10 +147,10 @@ def test_four_threads_get_what_one_gets_bit_for_bit(tmp_path, monkeypatch):
 SMALL_WORK = {
     "eigenshape.sparse.tasks.FEWEST_ENTRIES": 500,
     "eigenshape.sparse.basis.FEWEST_MULTIPLICATIONS": 1,
-    "eigenshape.sparse.basis.ROWS": 64,
+    "eigenshape.sparse.basis.COMBINED_ROWS": 64,
     "eigenshape.sparse.symmetric_factor.SHARED_HEIGHT": 48,
-    "eigenshape.spectral.multilevel.vcycle.ROWS": 64,
-    "eigenshape.spectral.multilevel.residuals.ROWS": 64,
+    "eigenshape.spectral.multilevel.vcycle.ROWS_A_THREAD": 64,
+    "eigenshape.spectral.multilevel.residuals.CHUNK_ROWS": 64,
 }
 
 

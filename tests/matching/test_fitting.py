@@ -12,7 +12,7 @@ from eigenshape.matching.growth import find_maps, fitted_maps, grow_maps
 from eigenshape.matching.pairs import patch_differences
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, smooth_places
 from eigenshape.matching.surface import describe_surface
-from eigenshape.matching.views import N_VIEWS, describe_views
+from eigenshape.matching.target import N_VIEWS, describe_views
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,12 @@
 
 import numpy as np
 
-from eigenshape.matching.match_loops import couple_pairs, nearest_rows, place_by_distances
-from eigenshape.matching.refinement_loops import nearest_face_points
+from eigenshape.matching.match_loops import (
+    couple_pairs,
+    nearest_face_points,
+    nearest_rows,
+    place_by_distances,
+)
 
 
 def test_nearest_rows_are_those_of_a_sort():

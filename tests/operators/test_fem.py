@@ -147,10 +147,11 @@ def test_units_scale_exactly(size, mesh):
 
 
 def test_many_points_get_keys_that_fit():
-    named = np.array([[[0, 0, 5]], [[0, 0, 3_000_000]], [[0, 0, 5]]])
-    n_corners = np.full((3, 1), 2)
-    _, numbers = np.unique(elements._keys(n_corners, named), return_inverse=True)
-    assert numbers.tolist() == [0, 1, 0]
+    far = 3_000_000  # its keys of three corners need more than 64 bits
+    names, numbers = elements.number_nodes(np.array([[0, 5], [0, far], [0, 5]]), 3)
+    assert numbers[0].tolist() == numbers[2].tolist()
+    assert len(np.unique(numbers)) == len(names) == 7
+    assert names[numbers[1]].tolist() == [[0, 0, 0], [0, 0, far], [0, far, far], [far, far, far]]
 
 
 @pytest.mark.parametrize("order", [0, 4])

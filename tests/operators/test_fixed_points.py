@@ -1,7 +1,7 @@
 import numpy as np
 
-from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.laplacian import dirichlet_laplacian
 from eigenshape.shapes.surfaces import icosphere
 
 

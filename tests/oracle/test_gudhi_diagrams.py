@@ -6,7 +6,7 @@ import pytest
 from gudhi.hera import bottleneck_distance as hera
 
 import eigenshape as es
-from eigenshape.features.bottleneck import ordinary_distance
+from eigenshape.features.diagram import ordinary_distance
 from eigenshape.geometry.topology import submesh
 
 

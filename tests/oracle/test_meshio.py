@@ -4,7 +4,7 @@ import meshio
 import numpy as np
 import pytest
 
-from eigenshape.io.parsing import GRIDS
+from eigenshape.io.formats.registry import format_of
 
 KINDS = {
     "tetra": "tetrahedra", "triangle": "triangles", "quad": "quads", "line": "segments",
@@ -68,7 +68,7 @@ def test_points_and_cells_are_those_of_meshio(tmp_path, form, dtype, kinds):
     )
     path = written(tmp_path / f"a{suffix}", name, options, points, cells)
     theirs = meshio.read(path)
-    found, blocks = GRIDS[suffix](path.read_bytes())
+    found, blocks = format_of(suffix).load().parse(path.read_bytes())
     np.testing.assert_array_equal(found, theirs.points)
     assert set(blocks) == {KINDS[kind] for kind in kinds if kind in KINDS}
     for kind, block in KINDS.items():

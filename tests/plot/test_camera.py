@@ -7,12 +7,11 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.plot import fields, poses, sheet, stability
+from eigenshape.plot import fields, shape_pairs, sheet
 from eigenshape.plot.camera import aim_camera, in_picture, three_quarter_view
 from eigenshape.plot.fields import figure_field, figure_segments
-from eigenshape.plot.poses import figure_poses
 from eigenshape.plot.render import draw
-from eigenshape.plot.sheet import Panel, figure_contact_sheet
+from eigenshape.plot.sheet import Panel, figure_contact_sheet, figure_poses
 from eigenshape.shapes.surfaces import icosphere, torus
 
 BALL = icosphere(2)
@@ -114,7 +113,7 @@ def test_every_picture_of_a_classic_shape_shows_it_upright(data, name, down, mon
     """Whichever figure draws it, and without being told which axis is up."""
     mesh = read_mesh(data / "classics" / name)
     views = []
-    for module in (fields, poses, sheet, stability):
+    for module in (fields, sheet, shape_pairs):
         monkeypatch.setattr(
             module,
             "draw",

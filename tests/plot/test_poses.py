@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape.plot.poses import N_COLUMNS
+from eigenshape.plot.sheet import POSES_IN_A_ROW
 
 BALL = es.icosphere(2)
 SHARES = (BALL.vertices[:, 2] + 1) / 2
@@ -41,11 +41,11 @@ def test_a_pose_twice_as_large_looks_twice_as_large():
 
 @pytest.mark.long
 def test_more_poses_than_columns_go_on_in_another_row():
-    poses = {f"pose {number}": BALL for number in range(N_COLUMNS + 1)}
+    poses = {f"pose {number}": BALL for number in range(POSES_IN_A_ROW + 1)}
     figure = es.plot.figure_poses(poses, SHARES)
-    titles = [axes.get_title() for axes in figure.axes[: N_COLUMNS + 1]]
+    titles = [axes.get_title() for axes in figure.axes[: POSES_IN_A_ROW + 1]]
     assert titles == list(poses)
-    first, last = pictures(figure, N_COLUMNS + 1)[::N_COLUMNS]
+    first, last = pictures(figure, POSES_IN_A_ROW + 1)[::POSES_IN_A_ROW]
     np.testing.assert_array_equal(first, last)
 
 

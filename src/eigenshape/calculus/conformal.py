@@ -21,6 +21,7 @@ from eigenshape.geometry.topology import (
     is_closed,
     vertex_components,
 )
+from eigenshape.operators.connection import as_real
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian
 
@@ -105,7 +106,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
     points, scale = scale_to_unit(mesh)
     unit = TriangleMesh(points, mesh.faces)
     laplacian = cotangent_laplacian(unit)
-    energy = _as_real(laplacian.stiffness - 2 * _area_form(mesh.n_vertices, rim))
+    energy = as_real(laplacian.stiffness - 2 * _area_form(mesh.n_vertices, rim))
     mass = sp.kron(laplacian.mass, sp.eye_array(2))
     shift = SHIFT * energy.diagonal().max() / mass.diagonal().max()
     solver = _factor(energy + shift * mass)
@@ -356,12 +357,7 @@ def angle_distortion(mesh: MeshLike, positions: ArrayLike) -> Float[np.ndarray, 
 
 
 def _factor(matrix: sp.csr_array) -> LinearSolver:
-    """Factor the equations of a map, which are definite but for rounding.
-
-    Raises
-    ------
-    ConvergenceError
-    """
+    """Factor the equations of a map, which are definite but for rounding."""
     try:
         return factor_definite(matrix)
     except InvalidParameterError as err:
@@ -377,12 +373,6 @@ def _area_form(n: int, rim: np.ndarray) -> sp.csr_array:
     quarter = np.full(len(rim), -0.25j)  # Im(conj(z_tail) z_head) / 2
     half = sp.coo_array((quarter, (tails, heads)), shape=(n, n)).tocsr()
     return (half + half.conj().T).tocsr()
-
-
-def _as_real(matrix: sp.csr_array) -> sp.csr_array:
-    """Write a Hermitian matrix of n complex numbers as a symmetric one of 2n real numbers."""
-    turned = sp.csr_array(np.array([[0.0, -1.0], [1.0, 0.0]]))
-    return (sp.kron(matrix.real, sp.eye_array(2)) + sp.kron(matrix.imag, turned)).tocsr()
 
 
 def _to_complex(pairs: Float[np.ndarray, " n2"]) -> Complex[np.ndarray, " n"]:

@@ -13,9 +13,9 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
-from eigenshape.operators.boundary import require_points
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.graph import edge_graph
+from eigenshape.operators.laplacian import require_points
 
 # Steps of Taubin's filter, without unit: λ and μ of his paper's examples (0.33, -0.34) are weaker;
 # these give the pass band 1/λ + 1/μ = 0.1 that he recommends, with λ = 0.5.

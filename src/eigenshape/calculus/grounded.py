@@ -50,10 +50,8 @@ class GroundedFactor:
 def factorize_definite(matrix: sp.sparray) -> SymmetricFactor:
     """Factor a symmetric positive definite matrix.
 
-    Raises
-    ------
-    InvalidShapeError
-        If rounding makes a pivot vanish, as it may where simplices are extremely thin.
+    Raise InvalidShapeError if rounding makes a pivot vanish, as it may where simplices are
+    extremely thin.
     """
     factor = factor_matrix(matrix)
     if factor is None:
@@ -69,10 +67,7 @@ def factorize_grounded(
 ) -> GroundedFactor:
     """Factor W with x = 0 at fixed points, and at the first point of each component without one.
 
-    Raises
-    ------
-    InvalidShapeError
-        As in `factorize_definite`.
+    Errors are those of `factorize_definite`.
     """
     _, components = connected_components(stiffness, directed=False)
     _, firsts = np.unique(components, return_index=True)

@@ -247,10 +247,7 @@ def as_heat_geodesics(shape: ShapeLike | HeatGeodesics) -> HeatGeodesics:
 def require_sources(sources: ArrayLike, n_points: int) -> Int[np.ndarray, " k"]:
     """Return sources as integers.
 
-    Raises
-    ------
-    InvalidParameterError
-        If there is none, or one is not a point.
+    Raise InvalidParameterError if there is none, or one is not a point.
     """
     wanted = whole_numbers(sources, "A source", 0, n_points - 1)
     if not wanted.size:
@@ -264,10 +261,6 @@ def require_heat(
     """Raise an error if heat of a source is too small for a float at a point of its component.
 
     Each edge takes a factor from it, of about 0.4 with the usual time; so 750 edges are too many.
-
-    Raises
-    ------
-    InvalidParameterError
     """
     # Below the normal floats digits are lost, and with them directions.
     cold = np.argwhere(reached & (np.abs(heat) < np.finfo(np.float64).tiny))

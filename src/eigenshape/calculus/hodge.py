@@ -213,12 +213,7 @@ def harmonic_fields(
 
 
 def require_rim(boundary: str) -> None:
-    """Raise an error if a boundary condition is unknown.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
+    """Raise an error if a boundary condition is unknown."""
     if boundary not in get_args(Rim):
         raise InvalidParameterError(
             f"boundary must be 'tangential' or 'normal'; it is {boundary!r}."

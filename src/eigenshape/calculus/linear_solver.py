@@ -13,8 +13,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.boundary import require_points
-from eigenshape.operators.laplacian import ASYMMETRY, find_zero_row_sums
+from eigenshape.operators.laplacian import ASYMMETRY, find_zero_row_sums, require_points
 from eigenshape.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 
 # Loads on a component where nothing is fixed may sum to this share of their absolute sum. Sums of a
@@ -245,10 +244,8 @@ class Constraints:
     ) -> Float[np.ndarray, "n k"]:
         """Return the solution that meets the constraints, given that without them.
 
-        Raises
-        ------
-        InvalidParameterError
-            If the constraints conflict, or leave a component where loads do not sum to 0.
+        Raise InvalidParameterError if the constraints conflict, or leave a component where loads do
+        not sum to 0.
         """
         n_rows, width = self.constants.shape[0], start.shape[1]
         reached = self.matrix @ start
@@ -367,10 +364,7 @@ def factor_definite(
 ) -> LinearSolver:
     """Factor a symmetric system in which constants have an energy, however small.
 
-    Raises
-    ------
-    InvalidParameterError
-        As in `factor_equations`.
+    Errors are those of `factor_equations`.
     """
     system = sp.csr_array(matrix)
     points = require_points([] if fixed is None else fixed, system.shape[0])
@@ -387,10 +381,7 @@ def factor_system(
 ) -> LinearSolver:
     """Factor a symmetric system whose components that float are known, -1 elsewhere.
 
-    Raises
-    ------
-    InvalidParameterError
-        As in `factor_equations`.
+    Errors are those of `factor_equations`.
     """
     n, held = system.shape[0], np.unique(points)
     means = np.ones(n) if weights is None else point_functions(weights, "weights", n)
@@ -453,10 +444,8 @@ def _factor(
 ) -> SymmetricFactor | None:
     """Factor the equations of the free points; None if there are none.
 
-    Raises
-    ------
-    InvalidParameterError
-        If they are singular up to rounding, or have negative pivots that are not expected.
+    Raise InvalidParameterError if they are singular up to rounding, or have negative pivots that
+    are not expected.
     """
     if not len(free):
         return None

@@ -100,12 +100,7 @@ def logarithmic_map(
 
 
 def require_log_method(method: str) -> None:
-    """Raise an error if a method of the logarithmic map is unknown.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
+    """Raise an error if a method of the logarithmic map is unknown."""
     if method not in get_args(LogMethod):
         raise InvalidParameterError(
             f"method must be 'affine', 'adaptive' or 'radial'; it is {method!r}."

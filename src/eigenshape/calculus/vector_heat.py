@@ -28,7 +28,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.directions import Directions, corner_products, vertex_directions
+from eigenshape.operators.directions import Directions, half_cotangents, vertex_directions
 from eigenshape.operators.tufted import side_ends
 from eigenshape.sparse.symmetric_factor import SymmetricFactor
 
@@ -343,9 +343,7 @@ def side_vectors(solver: VectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray
     at_tail = lengths * np.exp(1j * solver.directions.at_tail)
     at_head = -lengths * np.exp(1j * solver.directions.at_head)
     turns = np.exp(1j * (solver.directions.at_head + np.pi - solver.directions.at_tail))
-    cosines, sines = corner_products(solver.mesh)
-    weights = np.roll((cosines / sines).reshape(-1, 3), 1, axis=1).ravel() / 2
-    return at_tail, at_head, turns, weights
+    return at_tail, at_head, turns, half_cotangents(solver.mesh)
 
 
 def scalar_impulse(solver: VectorHeat, start: int) -> Float[np.ndarray, " n"]:

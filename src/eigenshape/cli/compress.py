@@ -1,40 +1,34 @@
 """eigenshape compress: a mesh as a small file."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 import eigenshape as es
 from eigenshape._files import replace_file
 from eigenshape.cli import steps
 from eigenshape.cli.console import out, print_json, print_written, progress_bar
-from eigenshape.cli.inputs import JsonOption, MeshArgument, RepairOption
-
-SUFFIX = ".esz"
 
 
 def compress(
-    mesh: MeshArgument,
+    mesh: Path,
     *,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Compressed mesh to write; it ends in .esz.")
-    ],
-    bits: Annotated[
-        int,
-        typer.Option(
-            help="Precision of coordinates, 4 to 24: vertices move by about 1 / 2^bits of the longest "
-            "side of the bounding box."
-        ),
-    ] = 12,
-    repair: RepairOption = "",
-    as_json: JsonOption = False,
+    output: Path,
+    bits: int = 12,
+    repair: str = "none",
+    as_json: bool = False,
 ) -> None:
     """Write a mesh as a small file, by the spectral coefficients of its coordinates.
 
     For instance: eigenshape compress scan.ply -o scan.esz --bits 12
+
+    Parameters
+    ----------
+    output
+        Write the compressed mesh, in a file that ends in .esz.
+    bits
+        Precision of coordinates, 4 to 24: vertices move by about 1 / 2^bits of the longest side
+        of the bounding box.
     """
-    steps.require_output(output, (SUFFIX,), "A compressed mesh")
+    steps.require_output(output, (".esz",), "A compressed mesh")
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("compress") as progress:
         packed = es.spectral.compress_mesh(surface, bits, progress=progress)
@@ -50,7 +44,7 @@ def compress(
         "max_error": packed.max_error,
     }
     if as_json:
-        print_json({"path": str(mesh), "output": str(output), **facts})
+        print_json({"path": mesh, "output": output, **facts})
         return
     out.print(
         f"{facts['bytes']:,} bytes, {facts['bits_per_vertex']:.1f} bits a vertex "

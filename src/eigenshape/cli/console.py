@@ -4,6 +4,8 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,11 +33,33 @@ def escape_text(text: object) -> str:
 
 
 def print_json(value: Any) -> None:
-    """Print a value as JSON on stdout. Arrays become lists, and numbers that are not finite become null."""
+    """Print a value as JSON on stdout, results of the library among it.
+
+    A result becomes an object, as `result_facts` has it. Arrays become lists, numbers that are not
+    finite become null, and paths become text.
+    """
     typer.echo(json.dumps(_plain(value), indent=2, allow_nan=False))
 
 
+def result_facts(result: Any, *left_out: str) -> dict[str, Any]:
+    """Return the fields and properties of a result by name, for JSON.
+
+    What it explains in words is its `explanation`. Shapes and large arrays should be left out by name.
+    """
+    names = [field.name for field in fields(result)]
+    for kind in type(result).__mro__:
+        for name, member in vars(kind).items():
+            if isinstance(member, property | cached_property):
+                names.append(name)
+    facts = {name: getattr(result, name) for name in names if name not in left_out}
+    if hasattr(result, "explain") and "explanation" not in left_out:
+        facts["explanation"] = result.explain()
+    return facts
+
+
 def _plain(value: Any) -> Any:
+    if is_dataclass(value):
+        value = result_facts(value)
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -44,7 +68,7 @@ def _plain(value: Any) -> Any:
         return _plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    return value
+    return str(value) if isinstance(value, Path) else value
 
 
 def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
@@ -74,6 +98,11 @@ def print_table(title: str, columns: list[str], rows: list[list[str]]) -> None:
     for row in rows:
         table.add_row(*map(escape, row))
     out.print(table)
+
+
+def count_shapes(number: int) -> str:
+    """Return a number of shapes in words."""
+    return f"{number} shape" if number == 1 else f"{number} shapes"
 
 
 def print_repairs(report: tuple[str, ...]) -> None:

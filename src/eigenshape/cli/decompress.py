@@ -1,9 +1,6 @@
 """eigenshape decompress: the mesh of a file that `eigenshape compress` wrote."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 import eigenshape as es
 from eigenshape._files import read_regular
@@ -12,18 +9,18 @@ from eigenshape.cli.console import print_written, progress_bar
 
 
 def decompress(
-    packed: Annotated[Path, typer.Argument(help="File that `eigenshape compress` wrote (.esz).")],
+    packed: Path,
     *,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ."
-        ),
-    ],
+    output: Path,
 ) -> None:
     """Write the mesh of a file that `eigenshape compress` wrote.
 
     For instance: eigenshape decompress scan.esz -o scan.ply
+
+    Parameters
+    ----------
+    packed
+        File that `eigenshape compress` wrote (.esz).
     """
     steps.require_mesh_path(output)
     with progress_bar("decompress") as progress:

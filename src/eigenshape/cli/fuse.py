@@ -1,7 +1,6 @@
 """eigenshape fuse: scans of one shape from several sides, as one surface."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -16,22 +15,14 @@ from eigenshape.cli.console import (
     print_written,
     progress_bar,
 )
-from eigenshape.cli.inputs import AutoRepairOption, JsonOption
 
 
 def fuse(
-    scans: Annotated[
-        list[Path],
-        typer.Argument(
-            help="Scans of one rigid shape in one length unit: meshes, or frames of a depth camera (.pcd)."
-        ),
-    ],
+    scans: list[Path],
     *,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="Write the surface to this mesh file.")
-    ],
-    repair: AutoRepairOption = "auto",
-    as_json: JsonOption = False,
+    output: Path,
+    repair: str = "auto",
+    as_json: bool = False,
 ) -> None:
     """Join scans of one shape from several sides, in any places, to one surface.
 
@@ -39,32 +30,33 @@ def fuse(
     out; the exit code is then 3.
 
     For instance: eigenshape fuse frame1.pcd frame2.pcd frame3.pcd -o whole.ply
+
+    Parameters
+    ----------
+    scans
+        Scans of one rigid shape in one length unit: meshes, or frames of a depth camera (.pcd).
     """
+    steps.require_mesh_path(output)
     meshes = [steps.load_surface(path, repair) for path in scans]
     with progress_bar("fuse") as progress:
         fused = es.matching.fuse_scans(meshes, progress=progress)
     es.write_mesh(fused.mesh, output)
-    left = [path for path, joined in zip(scans, fused.joined, strict=True) if not joined]
+    print_written(output)
+    vertices, faces = fused.mesh.n_vertices, fused.mesh.n_faces
     if as_json:
-        motions = [
-            {"scan": str(path), "joined": motion is not None}
-            | ({"rotation": motion.rotation, "translation": motion.translation} if motion else {})
-            for path, motion in zip(scans, fused.motions, strict=True)
-        ]
-        print_json(
-            {
-                "output": str(output),
-                "vertices": fused.mesh.n_vertices,
-                "faces": fused.mesh.n_faces,
-                "scans": motions,
-            }
-        )
+        motions = []
+        for path, motion in zip(scans, fused.motions, strict=True):
+            facts = {"scan": path, "joined": motion is not None}
+            if motion is not None:
+                facts |= {"rotation": motion.rotation, "translation": motion.translation}
+            motions.append(facts)
+        print_json({"output": output, "vertices": vertices, "faces": faces, "scans": motions})
     else:
         out.print(
-            f"joined {int(fused.joined.sum())} of {len(scans)} scans: {fused.mesh.n_vertices:,} "
-            f"vertices, {fused.mesh.n_faces:,} faces"
+            f"joined {int(fused.joined.sum())} of {len(scans)} scans: {vertices:,} vertices, "
+            f"{faces:,} faces"
         )
-    print_written(output)
+    left = [path for path, joined in zip(scans, fused.joined, strict=True) if not joined]
     for path in left:
         err.print(f"[yellow]left out:[/] {escape_text(path)} fits no other scan well enough")
     if left:

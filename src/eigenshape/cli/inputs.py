@@ -1,147 +1,98 @@
-"""The options that several verbs have. Nothing heavy is imported here, so that `--help` is quick."""
+"""What the options of several verbs say and take. Nothing heavy is imported here, so that `--help` is quick."""
 
+import re
 from collections.abc import Sequence
-from math import isfinite
-from pathlib import Path
-from typing import Annotated, Literal
-
-import typer
+from typing import Literal
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.repairs.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
-from eigenshape.io.cell_kinds import CellKind
-from eigenshape.retrieval.heat.recipe import PRESETS
+from eigenshape.io.formats.registry import MESH_FORMATS, POINT_FORMATS, WRITTEN
 
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
-NO_REPAIR = "none"
 KNOWN_REPAIRS = tuple(dict.fromkeys((*MESH_REPAIRS, *CLOUD_REPAIRS)))
-RepairOption = Annotated[
-    str,
-    typer.Option(
-        "--repair",
-        metavar="NAMES",
-        help=(
-            "Repairs to apply to the mesh first, in this order, separated by commas: "
-            f"{', '.join(KNOWN_REPAIRS)}. auto does what is needed, but fills no hole and "
-            "drops no component. By default none."
-        ),
-    ),
-]
-AUTO_REPAIRS = (
-    "Repairs to apply to each mesh first, in this order, separated by commas: "
-    f"{', '.join(MESH_REPAIRS)}. auto does what is needed, but fills no hole and "
-    "drops no component; none refuses meshes that need repair. "
-)
-IndexRepairOption = Annotated[
-    str,
-    typer.Option(
-        "--repair",
-        metavar="NAMES",
-        help=f"{AUTO_REPAIRS}Clouds and frames of a depth camera become a surface first. "
-        "By default auto.",
-    ),
-]
-AutoRepairOption = Annotated[
-    str, typer.Option("--repair", metavar="NAMES", help=f"{AUTO_REPAIRS}By default auto.")
-]
-MeshArgument = Annotated[
-    Path,
-    typer.Argument(
-        help="Mesh file: OFF, OBJ, PLY, STL, GLB, glTF, or a surface in .mesh, .msh, .vtk, .vtu."
-    ),
-]
-ShapeArgument = Annotated[
-    Path,
-    typer.Argument(
-        help="Shape file: a mesh (OFF, OBJ, PLY, STL, GLB, glTF, .mesh, .msh, .vtk, .vtu) or points "
-        "(.pts, .xyz, .pcd, PLY)."
-    ),
-]
-CellsOption = Annotated[
-    CellKind | None,
-    typer.Option(
-        help="Kind of cells to read, if the file holds several kinds or does not name the kind."
-    ),
-]
-DimOption = Annotated[
-    int,
-    typer.Option(
-        help="Dimension of the shape that a point cloud samples: 1 curve, 2 surface, 3 volume."
-    ),
-]
-ViewOption = Annotated[
-    str,
-    typer.Option(
-        "--view",
-        metavar="SIDE",
-        help=(
-            "Side from which the picture shows the shape: front, back, left, right, top, bottom, "
-            "front-left, front-right, back-left, back-right, or a direction to the viewer such as "
-            "1,0,2. By default the front left, as far as the front can be guessed."
-        ),
-    ),
-]
-UpOption = Annotated[
-    str,
-    typer.Option(
-        "--up",
-        metavar="AXIS",
-        help=(
-            "Upward direction of the picture: x, y, z, -x, -y, -z, or a direction such as 0,1,1. "
-            "By default it is guessed."
-        ),
-    ),
-]
-Scale = Literal["none", "area", "diameter"]
-PATCHES = "patches"  # a method of `index` and `query`
-PARTS = "parts"  # a method of `segment`
-METHODS = (PATCHES, *PRESETS)
+# What is said of a parameter of this name in each verb whose docstring says nothing else. After the
+# colon stands what help calls the value.
+SHARED_PARAMETERS = f"""\
+as_json
+    Print JSON instead of text.
+mesh
+    Mesh file: {", ".join(MESH_FORMATS)}.
+shape
+    Shape file: a mesh ({", ".join(MESH_FORMATS)}) or points
+    ({", ".join(POINT_FORMATS)}, or a mesh file without faces).
+output
+    Write the mesh ({", ".join(WRITTEN)}).
+index
+    Folder of the index.
+repair : NAMES
+    Repairs to apply first, in this order, separated by commas: {", ".join(KNOWN_REPAIRS)}. auto does what is
+    needed, but fills no hole and drops no component; none does nothing, so that a shape that
+    needs repair is refused.
+cells
+    Kind of cells to read, if the file holds several kinds or does not name the kind.
+dim
+    Dimension of the shape that a point cloud samples: 1 curve, 2 surface, 3 volume.
+view : SIDE
+    Side from which the picture shows the shape: front, back, left, right, top, bottom,
+    front-left, front-right, back-left, back-right, or a direction to the viewer such as 1,0,2.
+    By default the front left, as far as the front can be guessed.
+up : AXIS
+    Upward direction of the picture: x, y, z, -x, -y, -z, or a direction such as 0,1,1. By
+    default it is guessed.
+where : CONDITION
+    Only shapes that meet a condition: label=cat, tag=scanned, or by an attribute height=1.5..3.
+    label=cat,dog allows either, and label!=cat all others. Several filters must all be met.
+sources
+    Files of meshes or points, or folders to search for them.
+workers
+    Number of processes that describe shapes at the same time. By default one for each core.
+timeout
+    Seconds after which a file is named as failed.
+memory
+    Gigabytes that a process may use; a file that needs more is named as failed. By default each
+    process has an equal share of the machine's memory.
+scheduler : ADDRESS
+    Describe on a cluster: the address of a Dask scheduler, such as tcp://10.0.0.5:8786. Needs
+    pip install 'eigenshape[cluster]' on all machines, and files that all of them see.
+host
+    Address to listen on; one that other machines reach needs --allow-remote.
+"""
+# How a parameter is written whose name is not that of its option.
+OPTION_NAMES = {"as_json": "json", "where": "filter", "settings": "set", "map_file": "map"}
 
-HeatMethodOption = Annotated[
-    str, typer.Option("--method", help=f"How shapes are described: {' or '.join(PRESETS)}.")
-]
-MethodOption = Annotated[
-    str,
-    typer.Option(
-        "--method",
-        help=f"How shapes are described: {', '.join(METHODS)}. patches is best for partial scans.",
-    ),
-]
-StoredMethodOption = Annotated[
-    str | None,
-    typer.Option(
-        "--method",
-        help=(
-            f"Which descriptions to compare: {', '.join(METHODS)}. By default the index's "
-            "own, or patches if it has several."
-        ),
-    ),
-]
-IndexArgument = Annotated[Path, typer.Argument(help="Folder of the index.")]
-HostOption = Annotated[
-    str,
-    typer.Option(help="Address to listen on; one that other machines reach needs --allow-remote."),
-]
-FilterOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--filter",
-        metavar="CONDITION",
-        help="Only shapes that meet a condition: label=cat, tag=scanned, or by an attribute "
-        "height=1.5..3. label=cat,dog allows either, and label!=cat all others. Several filters must "
-        "all be met.",
-    ),
-]
-REGIONS = (
-    "'y>0.5' or 'y>0.5, x<0' (coordinates, or percent of the bounding box: 'y>60%'); 'vertex 17 within 0.2' "
-    "(distance along the surface, or percent of the square root of the area: 'within 10%'); 'part 3' (a number that "
-    "`eigenshape segment` prints); or a file with one vertex index a line."
-)
+# Names in PRESETS of the heat recipes; a test compares the two.
+HeatMethod = Literal["scale-free", "thesis"]
+Method = Literal["patches", HeatMethod]
+
+
+def read_parameters(text: str) -> dict[str, tuple[str | None, str]]:
+    """Return what a section of a docstring says of each parameter: how the value is called, and the help."""
+    explained = {}
+    entry = r"^([\w, ]+?)(?: : (.+))?\n((?: {4}.+\n?)+)"  # one name or several, and indented lines
+    for names, value, lines in re.findall(entry, text, re.MULTILINE):
+        for name in names.split(", "):
+            explained[name] = (value or None, " ".join(lines.split()))
+    return explained
+
+
+def option_spellings(name: str, default: object) -> tuple[str, ...]:
+    """Return how an option is written on the command line, by the rule that all verbs follow.
+
+    It is named as its parameter. The output is also `-o`, and a number of things (`n_parts`) also
+    `-n`. A flag that is on by default has a form `--no-`.
+    """
+    if len(name) == 1:
+        return (f"-{name}",)
+    text = OPTION_NAMES.get(name, name.replace("_", "-"))
+    if name == "output":
+        return ("-o", "--output")
+    if name.startswith("n_"):
+        return ("-n", f"--{text}")
+    return (f"--{text}/--no-{text}",) if default is True else (f"--{text}",)
 
 
 def repair_names(text: str) -> tuple[str, ...]:
     """Split a comma-separated list of repairs. An unknown name is an error before any file is read."""
-    if text == NO_REPAIR:
+    if text == "none":
         return ()
     names = [name.strip() for name in text.split(",") if name.strip()]
     return require_repairs(names, KNOWN_REPAIRS, "Names of --repair")
@@ -157,44 +108,11 @@ def memory_bytes(gigabytes: float | None) -> float | None:
     return None if gigabytes is None else gigabytes * 1e9
 
 
-def require_one_rule(n_parts: int | None, persistence: float | None, *, largest_gap: bool) -> None:
-    """Raise an error if more than one option decides how many parts a mesh gets."""
-    rules = {
-        "--n-parts": n_parts is not None,
-        "--persistence": persistence is not None,
-        "--largest-gap": largest_gap,
-    }
+def require_one_rule(rules: dict[str, bool]) -> None:
+    """Raise an error if more than one of the options is given that decide how many parts a mesh gets."""
     given = [name for name, is_given in rules.items() if is_given]
     if len(given) > 1:
         raise InvalidParameterError(
             f"The number of parts takes at most one of {', '.join(rules)}; it was given "
             f"{' and '.join(given)}."
         )
-
-
-def require_level(
-    level: float,
-    method: str,
-    n_parts: int | None,
-    persistence: float | None,
-    *,
-    largest_gap: bool,
-) -> None:
-    """Raise an error if a level has no meaning for a method, or other options contradict it."""
-    if method != PARTS:
-        raise InvalidParameterError(
-            f"--level is for --method {PARTS}; the method is {method}. Use --n-parts."
-        )
-    if not isfinite(level):
-        raise InvalidParameterError(f"--level must be finite; it is {level}.")
-    if n_parts is not None or persistence is not None or largest_gap:
-        raise InvalidParameterError(
-            "--level determines the number of parts, as --n-parts, --persistence and --largest-gap "
-            "do; give only one of them."
-        )
-
-
-def require_method(name: str, names: Sequence[str] = METHODS) -> None:
-    """Raise an error if the name is not one of the allowed names."""
-    if name not in names:
-        raise InvalidParameterError(f"--method takes {', '.join(names)}; it is {name!r}.")

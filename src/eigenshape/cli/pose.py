@@ -2,52 +2,42 @@
 
 from math import sqrt
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
-from eigenshape.cli.console import out, print_json, progress_bar
-from eigenshape.cli.inputs import AutoRepairOption, JsonOption, MeshArgument, UpOption, ViewOption
+from eigenshape.cli.console import print_json, progress_bar
+from eigenshape.cli.match import match_facts, print_match
 
 
 def pose(
-    mesh: MeshArgument,
+    mesh: Path,
     *,
-    like: Annotated[Path, typer.Option("--like", help="Mesh in the wanted pose.")],
-    rest: Annotated[
-        Path | None,
-        typer.Option(
-            "--rest",
-            help=(
-                "The shape of --like, with the same faces, in the pose that the mesh has now. The "
-                "mesh is then bent as that shape was bent from --rest to --like."
-            ),
-        ),
-    ] = None,
-    repair: AutoRepairOption = "auto",
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="Write the bent mesh (PLY, OBJ, GLB, OFF, STL, VTU, VTK or NPZ)."
-        ),
-    ] = None,
-    picture: Annotated[
-        Path | None, typer.Option(help="Draw the mesh before and after (PNG, SVG or PDF).")
-    ] = None,
-    view: ViewOption = "auto",
-    up: UpOption = "auto",
-    as_json: JsonOption = False,
+    like: Path,
+    rest: Path | None = None,
+    repair: str = "auto",
+    output: Path | None = None,
+    picture: Path | None = None,
+    view: str = "auto",
+    up: str = "auto",
+    as_json: bool = False,
 ) -> None:
     """Bend a mesh into the pose of another one; what corresponds is found by itself.
 
     All meshes are repaired; what is done to --rest is done to the same faces of --like.
 
     For instance: eigenshape pose cat.ply --like lion.ply -o bent.ply --picture bent.png
+
+    Parameters
+    ----------
+    like
+        Mesh in the wanted pose.
+    rest
+        The shape of --like, with the same faces, in the pose that the mesh has now. The mesh is
+        then bent as that shape was bent from --rest to --like.
+    picture
+        Draw the mesh before and after (PNG, SVG or PDF).
     """
-    steps.require_picture(picture)
-    side = steps.parse_side(view, up)
+    side = steps.picture_side(view, up, picture)
     steps.require_mesh_path(output)
     target = steps.load_mesh(mesh, repair)
     source, posed = steps.load_poses(rest or like, like, repair)
@@ -58,13 +48,12 @@ def pose(
             bent = es.deformation.transfer_deformation(source, posed, target, found)
         else:
             bent = es.matching.take_pose(target, posed, match=found)
-    facts = steps.match_facts(found)
     if as_json:
-        print_json({"path": str(mesh), "like": str(like), **facts})
+        print_json({"path": mesh, "like": like, **match_facts(found)})
     else:
-        out.print(steps.match_sentence(facts))
+        print_match(found)
     if output:
         steps.save_like(mesh, target, output, bent.vertices)
     if picture:
-        poses = {"before": target, "after": bent}
-        steps.save_picture(es.plot.figure_poses(poses, **side), picture)
+        figure = es.plot.figure_poses({"before": target, "after": bent}, **side)
+        steps.save_picture(figure, picture)

@@ -1,78 +1,53 @@
 """eigenshape repair: a mesh repaired, or converted, and written."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, print_repairs, print_table, print_written
-from eigenshape.cli.inputs import CellsOption, JsonOption, MeshArgument
-from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
-
-USUAL = "auto"
-ROWS = (
-    "vertices", "faces", "points", "simplices", "components", "boundary_loops", "boundary_points", "closed",
-    "faces_without_area", "without_volume", "duplicate_faces", "duplicates", "loose_vertices", "loose_points",
-    "coinciding_vertices", "non_manifold_edges", "turned_over_edges",
-)  # fmt: skip
+from eigenshape.cli.info import format_fact
+from eigenshape.io.formats.registry import CellKind
 
 
 def repair(
-    mesh: MeshArgument,
+    mesh: Path,
     *,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Mesh to write: OFF, OBJ, PLY, STL, GLB, VTU, VTK or NPZ; for tetrahedra VTU.",
-        ),
-    ],
-    names: Annotated[
-        str,
-        typer.Option(
-            "--repair",
-            metavar="NAMES",
-            help=(
-                f"Repairs to apply in this order, separated by commas: {', '.join(MESH_REPAIRS)}. "
-                "'' only converts the file."
-            ),
-        ),
-    ] = USUAL,
-    cells: CellsOption = None,
-    as_json: JsonOption = False,
+    output: Path,
+    repair: str = "auto",
+    cells: CellKind | None = None,
+    as_json: bool = False,
 ) -> None:
     """Repair a mesh and write it, and report what was done. All else that the file holds stays, or is named.
 
-    Hexahedra, wedges and pyramids are split into tetrahedra.
+    Hexahedra, wedges and pyramids are split into tetrahedra, which a .vtu file holds.
 
     For instance: eigenshape repair scan.ply --repair auto -o clean.ply
+
+    Parameters
+    ----------
+    repair : NAMES
+        Repairs to apply in this order, separated by commas: auto, drop_missing, weld, weld_seams,
+        collapse_needles, drop_degenerate, drop_duplicate_faces, drop_unreferenced, orient,
+        largest_component, fill_holes, cut_one_sided. none only converts the file. By default
+        auto.
     """
     steps.require_mesh_path(output)
-    before, done = steps.load_repaired(mesh, names, cells)
+    before, done = steps.load_repaired(mesh, repair, cells)
     if not isinstance(done.mesh, es.TriangleMesh):
         steps.require_output(output, (".vtu",), "A mesh of tetrahedra or segments")
     print_repairs(done.report)
-    facts = {"before": steps.shape_facts(before), "after": steps.shape_facts(done.mesh)}
     if isinstance(done.mesh, es.TriangleMesh):
         steps.save_like(mesh, done.mesh, output)
     else:
         es.io.write_fields(done.mesh, output, {})
         print_written(output)
+    facts = {"before": steps.shape_facts(before), "after": steps.shape_facts(done.mesh)}
     if as_json:
-        print_json({"path": str(mesh), "output": str(output), "report": list(done.report), **facts})
+        print_json({"path": mesh, "output": output, "report": done.report, **facts})
         return
-    rows = [
-        [name.replace("_", " "), *(_format(fact[name]) for fact in facts.values())]
-        for name in ROWS
-        if name in facts["before"]
-    ]
+    rows = []
+    for name, value in facts["before"].items():
+        if isinstance(value, int):  # counts, and yes or no
+            texts = [format_fact(fact[name]) for fact in facts.values()]
+            rows.append([name.replace("_", " "), *texts])
     print_table("Repaired", ["", *facts], rows)
-
-
-def _format(value: bool | int) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:,}"

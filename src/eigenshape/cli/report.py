@@ -8,31 +8,32 @@ import typer
 from eigenshape._studio import studio_module
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written, progress_bar
-from eigenshape.cli.inputs import MeshArgument, RepairOption, UpOption, ViewOption
 
 
 def report(
-    mesh: MeshArgument,
+    mesh: Path,
     *,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="HTML file to write; it opens without a server.")
-    ],
-    n_modes: Annotated[
-        int,
-        typer.Option("-n", "--n-modes", min=1, max=200, help="Number of eigenfunctions in it."),
-    ] = 20,
-    view: ViewOption = "auto",
-    up: UpOption = "auto",
-    repair: RepairOption = "",
+    output: Path,
+    n_modes: Annotated[int, typer.Option(min=1, max=200)] = 20,
+    view: str = "auto",
+    up: str = "auto",
+    repair: str = "none",
 ) -> None:
     """Write a shape with its spectrum, heat and parts to one HTML file that any browser opens.
 
     Needs the package eigenshape-studio.
 
     For instance: eigenshape report scan.ply -o scan.html
+
+    Parameters
+    ----------
+    output
+        Write the page (HTML), which any browser opens without a server.
+    n_modes
+        Number of eigenfunctions to write.
     """
     steps.require_output(output, (".html",), "A report")
-    side = steps.parse_side(view, up)
+    side = steps.picture_side(view, up)
     writer = studio_module("report")
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("report") as progress:

@@ -9,67 +9,23 @@ import typer
 import eigenshape as es
 from eigenshape._studio import studio_module
 from eigenshape.cli.console import print_address
-from eigenshape.cli.inputs import HostOption, memory_bytes
+from eigenshape.cli.inputs import memory_bytes
 
 
 def serve(
-    index: Annotated[Path, typer.Argument(help="Folder of the index.")],
+    index: Path,
     *,
-    host: HostOption = "127.0.0.1",
-    port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any that is free.")
-    ] = 8000,
-    allow_remote: Annotated[
-        bool,
-        typer.Option(
-            "--allow-remote",
-            help="Let other machines in, if they have the token. Nothing is encrypted.",
-        ),
-    ] = False,
-    allow_host: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME[:PORT]",
-            help="Answer to this name, too, as clients send it; may be repeated. Names of this "
-            "machine are known.",
-        ),
-    ] = None,
-    token: Annotated[
-        str | None,
-        typer.Option(
-            envvar="EIGENSHAPE_TOKEN",
-            help="Secret that requests must bring, at least 16 letters; other users of the machine "
-            "can read options, but not the environment variable. By default a random one is printed.",
-        ),
-    ] = None,
-    write_token: Annotated[
-        str | None,
-        typer.Option(
-            envvar="EIGENSHAPE_WRITE_TOKEN",
-            help="Another secret, with which programs may also add and remove shapes. Without it "
-            "the service only reads.",
-        ),
-    ] = None,
-    workers: Annotated[
-        int, typer.Option(min=1, help="Number of processes that describe uploaded meshes.")
-    ] = 2,
-    timeout: Annotated[
-        float, typer.Option(min=1, help="Seconds after which an uploaded mesh is given up.")
-    ] = 60.0,
-    memory: Annotated[
-        float | None,
-        typer.Option(
-            min=0.5,
-            help="Gigabytes that a process may use; a mesh that needs more is refused. By default "
-            "each process has an equal share of the machine's memory.",
-        ),
-    ] = None,
-    show_sources: Annotated[
-        bool, typer.Option("--show-sources", help="Name the files of shapes in answers.")
-    ] = False,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the address in a browser.")
-    ] = False,
+    host: str = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535)] = 8000,
+    allow_remote: bool = False,
+    allow_host: list[str] | None = None,
+    token: Annotated[str | None, typer.Option(envvar="EIGENSHAPE_TOKEN")] = None,
+    write_token: Annotated[str | None, typer.Option(envvar="EIGENSHAPE_WRITE_TOKEN")] = None,
+    workers: Annotated[int, typer.Option(min=1)] = 2,
+    timeout: Annotated[float, typer.Option(min=1)] = 60.0,
+    memory: Annotated[float | None, typer.Option(min=0.5)] = None,
+    show_sources: bool = False,
+    browser: bool = False,
 ) -> None:
     """Serve an index: upload a scan, by a page or a program, and get the most similar shapes.
 
@@ -78,6 +34,33 @@ def serve(
     ended.
 
     For instance: eigenshape serve my-index
+
+    Parameters
+    ----------
+    port
+        Port to listen on; 0 takes any that is free.
+    allow_remote
+        Let other machines in, if they have the token. Nothing is encrypted.
+    allow_host : NAME[:PORT]
+        Answer to this name, too, as clients send it; may be given several times. Names of this
+        machine are known.
+    token
+        Secret that requests must bring, at least 16 letters; other users of the machine can read
+        options, but not the environment variable. By default a random one is printed.
+    write_token
+        Another secret, with which programs may also add and remove shapes. Without it the service
+        only reads.
+    workers
+        Number of processes that describe uploaded meshes.
+    timeout
+        Seconds after which an uploaded mesh is given up.
+    memory
+        Gigabytes that a process may use; a mesh that needs more is refused. By default each
+        process has an equal share of the machine's memory.
+    show_sources
+        Name the files of shapes in answers.
+    browser
+        Open the address in a browser.
     """
     server = studio_module("service.server")
 

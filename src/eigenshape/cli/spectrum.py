@@ -1,194 +1,113 @@
 """eigenshape spectrum: the lowest eigenvalues of a shape by any operator, with their proof."""
 
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from __future__ import annotations
 
-import typer
+from pathlib import Path
+from typing import Any
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
-from eigenshape.cli.console import print_json, print_written, progress_bar
-from eigenshape.cli.inputs import (
-    CellsOption,
-    DimOption,
-    JsonOption,
-    RepairOption,
-    ShapeArgument,
-    UpOption,
-    ViewOption,
-)
-from eigenshape.operators.choices import Condition, Distance, Form, Mass
+from eigenshape.cli.console import err, out, print_json, print_table, print_written, progress_bar
+from eigenshape.cli.operators import read_settings
+from eigenshape.io.formats.registry import CellKind
+from eigenshape.operators.choices import Condition
 
 USUAL = 20  # pairs
 ORDERS = {"p2": 2, "p3": 3}
+N_PICTURED = 8  # eigenfunctions in a picture: two rows of four
 
 
 def spectrum(
-    shape: ShapeArgument,
+    shape: Path,
     *,
-    k: Annotated[
-        int | None,
-        typer.Option(
-            "-k",
-            help=f"Number of eigenpairs, from the lowest one, or all if there are fewer. By default "
-            f"{USUAL}, unless --below is given.",
-        ),
-    ] = None,
-    below: Annotated[
-        float | None,
-        typer.Option(help="Instead of -k: all eigenvalues below this value, in 1/length²."),
-    ] = None,
-    above: Annotated[
-        float | None,
-        typer.Option(help="With --below: only eigenvalues from this value on, in 1/length²."),
-    ] = None,
-    operator: Annotated[
-        str | None,
-        typer.Option(
-            "--operator",
-            help=(
-                "One of those that `eigenshape operators` lists. By default cotangent for meshes, "
-                "point-cloud for points."
-            ),
-        ),
-    ] = None,
-    accuracy: Annotated[
-        float | None,
-        typer.Option(
-            help=(
-                "Compute approximately, which is faster but proves nothing. Errors are at most this "
-                "share of the largest eigenvalue, such as 1e-3."
-            )
-        ),
-    ] = None,
-    boundary: Annotated[
-        Condition,
-        typer.Option(
-            help="Boundary condition: neumann leaves the boundary free, dirichlet fixes it at 0."
-        ),
-    ] = "neumann",
-    brackets: Annotated[
-        bool,
-        typer.Option(
-            "--brackets",
-            help="Also compute guaranteed lower and upper bounds of the eigenvalues of the mesh itself.",
-        ),
-    ] = False,
-    mass: Annotated[
-        Mass | None,
-        typer.Option(
-            help="Mass matrix of the cotangent operator: by default averaged for tetrahedra, and "
-            "otherwise lumped."
-        ),
-    ] = None,
-    t: Annotated[
-        float | None, typer.Option(help="Heat time of a kernel operator, in length².")
-    ] = None,
-    h: Annotated[
-        float | None, typer.Option(help="Instead of --t: width of the kernel, 2√t, in length.")
-    ] = None,
-    edge_factor: Annotated[
-        float | None, typer.Option(help="Instead of --t: width of the kernel in mean edge lengths.")
-    ] = None,
-    correct: Annotated[
-        Literal["log", "none"] | None,
-        typer.Option(
-            help="Whether to correct the bias of a kernel operator: by default on points, not on meshes."
-        ),
-    ] = None,
-    form: Annotated[
-        Form | None,
-        typer.Option(help="Mass matrix of a kernel operator; random-walk copes with noise."),
-    ] = None,
-    distance: Annotated[
-        Distance | None, typer.Option(help="Distance that the kernel of the mesh operator uses.")
-    ] = None,
-    cutoff: Annotated[
-        float | None, typer.Option(help="Distance at which a kernel is cut off, in widths.")
-    ] = None,
-    mollify: Annotated[
-        float | None,
-        typer.Option(
-            help="Smallest height that the robust operator allows in a triangle, in mean edge lengths. "
-            "By default 1e-5."
-        ),
-    ] = None,
-    n_neighbors: Annotated[
-        int | None,
-        typer.Option(
-            help="Neighbors of each point of a cloud among which the robust operator seeks triangles. "
-            "By default 30."
-        ),
-    ] = None,
-    dim: DimOption = 2,
-    cells: CellsOption = None,
-    repair: RepairOption = "",
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Write eigenvalues, eigenvectors and the proof (NPZ; Spectrum.load reads it).",
-        ),
-    ] = None,
-    picture: Annotated[
-        Path | None, typer.Option(help="Draw the eigenvalues (PNG, SVG or PDF).")
-    ] = None,
-    eigenfunctions: Annotated[
-        Path | None,
-        typer.Option(
-            help="Draw the first eigenfunctions of a triangle mesh with their nodal lines (PNG, "
-            "SVG or PDF)."
-        ),
-    ] = None,
-    view: ViewOption = "auto",
-    up: UpOption = "auto",
-    cache: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder that keeps spectra. A spectrum that is in it is read instead of computed."
-        ),
-    ] = None,
-    as_json: JsonOption = False,
+    k: int | None = None,
+    below: float | None = None,
+    above: float | None = None,
+    operator: str | None = None,
+    settings: list[str] | None = None,
+    accuracy: float | None = None,
+    boundary: Condition = "neumann",
+    brackets: bool = False,
+    dim: int = 2,
+    cells: CellKind | None = None,
+    repair: str = "none",
+    output: Path | None = None,
+    picture: Path | None = None,
+    eigenfunctions: Path | None = None,
+    view: str = "auto",
+    up: str = "auto",
+    cache: Path | None = None,
+    as_json: bool = False,
 ) -> None:
-    """Compute the lowest eigenvalues of a shape and prove that none is missing."""
-    steps.require_picture(picture)
-    steps.require_picture(eigenfunctions)
-    side = steps.parse_side(view, up)
+    """Compute the lowest eigenvalues of a shape and prove that none is missing.
+
+    Parameters
+    ----------
+    k
+        Number of eigenpairs, from the lowest one, or all if there are fewer. By default 20,
+        unless --below is given.
+    below
+        Instead of -k: all eigenvalues below this value, in 1/length².
+    above
+        With --below: only eigenvalues from this value on, in 1/length².
+    operator
+        Operator, one of those that `eigenshape operators` lists. By default cotangent for meshes,
+        point-cloud for points.
+    settings : NAME=VALUE
+        Option of the operator, such as mass=averaged or t=0.01; may be given several times.
+        `eigenshape operators` lists the options of each operator, and `eigenshape operators mesh`
+        explains those of one.
+    accuracy
+        Compute approximately, which is faster but proves nothing. Errors are at most this share
+        of the largest eigenvalue, such as 1e-3.
+    boundary
+        Boundary condition: neumann leaves the boundary free, dirichlet fixes it at 0.
+    brackets
+        Also compute guaranteed lower and upper bounds of the eigenvalues of the mesh itself.
+    output
+        Write eigenvalues, eigenvectors and the proof (NPZ, which Spectrum.load reads).
+    picture
+        Draw the eigenvalues (PNG, SVG or PDF).
+    eigenfunctions
+        Draw the first eigenfunctions of a triangle mesh with their nodal lines (PNG, SVG or PDF).
+    cache
+        Folder that keeps spectra. A spectrum that is in it is read instead of computed.
+    """
+    side = steps.picture_side(view, up, picture, eigenfunctions)
     steps.require_output(output, (".npz",), "A spectrum")
     if accuracy is not None and below is not None:
         raise InvalidParameterError(
             "--accuracy needs -k, because the approximate method cannot count the eigenvalues below a value. Pass -k "
             "instead of --below, or leave out --accuracy."
         )
-    scale = {"t": t, "h": h, "edge_factor": edge_factor, "cutoff": cutoff}
-    given = {
-        "mass": mass,
-        "mollify": mollify,
-        "n_neighbors": n_neighbors,
-        **scale,
-        "correct": correct,
-        "form": form,
-        "distance": distance,
-    }
-    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    if correct == "none":
-        options["correct"] = None
-    found = steps.load_shape(shape, repair, dim, cells)
-    steps.require_drawable(found, eigenfunctions)
-    bounded = steps.require_bracketable(found) if brackets else None
-    name = steps.operator_name(found, operator)
+    found: Any = steps.load_shape(shape, repair, dim, cells)
+    is_cloud = isinstance(found, es.PointCloud)
+    if eigenfunctions and not isinstance(found, es.TriangleMesh):
+        raise InvalidParameterError(
+            f"--eigenfunctions draws triangle meshes; the shape is {found!r}. --picture draws the "
+            "eigenvalues of any shape."
+        )
+    if brackets and is_cloud:
+        raise InvalidParameterError("--brackets is for meshes; the shape is a point cloud.")
+    name = operator or ("point-cloud" if is_cloud else "cotangent")
+    options = read_settings(name, settings or [])
     if accuracy is not None and name == "cotangent":
         options.setdefault("mass", "lumped")  # approximate eigenpairs need a diagonal
-    fixed = steps.boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
+    fixed = _boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
+
     with progress_bar("spectrum") as progress:
         progress(0.0, "building the operator")
         laplacian = es.build_laplacian(found, operator, **options)
         if name == "point-cloud" and laplacian.kernel is None:
             name = "robust"  # as a warning says
-        wanted = USUAL if k is None and below is None else k
-        n_pairs = None if wanted is None else steps.limit_pairs(laplacian, fixed, wanted)
+        n_pairs = USUAL if k is None and below is None else k
+        most = max(1, laplacian.n_points - (0 if fixed is None else len(fixed)))
+        if n_pairs is not None and n_pairs > most:
+            err.print(
+                f"[yellow]note:[/] this shape has {most} eigenpairs, not {n_pairs}; all are computed"
+            )
+            n_pairs = most
         solved = es.solve_spectrum(
             laplacian,
             n_pairs,
@@ -200,28 +119,65 @@ def spectrum(
             progress=progress,
             cache=cache,
         )
-        count = solved.certificate.first + len(solved.eigenvalues)
-        bounds = (
-            es.bracket_eigenvalues(bounded, count, boundary=boundary, progress=progress)
-            if bounded
-            else None
-        )
+        first, count = solved.certificate.first, len(solved.eigenvalues)
+        bounds = None
+        if brackets:
+            bounds = es.bracket_eigenvalues(
+                found, first + count, boundary=boundary, progress=progress
+            )
+
     if as_json:
         print_json(
             {
-                "path": str(shape),
+                "path": shape,
                 "operator": name,
                 "boundary": boundary,
                 **options,
-                **steps.spectrum_facts(solved, bounds),
+                "eigenvalues": solved.eigenvalues,
+                "residuals": solved.residuals,
+                "certificate": solved.certificate,
+                **({"brackets": bounds} if bounds else {}),
             }
         )
     else:
-        steps.print_spectrum(solved, bounds)
+        _print(solved, bounds)
     if picture:
-        steps.draw_eigenvalues(found, solved, bounds, picture)
-    if eigenfunctions and isinstance(found, es.TriangleMesh):
-        steps.draw_eigenfunctions(found, solved, eigenfunctions, side)
+        area = es.geometry.surface_area(found) if isinstance(found, es.TriangleMesh) else None
+        figure = es.plot.figure_spectrum(solved, area=area, brackets=bounds)
+        steps.save_picture(figure, picture)
+    if eigenfunctions:
+        start = min(1, count - 1) if first == 0 else 0  # the lowest is constant
+        chosen = range(start, min(count, start + N_PICTURED))
+        figure = es.plot.figure_eigenfunctions(found, solved, chosen, **side)
+        steps.save_picture(figure, eigenfunctions)
     if output:
         solved.save(output)
         print_written(output)
+
+
+def _boundary_points(shape: Any, order: int) -> Any:
+    """Return the points of the boundary, of elements of an order; raise an error if there are none."""
+    if isinstance(shape, es.PointCloud):
+        raise InvalidParameterError(
+            "--boundary dirichlet is for meshes; a point cloud has no boundary."
+        )
+    nodes = es.operators.fem_boundary_nodes(shape, order)
+    if not nodes.size:
+        raise InvalidParameterError(f"--boundary dirichlet needs a boundary; {shape!r} is closed.")
+    return nodes
+
+
+def _print(found: es.Spectrum, bounds: Any) -> None:
+    """Print a table of the eigenvalues, and what is proved about them."""
+    columns, first = ["i", "λ", "error at most"], found.certificate.first
+    rows = []
+    for index, value in enumerate(found.eigenvalues):
+        rows.append([str(first + index), f"{value:.10g}", f"{found.residuals[index]:.1e}"])
+    if bounds:
+        columns += ["lower", "upper"]
+        ends = zip(rows, bounds.lower[first:], bounds.upper[first:], strict=True)
+        rows = [[*row, f"{low:.6g}", f"{high:.6g}"] for row, low, high in ends]
+    print_table("Eigenvalues, in 1/length²", columns, rows)
+    out.print(found.certificate.explain())
+    if bounds:
+        out.print(bounds.explain())

@@ -1,79 +1,38 @@
 """eigenshape stability: two shapes, the distance of their spectra, and which heat times can be trusted."""
 
-from pathlib import Path
-from typing import Annotated
+from __future__ import annotations
 
-import typer
+from pathlib import Path
+from typing import Any, Literal
 
 import eigenshape as es
+from eigenshape._errors import InvalidParameterError
 from eigenshape._text import literal
 from eigenshape.cli import steps
-from eigenshape.cli.console import print_json, progress_bar
-from eigenshape.cli.inputs import (
-    DimOption,
-    JsonOption,
-    RepairOption,
-    Scale,
-    ShapeArgument,
-    UpOption,
-    ViewOption,
-)
-from eigenshape.stability.plan import USUAL_K, StabilityPlan
+from eigenshape.cli.console import out, print_json, print_table, progress_bar, result_facts
+from eigenshape.stability.plan import StabilityPlan
 
+Normalization = Literal["none", "area", "diameter"]
 USUAL = StabilityPlan()
 
 
 def stability(
-    one: ShapeArgument,
-    two: ShapeArgument,
+    one: Path,
+    two: Path,
     *,
-    k: Annotated[
-        int | None,
-        typer.Option(
-            "-k",
-            help=f"Number of eigenvalues to compare. By default {USUAL_K}, or all if there are fewer.",
-        ),
-    ] = None,
-    t: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--t",
-            help="Heat time, in length²; may be given several times. By default four are chosen.",
-        ),
-    ] = None,
-    n_samples: Annotated[
-        int, typer.Option("-n", "--n-samples", help="Number of random points on each shape.")
-    ] = USUAL.n_samples,
-    seed: Annotated[int, typer.Option(help="Seed of the random points.")] = USUAL.seed,
-    map_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--map",
-            help=(
-                "Text file with one line for each vertex of the first shape: the number of its "
-                "partner in the second shape, from 0."
-            ),
-        ),
-    ] = None,
-    scale: Annotated[
-        Scale,
-        typer.Option(
-            help="Center both shapes and scale them to area 1 or to diameter 1 before they are compared."
-        ),
-    ] = "none",
-    brackets: Annotated[
-        bool,
-        typer.Option(
-            "--brackets",
-            help="Compute guaranteed bounds of each eigenvalue, to prove that the shapes differ.",
-        ),
-    ] = False,
-    dim: DimOption = 2,
-    repair: RepairOption = "",
-    picture: Annotated[Path | None, typer.Option(help="Draw the report (PNG, SVG or PDF).")] = None,
-    view: ViewOption = "auto",
-    up: UpOption = "auto",
-    as_json: JsonOption = False,
+    k: int | None = None,
+    t: list[float] | None = None,
+    n_samples: int = USUAL.n_samples,
+    seed: int = USUAL.seed,
+    map_file: Path | None = None,
+    normalize: Normalization = "none",
+    brackets: bool = False,
+    dim: int = 2,
+    repair: str = "none",
+    picture: Path | None = None,
+    view: str = "auto",
+    up: str = "auto",
+    as_json: bool = False,
 ) -> None:
     """Compare two shapes: how close they are, how their spectra change, which heat times to trust.
 
@@ -81,12 +40,34 @@ def stability(
     points that are matched by their distances in space.
 
     For instance: eigenshape stability clean.ply noisy.ply --picture report.png
+
+    Parameters
+    ----------
+    one, two
+        The shapes, in files of any kind that `info` takes.
+    k
+        Number of eigenvalues to compare. By default 20, or all if there are fewer.
+    t
+        Heat time, in length²; may be given several times. By default four are chosen.
+    n_samples
+        Number of random points on each shape.
+    seed
+        Seed of the random points.
+    map_file
+        Text file with one line for each vertex of the first shape: the number of its partner in
+        the second shape, from 0.
+    normalize
+        Center both shapes and scale them to area 1 or to diameter 1 before they are compared.
+    brackets
+        Also compute guaranteed lower and upper bounds of each eigenvalue, to prove that the
+        shapes differ.
+    picture
+        Draw the report (PNG, SVG or PDF).
     """
-    steps.require_picture(picture)
-    side = steps.parse_side(view, up)
-    partners = steps.read_partners(map_file)
+    side = steps.picture_side(view, up, picture)
+    partners = None if map_file is None else steps.read_map(map_file)
     first, second = (
-        steps.scale_shape(steps.load_shape(path, repair, dim), scale) for path in (one, two)
+        _normalized(steps.load_shape(path, repair, dim), normalize) for path in (one, two)
     )
     plan = StabilityPlan(
         k=k, n_samples=n_samples, times=tuple(t or ()), seed=seed, brackets=brackets
@@ -94,15 +75,42 @@ def stability(
     with progress_bar("stability") as progress:
         report = es.compare_shapes(first, second, plan, partners=partners, progress=progress)
     if as_json:
-        print_json(
-            {"one": str(one), "two": str(two), "scale": scale, **steps.stability_facts(report)}
-        )
+        closeness = {"delta_of_the_map": report.closeness.delta if report.closeness else None}
+        # Without what there is for each point
+        facts = result_facts(report, "closeness", "distances") | closeness
+        print_json({"one": one, "two": two, "normalize": normalize, **facts})
     else:
-        steps.print_stability(report)
+        _print(report)
     if picture:
-        steps.save_picture(
-            es.plot.figure_stability(
-                report, first, second, titles=(literal(one.stem), literal(two.stem)), **side
-            ),
-            picture,
-        )
+        titles = (literal(one.stem), literal(two.stem))
+        figure = es.plot.figure_stability(report, first, second, titles=titles, **side)
+        steps.save_picture(figure, picture)
+
+
+def _normalized(shape: Any, how: Normalization) -> Any:
+    """Center a shape and scale it to area 1 or to diameter 1, as --normalize says."""
+    if how == "none":
+        return shape
+    if not isinstance(shape, es.TriangleMesh):
+        raise InvalidParameterError(f"--normalize is for triangle meshes; the shape is {shape!r}.")
+    return es.geometry.normalize_mesh(shape, how)
+
+
+def _print(report: es.stability.StabilityReport) -> None:
+    """Print the eigenvalues of both shapes and their changes at each heat time."""
+    compared = report.spectra
+    proved = compared.proved_changes
+    rows = []
+    for number, is_zero in enumerate(compared.zero):
+        values = (0.0, 0.0) if is_zero else (compared.one[number], compared.two[number])
+        texts = [*(f"{value:.6g}" for value in values), f"{compared.relative[number]:.2%}"]
+        rows.append([str(number), *texts, "yes" if proved[number] else "no"])
+    print_table("Eigenvalues, in 1/length²", ["i", "first", "second", "change", "proved"], rows)
+    heat = []
+    for change in report.changes:
+        numbers = (change.t, change.change, change.floor, change.weyl)
+        texts = [f"{number:.3g}" for number in numbers]
+        heat.append([*texts, "yes" if change.admissible else "no"])
+    title = f"Largest change of {len(rows)} eigenvalues of graph Laplacians, over the last, at heat time t (length²)"
+    print_table(title, ["t", "shapes", "samples", "Weyl's bound", "admissible"], heat)
+    out.print(report.explain())

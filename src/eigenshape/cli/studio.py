@@ -9,49 +9,45 @@ import typer
 from eigenshape._studio import studio_module
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_address
-from eigenshape.cli.inputs import HostOption, UpOption, ViewOption
 
 
 def studio(
-    mesh: Annotated[
-        Path | None,
-        typer.Argument(help="Mesh file to open. By default a synthetic creature."),
-    ] = None,
+    mesh: Path | None = None,
     *,
-    shelf: Annotated[
-        Path | None,
-        typer.Option("--index", help="Folder of an index to search in, as `index` writes it."),
-    ] = None,
-    view: ViewOption = "auto",
-    up: UpOption = "auto",
-    host: HostOption = "127.0.0.1",
-    port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any that is free.")
-    ] = 0,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the address in a browser.")
-    ] = True,
-    allow_remote: Annotated[
-        bool,
-        typer.Option(
-            "--allow-remote",
-            help="Let other machines in. Whoever has the address controls the studio, and nothing is "
-            "encrypted.",
-        ),
-    ] = False,
+    index: Path | None = None,
+    view: str = "auto",
+    up: str = "auto",
+    host: str = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535)] = 0,
+    browser: bool = True,
+    allow_remote: bool = False,
 ) -> None:
     """Open a window in the browser: bend a shape by hand, see its spectrum, heat and parts, and search.
 
     Needs the package eigenshape-studio. Ctrl-C ends it.
 
     For instance: eigenshape studio scan.ply --index my-index
+
+    Parameters
+    ----------
+    mesh
+        Mesh file to open. By default a synthetic creature.
+    index
+        Folder of an index to search in.
+    port
+        Port to listen on; 0 takes any that is free.
+    browser
+        Open the address in a browser.
+    allow_remote
+        Let other machines in. Whoever has the address controls the studio, and nothing is
+        encrypted.
     """
-    side = steps.parse_side(view, up)
+    side = steps.picture_side(view, up)
     server = studio_module("server")
 
     server.serve(
         mesh,
-        index=shelf,
+        index=index,
         **side,
         host=host,
         port=port,

@@ -1,10 +1,18 @@
 """The verbs of the command line: a list that costs nothing, and modules loaded when a verb is called."""
 
+import inspect
+import signal
+import sys
+import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from importlib import import_module
-from typing import Any
+from importlib.util import find_spec
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any, get_args, get_origin
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -12,62 +20,16 @@ from typer.core import TyperCommand, TyperGroup
 from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape._text import printable
 from eigenshape.cli.console import err, escape_text
-from eigenshape.cli.interrupt import interruptible
+from eigenshape.cli.inputs import SHARED_PARAMETERS, option_spellings, read_parameters
 
-# The first line of each verb's docstring stands here again, because `eigenshape --help` lists the
-# verbs without importing their modules, which takes more than a second. A test compares the two.
-VERBS = {
-    "info": "Show the size, topology and faults of a shape, and which repairs would help.",
-    "repair": "Repair a mesh and write it, and report what was done. All else that the file holds "
-    "stays, or is named.",
-    "decimate": "Write a mesh with fewer faces and the same topology, by collapsing edges.",
-    "spectrum": "Compute the lowest eigenvalues of a shape and prove that none is missing.",
-    "operators": "List the operators that `spectrum --operator` takes, with the shapes and options "
-    "of each.",
-    "features": "Find the feature points of a mesh and the parts around them, most persistent "
-    "first.",
-    "segment": "Cut a mesh into its parts: limbs, head, torso.",
-    "label": "Copy the labels of one mesh or several to another: label a horse, and get a labeled "
-    "camel.",
-    "match": "Find where each point of a part, a scan or a pose lies on a whole shape.",
-    "deform": "Bend, twist or stretch a mesh: a region is turned or moved, and the rest follows "
-    "smoothly.",
-    "pose": "Bend a mesh into the pose of another one; what corresponds is found by itself.",
-    "stability": "Compare two shapes: how close they are, how their spectra change, which heat times "
-    "to trust.",
-    "index": "Keep an index of shapes: add meshes, list and remove shapes, check, compact, export "
-    "and merge.",
-    "query": "Find the shapes of an index that are most like a scan, and which features "
-    "correspond.",
-    "fuse": "Join scans of one shape from several sides, in any places, to one surface.",
-    "compress": "Write a mesh as a small file, by the spectral coefficients of its coordinates.",
-    "decompress": "Write the mesh of a file that `eigenshape compress` wrote.",
-    "studio": "Open a window in the browser: bend a shape by hand, see its spectrum, heat and parts, "
-    "and search.",
-    "serve": "Serve an index: upload a scan, by a page or a program, and get the most similar shapes.",
-    "report": "Write a shape with its spectrum, heat and parts to one HTML file that any browser "
-    "opens.",
-    "warm-up": "Compile the loops of spectra, search, matching, parts and bending, and keep them on "
-    "disk.",
-    "demo": "Try everything: make creatures, index them, scan one from one side in a new pose, and "
-    "find its kind.",
-}
-INDEX_VERBS = {
-    "add": "Describe shapes and add them to an index; a file that fails is named, and the others "
-    "are still added.",
-    "ls": "List the shapes of an index, with their labels, tags and attributes.",
-    "rm": "Remove shapes from an index.",
-    "stats": "Show how many shapes an index holds, how they are described, and the space they take.",
-    "verify": "Read every byte of an index and name what is damaged.",
-    "compact": "Give back the space of removed and replaced shapes.",
-    "export": "Write the descriptors of shapes, and what is known of them, for other programs.",
-    "merge": "Make one index of several, by copying them.",
-    "convert": "Write an index of an older version anew, in the format of this one.",
-    "duplicates": "List pairs of shapes that are nearly the same, wherever they lie and whatever "
-    "their size.",
-    "learn": "Learn a codebook from meshes, for indexes that are built in parts.",
-}
-NEED_NO_ARGUMENT = ("operators", "studio", "warm-up", "demo")
+# In the order in which help lists them. What each does is the first line of its docstring.
+VERBS = (
+    "info", "repair", "decimate", "spectrum", "operators", "features", "segment", "label", "match", "deform", "pose",
+    "stability", "index", "query", "fuse", "compress", "decompress", "studio", "serve", "report", "warm-up", "demo",
+)  # fmt: skip
+INDEX_VERBS = (
+    "add", "ls", "rm", "stats", "verify", "compact", "export", "merge", "convert", "duplicates", "learn",
+)  # fmt: skip
 MARKUP: Any = "markdown"  # leaves plain brackets alone, which rich markup would take for its own
 
 # typer brings its own copy of click since version 0.20 and used the package before; this is the
@@ -82,15 +44,10 @@ class Verb(TyperCommand):
         """Return options and arguments, as help lists them."""
         return _flags_without_type(super().get_params(ctx))
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read the options and arguments of the verb."""
-        with _printable_usage():
-            return super().parse_args(ctx, args)
-
     def invoke(self, ctx: Any) -> Any:
         """Run the verb."""
         try:
-            with interruptible(), _printable_usage(), warnings.catch_warnings():
+            with interruptible(), warnings.catch_warnings():
                 warnings.simplefilter("always", UserWarning)
                 warnings.showwarning = _print_warning
                 return super().invoke(ctx)
@@ -108,65 +65,58 @@ class Verb(TyperCommand):
 class Verbs(TyperGroup):
     """The list of verbs. It holds the name and first line of each, and imports a verb when it is called."""
 
-    lines = VERBS
+    names: tuple[str, ...] = VERBS
     package = "eigenshape.cli"
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.commands = {name: TyperCommand(name, help=line) for name, line in self.lines.items()}
+        self.commands = {
+            name: TyperCommand(name, help=first_line(self.package, name)) for name in self.names
+        }
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the options before the verb, as help lists them."""
         return _flags_without_type(super().get_params(ctx))
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+    def make_context(self, *args: Any, **settings: Any) -> Any:
         """Read the options before the verb."""
         with _printable_usage():
-            return super().parse_args(ctx, args)
+            return super().make_context(*args, **settings)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Read what stands after the verb, and run it."""
+        with _printable_usage():
+            return super().invoke(ctx)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
         """Return the verb that was called, from its module."""
-        with _printable_usage():
-            name, found, rest = super().resolve_command(ctx, args)
+        name, found, rest = super().resolve_command(ctx, args)
         # found is None only where a shell completes a half-typed verb
         return name, self.load(str(name)) if found else None, rest
 
     def load(self, name: str) -> Any:
         """Import a verb's module and return its command."""
         if name == "index":
-            return index_verbs()
+            help_text = first_line(self.package, name)
+            return IndexVerbs(
+                name=name, help=help_text, rich_markup_mode=MARKUP, no_args_is_help=True
+            )
+        function = name.replace("-", "_")
+        verb = command_of(getattr(import_module(f"{self.package}.{function}"), function))
+        parameters = inspect.signature(verb).parameters.values()
+        takes_something = any(parameter.default is parameter.empty for parameter in parameters)
         alone = typer.Typer(
             rich_markup_mode=MARKUP, add_completion=False, pretty_exceptions_enable=False
         )
-        function = name.replace("-", "_")
-        module = import_module(f"{self.package}.{function}")
-        alone.command(name, cls=Verb, no_args_is_help=name not in NEED_NO_ARGUMENT)(
-            getattr(module, function)
-        )
+        alone.command(name, cls=Verb, no_args_is_help=takes_something)(verb)
         return typer.main.get_command(alone)
 
 
 class IndexVerbs(Verbs):
     """The verbs of `eigenshape index`."""
 
-    lines = INDEX_VERBS
+    names = INDEX_VERBS
     package = "eigenshape.cli.index"
-
-
-def index_verbs() -> Any:
-    """Return the command `eigenshape index`, which lists its verbs."""
-    group = typer.Typer(
-        name="index",
-        cls=IndexVerbs,
-        help=VERBS["index"],
-        rich_markup_mode=MARKUP,
-        no_args_is_help=True,
-        add_completion=False,
-        pretty_exceptions_enable=False,
-    )
-
-    group.callback()(lambda: None)  # without it, typer would make no group
-    return typer.main.get_command(group)
 
 
 def load_verb(name: str) -> Any:
@@ -174,6 +124,45 @@ def load_verb(name: str) -> Any:
     *group, verb = name.split()
     verbs = (IndexVerbs if group else Verbs)(name=name)
     return verbs.load(verb)
+
+
+def first_line(package: str, verb: str) -> str:
+    """Return what a verb does, without importing its module, which takes up to a second."""
+    function = verb.replace("-", "_")
+    place = find_spec(f"{package}.{function}").origin  # type: ignore[union-attr]  # it is there
+    text = Path(str(place)).read_text(encoding="utf-8")
+    text = text.partition(f"\ndef {function}(")[2] or text  # `index` has a docstring of its own
+    return " ".join(text.split('"""')[1].split("\n\n")[0].split())
+
+
+def command_of(function: Callable[..., None]) -> Callable[..., None]:
+    """Return a verb as typer takes it: with the help of each parameter, which is in the docstring.
+
+    Parameters before the star are arguments, the others are options. One that brings a
+    `typer.Option` keeps what that holds.
+    """
+    text, _, section = (inspect.getdoc(function) or "").partition("\n\nParameters\n----------\n")
+    explained = read_parameters(SHARED_PARAMETERS) | read_parameters(section)
+    parameters = []
+    signature = inspect.signature(function, eval_str=True)
+    for name, parameter in signature.parameters.items():
+        kind, info = parameter.annotation, None
+        if get_origin(kind) is Annotated:
+            kind, info = get_args(kind)
+        is_option = parameter.kind is parameter.KEYWORD_ONLY
+        info = copy(info) or (typer.Option() if is_option else typer.Argument())
+        if is_option and info.default is ... and not info.param_decls:
+            info.param_decls = option_spellings(name, parameter.default)
+        if not info.help:
+            info.metavar, info.help = explained.get(name, (None, None))
+        parameters.append(parameter.replace(annotation=Annotated[kind, info]))
+
+    def verb(**values: Any) -> None:
+        function(**values)
+
+    verb.__doc__ = text
+    verb.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return verb
 
 
 def _flags_without_type(params: list[Any]) -> list[Any]:
@@ -196,3 +185,40 @@ def _printable_usage() -> Iterator[None]:
 
 def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
     err.print(f"[yellow]warning:[/] {escape_text(message)}")
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let Ctrl-C raise KeyboardInterrupt while the block runs, so that what is half done is cleared away.
+
+    Python cannot raise it everywhere: in a finalizer or in a callback from C, of which compiling
+    has many, it prints a traceback and goes on. There Ctrl-C is repeated; and an error that comes
+    after it counts as its consequence.
+    """
+    before, report = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    if not callable(before) or threading.current_thread() is not threading.main_thread():
+        yield  # ignored, as in a background job, or not ours to decide
+        return
+    pressed = threading.Event()
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        pressed.set()
+        raise KeyboardInterrupt
+
+    def repeat(unraisable: Any) -> None:
+        if unraisable.exc_type is KeyboardInterrupt:
+            threading.Timer(0.01, signal.raise_signal, [signal.SIGINT]).start()
+        elif not pressed.is_set():
+            report(unraisable)
+
+    signal.signal(signal.SIGINT, stop)
+    sys.unraisablehook = repeat
+    try:
+        yield
+    except Exception as error:
+        if pressed.is_set():
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        sys.unraisablehook = report
+        signal.signal(signal.SIGINT, before)

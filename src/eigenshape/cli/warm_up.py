@@ -9,12 +9,11 @@ from time import perf_counter
 
 import eigenshape as es
 from eigenshape.cli.console import err, escape_text, out, print_json, print_table, progress_bar
-from eigenshape.cli.inputs import JsonOption
 
 N_VERTICES = 2000  # of a creature: large enough for all that is done with fingers and views
 
 
-def warm_up(*, as_json: JsonOption = False) -> None:
+def warm_up(*, as_json: bool = False) -> None:
     """Compile the loops of spectra, search, matching, parts and bending, and keep them on disk.
 
     Otherwise each loop is compiled when it is first called, which takes some seconds. Run this when

@@ -18,10 +18,10 @@ from .rig import eigen_skeleton as eigen_skeleton
 from .rig import rig_shape as rig_shape
 from .session import DeformationSession as DeformationSession
 from .session import replay as replay
-from .skeleton import SkeletonResponse as SkeletonResponse
-from .skeleton import move_skeleton as move_skeleton
-from .skeleton import skeleton_response as skeleton_response
 from .thesis import DetailedSkeleton as DetailedSkeleton
+from .thesis import SkeletonResponse as SkeletonResponse
 from .thesis import detailed_skeleton as detailed_skeleton
 from .thesis import eigen_deformation as eigen_deformation
+from .thesis import move_skeleton as move_skeleton
+from .thesis import skeleton_response as skeleton_response
 from .transfer import transfer_deformation as transfer_deformation

@@ -162,7 +162,12 @@ def bind(
     if not len(masks):
         raise InvalidParameterError("There must be at least one region; none was given.")
     still = np.zeros(n, dtype=bool) if fixed is None else region_mask(rig.mesh, fixed)
-    _require_disjoint(np.vstack([masks, still]))
+    twice = np.flatnonzero(masks.sum(axis=0) + still > 1)
+    if twice.size:
+        raise InvalidParameterError(
+            "Regions and fixed vertices must not overlap; "
+            f"vertex {twice[0]} is in two of them ({twice.size} such)."
+        )
     # The vertices at which the fit has data. Without data in some component, nothing would
     # determine the modes that are constant on that component.
     known = masks.any(axis=0) | still if still.any() else np.ones_like(still)
@@ -170,12 +175,18 @@ def bind(
 
     rims = [require_boundary(rig.mesh, mask, number) for number, mask in enumerate(masks)]
     distances = geodesic_distances(rig.mesh, rims)
-    if n_modes is None:
-        counts = [_modes_by_rule(rig, *pair) for pair in zip(masks, distances, strict=True)]
-    else:
+    counts = []
+    for mask, distance in zip(masks, distances, strict=True):
+        reached = np.isfinite(distance)
+        inside = np.max(distance[mask & reached], initial=0.0)
+        outside = np.max(distance[~mask & reached], initial=0.0)
+        by_rule = next(count for least, count in MODE_RULE if inside >= least * outside)
+        # One more for each further component, whose indicator is a mode of eigenvalue 0
+        counts.append(min(by_rule + int(rig.components.max()), rig.n_modes))
+    if n_modes is not None:
         counts = [whole_number(n_modes, "n_modes", 1, rig.n_modes)] * len(masks)
     pairs = zip(masks, counts, strict=True)
-    shares = np.array([_compute_shares(rig, mask, known, count) for mask, count in pairs])
+    shares = np.array([_fit_shares(rig, mask, known, count) for mask, count in pairs])
     shares /= np.maximum(shares.sum(axis=0), 1)
 
     placed = known & ((shares == 0).all(axis=0) | (shares == 1).any(axis=0))
@@ -222,30 +233,21 @@ def _placed_beyond_rims(
     return placed & (~near | (n_left[group] == 0))
 
 
-def _require_disjoint(masks: Bool[np.ndarray, "r n"]) -> None:
-    twice = np.flatnonzero(masks.sum(axis=0) > 1)
-    if twice.size:
-        raise InvalidParameterError(
-            "Regions and fixed vertices must not overlap; "
-            f"vertex {twice[0]} is in two of them ({twice.size} such)."
-        )
-
-
-def _modes_by_rule(
-    rig: EigenRig, mask: Bool[np.ndarray, " n"], distance: Float[np.ndarray, " n"]
-) -> int:
-    inside, outside = (
-        np.max(distance[side & np.isfinite(distance)], initial=0.0) for side in (mask, ~mask)
-    )
-    by_rule = next(count for least, count in MODE_RULE if inside >= least * outside)
-    return min(by_rule + int(rig.components.max()), rig.n_modes)
-
-
-def _compute_shares(
+def _fit_shares(
     rig: EigenRig, mask: Bool[np.ndarray, " n"], known: Bool[np.ndarray, " n"], n_modes: int
 ) -> Float[np.ndarray, " n"]:
-    """Scale and clip the fit of a region's indicator to 0..1."""
-    fit = _fit_indicator(rig, mask, known, n_modes)
+    """Fit a region's indicator by the lowest modes, and scale and clip the fit to 0..1."""
+    modes, values = rig.eigenvectors[:, :n_modes], rig.eigenvalues[:n_modes]
+    goal = modes[mask].T @ rig.areas[mask]
+    if known.all():
+        # The modes are orthonormal with respect to the areas.
+        fit = modes @ goal
+    else:
+        # Least squares where the indicator is known, and smooth elsewhere
+        gram = (modes[known] * rig.areas[known, None]).T @ modes[known]
+        relative_values = values / max(values[-1], np.finfo(float).tiny)
+        stiff = SMOOTHNESS * rig.areas[known].sum() / rig.areas.sum() * relative_values**2
+        fit = modes @ np.linalg.solve(gram + np.diag(stiff), goal)
     best, rest = fit[mask].max(), fit[known & ~mask].min()
     if not best - rest > LEAST_CONTRAST * abs(best):
         raise InvalidParameterError(
@@ -254,18 +256,3 @@ def _compute_shares(
         )
     low, high = max(CLIP * min(best, 1), rest), min(1 - CLIP, best)
     return np.clip((fit - low) / (high - low), 0, 1)
-
-
-def _fit_indicator(
-    rig: EigenRig, mask: Bool[np.ndarray, " n"], known: Bool[np.ndarray, " n"], n_modes: int
-) -> Float[np.ndarray, " n"]:
-    """Fit a region's indicator by the lowest modes: least squares where known, smooth elsewhere."""
-    modes, values = rig.eigenvectors[:, :n_modes], rig.eigenvalues[:n_modes]
-    goal = modes[mask].T @ rig.areas[mask]
-    if known.all():
-        # The modes are orthonormal with respect to the areas.
-        return modes @ goal
-    gram = (modes[known] * rig.areas[known, None]).T @ modes[known]
-    relative_values = values / max(values[-1], np.finfo(float).tiny)
-    stiff = SMOOTHNESS * rig.areas[known].sum() / rig.areas.sum() * relative_values**2
-    return modes @ np.linalg.solve(gram + np.diag(stiff), goal)

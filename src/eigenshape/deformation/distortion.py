@@ -110,13 +110,7 @@ def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:
 
 
 def require_poses(before: TriangleMesh, after: TriangleMesh) -> None:
-    """Raise an error if two meshes do not have the same faces.
-
-    Raises
-    ------
-    InvalidParameterError
-        If the faces differ.
-    """
+    """Raise an error if two meshes do not have the same faces."""
     if before.n_vertices != after.n_vertices or not np.array_equal(before.faces, after.faces):
         raise InvalidParameterError(
             f"Poses of one mesh must have the same faces; these are {before} and {after}."

@@ -1,7 +1,7 @@
 """Edits as values that can be stored as JSON and applied again."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from hashlib import sha256
 from typing import Any
 
@@ -23,6 +23,10 @@ from eigenshape.geometry.mesh import TriangleMesh
 # The entries "kind" and "version" of the JSON object. The version grows when older readers could
 # not read what is written.
 KIND, VERSION = "eigenshape edits", 2
+# Names of handles and regions in it; a mask is written as the list of its vertices.
+HANDLES = {"rotation": Rotation, "translation": Translation}
+REGIONS = {"box": BoxRegion, "brush": BrushRegion}
+OPEN_SIDES = {"low": -np.inf, "high": np.inf}
 
 
 @dataclass(frozen=True)
@@ -162,52 +166,44 @@ def carry_edit(edit: Edit, source: TriangleMesh, target: TriangleMesh) -> Edit:
 def edits_to_json(edits: Sequence[Edit], mesh: TriangleMesh) -> dict[str, Any]:
     """Return the edits of a mesh as a dictionary for JSON, with regions as indices of vertices.
 
-    Raises
-    ------
-    InvalidParameterError
-        If a region does not fit the mesh.
+    Raise InvalidParameterError if a region does not fit the mesh.
     """
     entries = []
     for edit in edits:
         moves = [
-            {"region": _region_out(move.region, mesh), "handle": _handle_out(move.handle)}
+            {"region": _region_to_json(move.region, mesh), "handle": _to_json(move.handle)}
             for move in edit.moves
         ]
-        fixed = None if edit.fixed is None else _region_out(edit.fixed, mesh)
+        fixed = None if edit.fixed is None else _region_to_json(edit.fixed, mesh)
         entries.append({"moves": moves, "fixed": fixed, "n_modes": edit.n_modes, "mode": edit.mode})
     fingerprint = asdict(mesh_fingerprint(mesh))
     return {"kind": KIND, "version": VERSION, "mesh": fingerprint, "edits": entries}
 
 
-def _region_out(region: Region, mesh: TriangleMesh) -> dict[str, Any]:
-    if isinstance(region, BoxRegion):
-        # JSON has no infinity: null stands for an open side.
-        low, high = (
-            [value if np.isfinite(value) else None for value in corner.tolist()]
-            for corner in (region.low, region.high)
-        )
-        return {"kind": "box", "low": low, "high": high}
-    if isinstance(region, BrushRegion):
-        return {"kind": "brush", "center": region.center.tolist(), "radius": region.radius}
+def _region_to_json(region: Region, mesh: TriangleMesh) -> dict[str, Any]:
+    if isinstance(region, BoxRegion | BrushRegion):
+        return _to_json(region)
     return {"kind": "vertices", "vertices": np.flatnonzero(region_mask(mesh, region)).tolist()}
 
 
-def _handle_out(handle: Handle) -> dict[str, Any]:
-    if isinstance(handle, Rotation):
-        pivot, axis = handle.pivot.tolist(), handle.axis.tolist()
-        return {"kind": "rotation", "pivot": pivot, "axis": axis, "angle": handle.angle}
-    return {"kind": "translation", "vector": handle.vector.tolist()}
+def _to_json(value: Handle | BoxRegion | BrushRegion) -> dict[str, Any]:
+    """Return the kind of a value and its fields; null stands for an open side of a box."""
+    kinds = {made: kind for kind, made in (HANDLES | REGIONS).items()}
+    entry: dict[str, Any] = {"kind": kinds[type(value)]}
+    for field in fields(value):
+        content = getattr(value, field.name)
+        if isinstance(content, np.ndarray):
+            # JSON has no infinity.
+            content = [part if np.isfinite(part) else None for part in content.tolist()]
+        entry[field.name] = content
+    return entry
 
 
 def edits_from_json(content: Any, mesh: TriangleMesh) -> list[Edit]:
     """Return the edits of a mesh from what `edits_to_json` returned.
 
-    Raises
-    ------
-    FileFormatError
-        If the content is of another form; the message names the first edit that cannot be read.
-    InvalidParameterError
-        If the edits belong to another mesh; the message names the size and digest of both.
+    Raise FileFormatError if the content is of another form, and InvalidParameterError if the edits
+    belong to another mesh.
     """
     if not isinstance(content, Mapping):
         raise FileFormatError(
@@ -227,7 +223,17 @@ def edits_from_json(content: Any, mesh: TriangleMesh) -> list[Edit]:
         n_vertices, n_faces = (_whole(entry[name], name, 0) for name in ("n_vertices", "n_faces"))
         original = MeshFingerprint(n_vertices, n_faces, str(entry["digest"]))
         for entry in _as_list(content["edits"], "edits"):
-            found.append(_edit_in(entry, n_vertices))
+            moves = [
+                Move(
+                    _region_from_json(move["region"], n_vertices),
+                    _from_json(move["handle"], HANDLES),
+                )
+                for move in _as_list(entry["moves"], "moves")
+            ]
+            fixed, n_modes = entry["fixed"], entry["n_modes"]
+            fixed = None if fixed is None else _region_from_json(fixed, n_vertices)
+            n_modes = None if n_modes is None else _whole(n_modes, "n_modes", 1)
+            found.append(Edit(tuple(moves), fixed, n_modes, require_mode(str(entry["mode"]))))
     except (KeyError, TypeError, ValueError, OverflowError) as err:
         reason = f"{err} is missing or unknown." if isinstance(err, KeyError) else str(err)
         raise FileFormatError(f"Edit {len(found)} cannot be read: {reason}") from err
@@ -241,39 +247,29 @@ def edits_from_json(content: Any, mesh: TriangleMesh) -> list[Edit]:
     return found
 
 
-def _edit_in(entry: Any, n_vertices: int) -> Edit:
-    moves = [
-        (_region_in(move["region"], n_vertices), _handle_in(move["handle"]))
-        for move in _as_list(entry["moves"], "moves")
-    ]
-    fixed = None if entry["fixed"] is None else _region_in(entry["fixed"], n_vertices)
-    n_modes = None if entry["n_modes"] is None else _whole(entry["n_modes"], "n_modes", 1)
-    mode = require_mode(str(entry["mode"]))
-    return Edit(tuple(Move(*pair) for pair in moves), fixed, n_modes, mode)
+def _region_from_json(entry: Any, n_vertices: int) -> Region:
+    if entry["kind"] != "vertices":
+        return _from_json(entry, REGIONS)
+    vertices = _as_list(entry["vertices"], "vertices")
+    whole = [_whole(vertex, "A vertex", 0, n_vertices - 1) for vertex in vertices]
+    return np.array(whole, dtype=np.int64)
 
 
-def _region_in(entry: Any, n_vertices: int) -> Region:
-    kind = entry["kind"]
-    if kind == "box":
-        low = _numbers(entry["low"], "low", -np.inf)
-        return BoxRegion(low, _numbers(entry["high"], "high", np.inf))
-    if kind == "brush":
-        return BrushRegion(_numbers(entry["center"], "center"), _number(entry["radius"], "radius"))
-    if kind == "vertices":
-        vertices = _as_list(entry["vertices"], "vertices")
-        whole = [_whole(vertex, "A vertex", 0, n_vertices - 1) for vertex in vertices]
-        return np.array(whole, dtype=np.int64)
-    raise KeyError(kind)
-
-
-def _handle_in(entry: Any) -> Handle:
-    kind = entry["kind"]
-    if kind == "rotation":
-        pivot, axis = _numbers(entry["pivot"], "pivot"), _numbers(entry["axis"], "axis")
-        return Rotation(pivot, axis, _number(entry["angle"], "angle"))
-    if kind == "translation":
-        return Translation(_numbers(entry["vector"], "vector"))
-    raise KeyError(kind)
+def _from_json(entry: Any, kinds: dict[str, Any]) -> Any:
+    """Make a value of its kind and its fields, which are numbers or lists of numbers."""
+    made = kinds[entry["kind"]]
+    arguments: dict[str, Any] = {}
+    for field in fields(made):
+        name, content = field.name, entry[field.name]
+        if field.type is float:
+            arguments[name] = _number(content, name)
+        else:
+            parts = [
+                OPEN_SIDES[name] if part is None and name in OPEN_SIDES else _number(part, name)
+                for part in _as_list(content, name)
+            ]
+            arguments[name] = parts
+    return made(**arguments)
 
 
 def _as_list(value: Any, name: str) -> list[Any]:
@@ -292,11 +288,3 @@ def _number(value: Any, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidParameterError(f"{name} must be a number; it is {value!r}.")
     return float(value)
-
-
-def _numbers(value: Any, name: str, null: float | None = None) -> list[float]:
-    """Return a list of numbers; `null`, if given, is the meaning of a null in the list."""
-    return [
-        null if null is not None and part is None else _number(part, name)
-        for part in _as_list(value, name)
-    ]

@@ -208,12 +208,7 @@ def rotation_from_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Ro
 
 
 def as_vector(value: ArrayLike, name: str) -> Float[np.ndarray, " 3"]:
-    """Return `value` as three finite numbers.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
+    """Return `value` as three finite numbers."""
     numbers = finite_values(value, name)
     if numbers.shape != (3,):
         raise InvalidParameterError(

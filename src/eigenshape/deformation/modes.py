@@ -8,12 +8,7 @@ Mode = Literal["graded", "uncrossed", "thesis"]
 
 
 def require_mode(mode: str) -> Mode:
-    """Return the mode; raise an error if it is unknown.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
+    """Return the mode; raise an error if it is unknown."""
     if mode not in get_args(Mode):
         raise InvalidParameterError(
             f"mode must be 'graded', 'uncrossed' or 'thesis'; it is {mode!r}."

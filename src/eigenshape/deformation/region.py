@@ -224,13 +224,7 @@ def region_boundary(mesh: MeshLike, mask: Bool[np.ndarray, " n"]) -> Int[np.ndar
 def require_boundary(
     mesh: TriangleMesh, mask: Bool[np.ndarray, " n"], number: int
 ) -> Int[np.ndarray, " b"]:
-    """Return the boundary of a region; raise an error if it has none.
-
-    Raises
-    ------
-    InvalidParameterError
-        If the region is empty, or consists of whole components.
-    """
+    """Return the boundary of a region; raise an error if it has none."""
     rim = region_boundary(mesh, mask)
     if len(rim):
         return rim

@@ -142,8 +142,8 @@ def rig_shape(
         # Φ = QR gives ΦᵀΦ = RᵀR, without the squared condition number of forming ΦᵀΦ.
         factor = np.asarray(np.linalg.qr(modes, mode="r")).T
     edges = edge_weights(mesh, laplacian.stiffness)
-    areas = freeze(spectrum.mass @ np.ones(len(modes)))
-    return EigenRig(mesh, modes, spectrum.eigenvalues, areas, freeze(factor), edges)
+    areas = spectrum.mass @ np.ones(len(modes))
+    return EigenRig(mesh, modes, spectrum.eigenvalues, areas, factor, edges)
 
 
 def pose_rig(rig: EigenRig, vertices: ArrayLike) -> EigenRig:
@@ -151,10 +151,7 @@ def pose_rig(rig: EigenRig, vertices: ArrayLike) -> EigenRig:
 
     The modes are kept, because bending hardly changes them.
 
-    Raises
-    ------
-    InvalidShapeError
-        If a coordinate is not finite, or the shape of the array is not (n, 3).
+    Raise InvalidShapeError if a coordinate is not finite, or the shape of the array is not (n, 3).
     """
     return replace(rig, mesh=TriangleMesh(finite_rows(vertices, "vertices", 3), rig.mesh.faces))
 

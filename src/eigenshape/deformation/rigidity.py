@@ -107,12 +107,8 @@ def edge_weights(mesh: TriangleMesh, stiffness: sp.csr_array) -> EdgeWeights:
 def free_part(edges: EdgeWeights, fixed: Bool[np.ndarray, " n"]) -> FreePart:
     """Factor the equations of the free vertices, without a pull to their start.
 
-    Raises
-    ------
-    InvalidParameterError
-        If a component has no fixed vertex.
-    InvalidShapeError
-        If the equations are not positive definite.
+    Raise InvalidParameterError if a component has no fixed vertex, and InvalidShapeError if the
+    equations are not positive definite.
     """
     require_fixed_vertices(edges, fixed)
     free = np.flatnonzero(~fixed)
@@ -132,12 +128,7 @@ def pull_part(part: FreePart, pull: Float[np.ndarray, " n"]) -> FreePart:
 
 
 def require_fixed_vertices(edges: EdgeWeights, fixed: Bool[np.ndarray, " n"]) -> None:
-    """Raise an error if a component has no fixed vertex.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
+    """Raise an error if a component has no fixed vertex."""
     n_components, component = connected_components(edges.matrix, directed=False)
     loose = np.flatnonzero(np.bincount(component[fixed], minlength=n_components) == 0)
     if loose.size:
@@ -153,10 +144,7 @@ def factor_equations(
 ) -> SymmetricFactor:
     """Factor the equations of the free vertices, in the order of a factor of the same pattern.
 
-    Raises
-    ------
-    InvalidShapeError
-        If they are not positive definite.
+    Raise InvalidShapeError if they are not positive definite.
     """
     factor = factor_matrix(square, similar)
     if factor is None or not (factor.pivots > 0).all():

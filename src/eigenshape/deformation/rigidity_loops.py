@@ -7,7 +7,7 @@ import numpy as np
 from eigenshape._compile import njit
 
 # Most steps of a fit. Newton's method takes a few; the rest is for starts far from the maximum.
-ROUNDS = 100
+MOST_NEWTON_STEPS = 100
 # A step that turns by less, in radians, is the last: Newton's next one would be of its square.
 SETTLED = 1e-4
 # Added to the Hessian, as a share of the largest covariance, so that a rotation which the edges do
@@ -68,7 +68,7 @@ def _settle(covariance, turns, i):
         for row in range(3):
             for column in range(3):
                 covariance[row, column] /= largest
-    for _ in range(ROUNDS if largest > 0.0 else 0):
+    for _ in range(MOST_NEWTON_STEPS if largest > 0.0 else 0):
         m00, m01, m02 = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
         m10, m11, m12 = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
         m20, m21, m22 = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)

@@ -1,10 +1,9 @@
 """A session: edits of one shape one after the other, with undo and redo."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import wraps
 from threading import RLock
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -15,29 +14,15 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr
 from eigenshape._typing import Integer
 from eigenshape.deformation.binding import Binding, bind
-from eigenshape.deformation.deform import bend
+from eigenshape.deformation.deform import bend, move_by_shares
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
-from eigenshape.deformation.graded_bend import move_by_shares
 from eigenshape.deformation.handles import Handle, require_handle
 from eigenshape.deformation.modes import Mode, require_mode
 from eigenshape.deformation.region import Region, region_mask
 from eigenshape.deformation.rig import EigenRig, pose_rig
-from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, skeleton_response
+from eigenshape.deformation.thesis import SkeletonResponse, move_skeleton, skeleton_response
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def _one_at_a_time(change: F) -> F:
-    """Let each change of a session end before another thread begins the next one."""
-
-    @wraps(change)
-    def change_alone(self: "DeformationSession", *args: Any, **kwargs: Any) -> Any:
-        with self._lock:
-            return change(self, *args, **kwargs)
-
-    return cast("F", change_alone)
 
 
 class DeformationSession:
@@ -82,6 +67,7 @@ class DeformationSession:
     def __init__(self, rig: EigenRig, *, mode: Mode = "graded") -> None:
         require_type(rig, EigenRig, "rig")
         self._mode: Mode = require_mode(mode)
+        # Each change ends before another thread begins the next one.
         self._lock = RLock()
         self._poses = [rig]
         self._edits: list[Edit] = []
@@ -180,7 +166,6 @@ class DeformationSession:
         require_handle(handle)
         return self.drag_all([Move(region, handle)], fixed=fixed, n_modes=n_modes)
 
-    @_one_at_a_time
     def drag_all(
         self,
         moves: Iterable[Move],
@@ -213,27 +198,31 @@ class DeformationSession:
         moves = tuple(moves) if isinstance(moves, Iterable) else moves
         require_each(moves, Move, "moves")
         edit = Edit(tuple(moves), fixed, number, self._mode)
-        if self._pending is None or not self._same_regions(edit, self._pending[0]):
-            regions = [move.region for move in edit.moves]
-            binding = bind(self.rig, regions, fixed=fixed, n_modes=number)
-            self._pending = edit, binding, skeleton_response(binding)
-        self._pending = edit, *self._pending[1:]
-        return move_skeleton(self.response, [move.handle for move in edit.moves])
+        with self._lock:
+            if self._pending is None or not self._same_regions(edit, self._pending[0]):
+                regions = [move.region for move in edit.moves]
+                binding = bind(self.rig, regions, fixed=fixed, n_modes=number)
+                self._pending = edit, binding, skeleton_response(binding)
+            self._pending = edit, *self._pending[1:]
+            return move_skeleton(self.response, [move.handle for move in edit.moves])
 
     def _same_regions(self, one: Edit, two: Edit) -> bool:
         """Say whether two edits have the same binding."""
-        if (
-            one.n_modes != two.n_modes
-            or len(one.moves) != len(two.moves)
-            or (one.fixed is None) != (two.fixed is None)
-        ):
+        if one.n_modes != two.n_modes or len(one.moves) != len(two.moves):
             return False
-        pairs = [(a.region, b.region) for a, b in zip(one.moves, two.moves, strict=True)]
-        pairs += [(one.fixed, two.fixed)] if one.fixed is not None and two.fixed is not None else []
-        return all(
-            a is b or np.array_equal(region_mask(self.mesh, a), region_mask(self.mesh, b))
-            for a, b in pairs
-        )
+        for a, b in zip(
+            [*(move.region for move in one.moves), one.fixed],
+            [*(move.region for move in two.moves), two.fixed],
+            strict=True,
+        ):
+            # Masks are compared last: that of a brush costs as much as a short walk on the surface.
+            if a is b:
+                continue
+            if a is None or b is None:
+                return False
+            if not np.array_equal(region_mask(self.mesh, a), region_mask(self.mesh, b)):
+                return False
+        return True
 
     def _require_drag(self) -> tuple[Edit, Binding, SkeletonResponse]:
         if self._pending is None:
@@ -273,7 +262,6 @@ class DeformationSession:
         edit, binding, _ = self._require_drag()
         return move_by_shares(binding, [move.handle for move in edit.moves])
 
-    @_one_at_a_time
     def commit(self, *, mode: Mode | None = None) -> TriangleMesh:
         """Apply the present drag, and forget the edits that were undone.
 
@@ -292,13 +280,12 @@ class DeformationSession:
         InvalidParameterError
             If no region is being dragged, or the mode is unknown.
         """
-        edit, binding, _ = self._require_drag()
-        edit = replace(edit, mode=self._mode if mode is None else require_mode(mode))
-        bent = bend(binding, [move.handle for move in edit.moves], mode=edit.mode)
-        self._advance(edit, pose_rig(self.rig, bent.vertices))
-        return self.mesh
+        with self._lock:
+            edit, binding, _ = self._require_drag()
+            edit = replace(edit, mode=self._mode if mode is None else require_mode(mode))
+            bent = bend(binding, [move.handle for move in edit.moves], mode=edit.mode)
+            return self._advance(edit, pose_rig(self.rig, bent.vertices))
 
-    @_one_at_a_time
     def apply(self, edit: Edit) -> TriangleMesh:
         """Apply an edit in its own mode, and drop the present drag.
 
@@ -313,21 +300,26 @@ class DeformationSession:
             As for `bind` and `bend`.
         """
         require_type(edit, Edit, "edit")
-        self._advance(edit, apply_edit(self.rig, edit))
-        return self.mesh
+        with self._lock:
+            return self._advance(edit, apply_edit(self.rig, edit))
 
-    def _advance(self, edit: Edit, rig: EigenRig) -> None:
+    def _advance(self, edit: Edit, rig: EigenRig) -> TriangleMesh:
+        """Enter the pose after an edit, and forget the edits that were undone."""
         self._edits[self._place :] = [edit]
         self._poses[self._place + 1 :] = [rig]
-        self._place += 1
-        self._pending = None
+        return self._go(1)
 
-    @_one_at_a_time
+    def _go(self, step: int) -> TriangleMesh:
+        """Go to the next pose, or to the one before; a drag does not survive that."""
+        self._place += step
+        self._pending = None
+        return self.mesh
+
     def cancel(self) -> None:
         """Drop the present drag, if there is one."""
-        self._pending = None
+        with self._lock:
+            self._pending = None
 
-    @_one_at_a_time
     def undo(self) -> TriangleMesh:
         """Return to the pose before the last edit, with exactly the same vertices.
 
@@ -336,13 +328,11 @@ class DeformationSession:
         InvalidParameterError
             If there is no edit.
         """
-        if not self._place:
-            raise InvalidParameterError("There must be an edit to undo; there is none.")
-        self._place -= 1
-        self._pending = None
-        return self.mesh
+        with self._lock:
+            if not self._place:
+                raise InvalidParameterError("There must be an edit to undo; there is none.")
+            return self._go(-1)
 
-    @_one_at_a_time
     def redo(self) -> TriangleMesh:
         """Return to the pose after the edit that was undone last, with exactly the same vertices.
 
@@ -351,11 +341,10 @@ class DeformationSession:
         InvalidParameterError
             If no edit was undone.
         """
-        if not self.n_redoable:
-            raise InvalidParameterError("There must be an undone edit to redo; there is none.")
-        self._place += 1
-        self._pending = None
-        return self.mesh
+        with self._lock:
+            if not self.n_redoable:
+                raise InvalidParameterError("There must be an undone edit to redo; there is none.")
+            return self._go(1)
 
 
 def replay(

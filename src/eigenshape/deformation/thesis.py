@@ -1,33 +1,246 @@
-"""Eigen deformation of the thesis: a skeleton moved by least squares, and its details (6.3)."""
+"""Eigen deformation of the thesis (6.2, 6.3): a skeleton that handles move, and its details in frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
-from eigenshape.deformation.details import (
-    FramedDetails,
-    blend_details,
-    frame_details,
-    turn_by_frames,
-    turn_by_handles,
-)
-from eigenshape.deformation.handles import Handle, require_handles
+from eigenshape.deformation.handles import Handle, affine_offset, require_handles
 from eigenshape.deformation.rig import eigen_skeleton, project_on_modes
-from eigenshape.deformation.skeleton import SkeletonResponse, move_skeleton, skeleton_response
+from eigenshape.geometry.measure import mean_normals
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import edge_table
 
+# Least tangential part of an edge, as a share of its length. An edge with less is parallel to the
+# normal up to rounding, and gives no direction to a frame.
+LEAST_TANGENT = 1e-6
 # Modes of the finer skeleton, through which the details come back (thesis 6.3.3).
 SECOND_PASS = 300
 
 Points = Float[np.ndarray, "n 3"]
 Details = Literal["blended", "frames", "handle"]
+
+
+@dataclass(frozen=True, eq=False)
+class SkeletonResponse(ReadOnly):
+    """The eigen-skeleton, and how it responds to the motions of handles.
+
+    The response is linear: each drag costs four numbers per vertex and region, so a viewer can
+    follow a handle without calling the library (for example in a vertex shader).
+
+    Attributes
+    ----------
+    skeleton : (n, 3) float
+        K, the eigen-skeleton of as many modes as the binding uses.
+    weights : (r, n, 4) float
+        U with K* = K + Σ_r U_r D_rᵀ, where D_r = [R - 1 | t] for the motion x → R x + t of region
+        r.
+
+    See Also
+    --------
+    skeleton_response : Compute the response.
+    move_skeleton : Apply motions.
+
+    Examples
+    --------
+    A viewer can apply the formula itself. For a translation, R - 1 is zero:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> response = es.deformation.skeleton_response(binding)
+    >>> motion = np.column_stack([np.zeros((3, 3)), [0, 0, 0.5]])  # [R - 1 | t]
+    >>> moved = response.skeleton + response.weights[0] @ motion.T
+    >>> handle = es.Translation([0, 0, 0.5])
+    >>> bool(np.allclose(moved, es.deformation.move_skeleton(response, [handle])))
+    True
+    """
+
+    skeleton: Float[np.ndarray, "n 3"]
+    weights: Float[np.ndarray, "r n 4"]
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+
+@one_blas_thread()
+def skeleton_response(binding: Binding) -> SkeletonResponse:
+    """Compute how the eigen-skeleton responds to all motions of the bound regions (thesis eq. 6.1).
+
+    A motion cuts a region out of the skeleton and moves it; the new skeleton is the least-squares
+    fit by the lowest modes. The fit is Φ (ΦᵀΦ)⁻¹ Φ_Rᵀ [K_R, 1] times D, so four columns per region
+    serve all motions.
+
+    Parameters
+    ----------
+    binding : Binding
+
+    Returns
+    -------
+    SkeletonResponse
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> response = es.deformation.skeleton_response(binding)
+    >>> response.weights.shape
+    (1, 162, 4)
+    >>> es.deformation.move_skeleton(response, [es.Translation([0, 0, 1])]).shape
+    (162, 3)
+    """
+    require_type(binding, Binding, "binding")
+    rig, n_modes = binding.rig, int(binding.n_modes.max())
+    skeleton = eigen_skeleton(rig, n_modes)
+    homogeneous = np.column_stack([skeleton, np.ones(len(skeleton))])
+    weights = [
+        rig.eigenvectors[:, :n_modes] @ project_on_modes(rig, homogeneous * mask[:, None], n_modes)
+        for mask in binding.regions
+    ]
+    return SkeletonResponse(skeleton, np.array(weights))
+
+
+def move_skeleton(
+    response: SkeletonResponse, handles: Sequence[Handle]
+) -> Float[np.ndarray, "n 3"]:
+    """Return the eigen-skeleton under the motions of handles.
+
+    Parameters
+    ----------
+    response : SkeletonResponse
+    handles : sequence of r Rotation or Translation
+        One for each region.
+
+    Returns
+    -------
+    (n, 3) float
+        K*, the vertices of the moved skeleton.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is not one handle for each region.
+
+    See Also
+    --------
+    skeleton_response : Compute the response.
+    bend : Move the shape itself.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> mesh = es.icosphere(2)
+    >>> binding = es.deformation.bind(es.rig_shape(mesh), [mesh.vertices[:, 2] > 0.2])
+    >>> response = es.deformation.skeleton_response(binding)
+    >>> still = es.deformation.move_skeleton(response, [es.Translation([0, 0, 0])])
+    >>> moved = es.deformation.move_skeleton(response, [es.Translation([0, 0, 0.5])])
+    >>> bool((moved[:, 2] - still[:, 2]).max() > 0.4)
+    True
+    """
+    require_type(response, SkeletonResponse, "response")
+    require_handles(handles, len(response.weights))
+    pairs = zip(response.weights, handles, strict=True)
+    return response.skeleton + sum(
+        (weights @ affine_offset(handle).T for weights, handle in pairs), np.zeros(3)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FramedDetails:
+    """Details of a shape on a skeleton, in the local frames of the skeleton.
+
+    Attributes
+    ----------
+    details : (n, 3) float
+        Shape minus skeleton.
+    local : (n, 3) float
+        Coordinates of the details along the normal, along the tangential part of an edge, and along
+        their cross product.
+    partner : (n,) int
+        The other end of that edge: the most tangential edge at the vertex.
+    has_frame : (n,) bool
+        Whether the frame exists: the normal is not zero, and some edge is not parallel to it.
+    """
+
+    details: Points
+    local: Points
+    partner: Int[np.ndarray, " n"]
+    has_frame: Bool[np.ndarray, " n"]
+
+
+def frame_details(faces: Int[np.ndarray, "f 3"], skeleton: Points, shape: Points) -> FramedDetails:
+    """Express the details of a shape on a skeleton in the local frames of the skeleton."""
+    mesh, details = TriangleMesh(skeleton, faces), shape - skeleton
+    edges = edge_table(mesh).edges
+    ends = np.concatenate([edges, edges[:, ::-1]])
+    arms = skeleton[ends[:, 1]] - skeleton[ends[:, 0]]
+    lengths, normals = np.linalg.norm(arms, axis=1), mean_normals(mesh)[ends[:, 0]]
+    flat = np.linalg.norm(arms - np.einsum("ei,ei->e", arms, normals)[:, None] * normals, axis=1)
+    share = np.divide(flat, lengths, out=np.zeros_like(flat), where=lengths > 0)
+    order = np.lexsort((share, ends[:, 0]))
+    partner = np.empty(mesh.n_vertices, dtype=np.int64)
+    # Of several edges at a vertex the last one is kept, which is the most tangential.
+    partner[ends[order, 0]] = ends[order, 1]
+    frames, has_frame = _local_frames(mesh, partner)
+    return FramedDetails(details, np.einsum("nij,nj->ni", frames, details), partner, has_frame)
+
+
+def turn_by_frames(faces: Int[np.ndarray, "f 3"], kept: FramedDetails, moved: Points) -> Points:
+    """Turn details with the local frames of the moved skeleton, where these exist."""
+    frames, has_frame = _local_frames(TriangleMesh(moved, faces), kept.partner)
+    turned = np.einsum("nji,nj->ni", frames, kept.local)
+    return np.where((kept.has_frame & has_frame)[:, None], turned, kept.details)
+
+
+def turn_by_handles(binding: Binding, handles: Sequence[Handle], details: Points) -> Points:
+    """Turn the details inside each region with its handle."""
+    turned = details.copy()
+    for mask, handle in zip(binding.regions, handles, strict=True):
+        turned[mask] += details[mask] @ affine_offset(handle)[:, :3].T
+    return turned
+
+
+def blend_details(binding: Binding, by_frames: Points, by_handles: Points) -> Points:
+    """Blend details turned by frames with details turned by handles (thesis 6.3.1).
+
+    Frames count near the boundary of a region, handles deep inside. As in the thesis, directions
+    are blended, and the result has the length of the details or less.
+    """
+    weight = np.zeros(len(by_frames))
+    for mask, distance in zip(binding.regions, binding.distances, strict=True):
+        extent = distance[mask & np.isfinite(distance)].max()
+        # 1 up to an eighth of the extent from the boundary, falling to 0 at a quarter; where every
+        # vertex of the region lies on its boundary, 1 there
+        near = distance == 0 if extent == 0 else (extent / 4 - distance) / (extent / 8)
+        weight = np.maximum(weight, np.clip(near, 0, 1))
+    lengths = np.linalg.norm(by_frames, axis=1, keepdims=True)
+    one, other = (
+        np.divide(turned, lengths, out=np.zeros_like(turned), where=lengths > 0)
+        for turned in (by_frames, by_handles)
+    )
+    return (weight[:, None] * one + (1 - weight[:, None]) * other) * lengths
+
+
+def _local_frames(
+    skeleton: TriangleMesh, partner: Int[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, "n 3 3"], Bool[np.ndarray, " n"]]:
+    """Return the frame of each vertex, its axes as rows, and whether it exists."""
+    normals, arms = mean_normals(skeleton), skeleton.vertices[partner] - skeleton.vertices
+    flat = arms - np.einsum("ni,ni->n", arms, normals)[:, None] * normals
+    flat_lengths = np.linalg.norm(flat, axis=1, keepdims=True)
+    arm_lengths = np.linalg.norm(arms, axis=1)
+    has_frame = normals.any(axis=1) & (flat_lengths[:, 0] > LEAST_TANGENT * arm_lengths)
+    along = np.divide(flat, flat_lengths, out=np.zeros_like(flat), where=has_frame[:, None])
+    return np.stack([normals, along, np.cross(normals, along)], axis=1), has_frame
 
 
 @dataclass(frozen=True, eq=False)

@@ -111,10 +111,18 @@ def transfer_deformation(
     turns = fit_turns(weights, before.vertices, after.vertices)
     # A mean of rotations is no rotation: take the nearest one.
     carried = nearest_rotations(transfer_function(few, turns.reshape(-1, 9)).reshape(-1, 3, 3))
-    source_on_target = transfer_function(mapping, before.vertices)
-    stand = _rotation_between(source_on_target, target.vertices, point_areas(mapping.target))
+    # How the target stands in space: the rotation that takes the source, carried over to it, nearest
+    # to its vertices (Kabsch 1976)
+    areas = point_areas(mapping.target)
+    places = transfer_function(mapping, before.vertices), target.vertices
+    one, two = (size_one(points - _center(points, areas))[0] for points in places)
+    stand = nearest_rotations((two.T @ (areas[:, None] / areas.sum() * one))[None])[0]
     turned = _turn_edges(target, stand @ carried @ stand.T)
-    return TriangleMesh(turned + _move_center(before, after, target, stand), target.faces)
+    # The center moves as that of the source, in proportion to size.
+    ours, theirs = dual_volumes(before), dual_volumes(target)
+    size = np.sqrt(theirs.sum() / ours.sum())
+    shift = size * stand @ (_center(after.vertices, ours) - _center(before.vertices, ours))
+    return TriangleMesh(turned + shift, target.faces)
 
 
 def _map_of_vertices(
@@ -130,16 +138,6 @@ def _map_of_vertices(
     k = min(POSE_MODES, before.n_vertices // 2, target.n_vertices // 2)
     source, other = (solve_spectrum(cotangent_laplacian(mesh), k) for mesh in (before, target))
     return map_from_points(source, other, places, n_modes=k)
-
-
-def _rotation_between(
-    source: Float[np.ndarray, "n 3"],
-    target: Float[np.ndarray, "n 3"],
-    areas: Float[np.ndarray, " n"],
-) -> Float[np.ndarray, "3 3"]:
-    """Return the rotation that takes points nearest to their partners (Kabsch 1976)."""
-    one, two = (size_one(points - _center(points, areas))[0] for points in (source, target))
-    return nearest_rotations((two.T @ (areas[:, None] / areas.sum() * one))[None])[0]
 
 
 def _center(
@@ -162,12 +160,3 @@ def _turn_edges(target: TriangleMesh, turns: Turns) -> Float[np.ndarray, "n 3"]:
     if part.factor is not None:
         found[part.free] += part.factor.solve(sums)
     return found + _center(target.vertices, areas) - _center(found, areas)
-
-
-def _move_center(
-    before: TriangleMesh, after: TriangleMesh, target: TriangleMesh, stand: Float[np.ndarray, "3 3"]
-) -> Float[np.ndarray, " 3"]:
-    """Return the motion of the source's center, scaled to the size of the target and turned."""
-    ours, theirs = dual_volumes(before), dual_volumes(target)
-    size = np.sqrt(theirs.sum() / ours.sum())
-    return size * stand @ (_center(after.vertices, ours) - _center(before.vertices, ours))

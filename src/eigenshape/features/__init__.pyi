@@ -1,8 +1,8 @@
-from .bottleneck import bottleneck_distance as bottleneck_distance
 from .boundaries import smooth_boundaries as smooth_boundaries
 from .contrast import PART_CONTRAST as PART_CONTRAST
 from .diagram import PersistenceDiagram as PersistenceDiagram
 from .diagram import PersistencePairs as PersistencePairs
+from .diagram import bottleneck_distance as bottleneck_distance
 from .diagram import persistence_diagram as persistence_diagram
 from .merge_tree import merge_tree as merge_tree
 from .part_merging import part_tree as part_tree

@@ -5,15 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
-from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra, maximum_flow
+from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, positive_values
+from eigenshape._arrays import positive_values
 from eigenshape.features.segmentation import Segmentation, adjacent_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, face_pairs
+from eigenshape.geometry.topology import adjacency_matrix, edge_table, face_pairs
 from eigenshape.operators.anisotropic import curvature_tensors
 
 # α of `curvature_tensors`, without unit: the strength of creases. The best of 1, 5, 10, 20, 40 and
@@ -111,12 +112,12 @@ def move_boundaries(
     share: float = WIDTH,
 ) -> Segmentation:
     """Do what `smooth_boundaries` does, with tensors that are there already."""
-    network, labels = _build_network(mesh, tensors), segmentation.labels.copy()
+    labels, network = segmentation.labels.copy(), build_network(mesh, tensors)
     tips = segmentation.features.vertices[segmentation.labels]
     fixed = (mesh.faces == tips[:, None]).any(axis=1)
     for one, two in adjacent_parts(mesh, labels).tolist():
         _move_boundary(network, labels, (one, two), fixed, share)
-    return Segmentation(freeze(labels), segmentation.features)
+    return Segmentation(labels, segmentation.features)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +136,8 @@ class _Network:
     conductivity: Float[np.ndarray, " p"]
 
 
-def _build_network(mesh: TriangleMesh, tensors: Float[np.ndarray, "f 3 3"]) -> _Network:
+def build_network(mesh: TriangleMesh, tensors: Float[np.ndarray, "f 3 3"]) -> _Network:
+    """Measure the graph of the faces, with the cost of a cut along each inner edge."""
     points, _ = scale_to_unit(mesh)
     unit = TriangleMesh(points, mesh.faces)
     table = edge_table(unit)
@@ -147,10 +149,9 @@ def _build_network(mesh: TriangleMesh, tensors: Float[np.ndarray, "f 3 3"]) -> _
     between = tensors[pairs].mean(axis=1)
     squares = np.einsum("pi,pij,pj->p", across, between, across)
     conductivity = np.divide(squares, lengths**2, out=np.ones_like(lengths), where=lengths > 0)
-    edge_lengths = np.linalg.norm(np.diff(points[table.edges[edges]], axis=1)[:, 0], axis=1)
-    return _Network(
-        pairs, lengths, edge_lengths * conductivity, face_areas(unit), centers, conductivity
-    )
+    sides = np.linalg.norm(np.diff(points[table.edges[edges]], axis=1)[:, 0], axis=1)
+    costs, areas = sides * conductivity, face_areas(unit)
+    return _Network(pairs, lengths, costs, areas, centers, conductivity)
 
 
 def _move_boundary(
@@ -174,7 +175,7 @@ def _move_boundary(
 
     # The band: faces near the boundary, measured along the graph.
     areas = network.areas[faces]
-    graph = _symmetric_graph(pairs, network.lengths[inside], len(faces))
+    graph = adjacency_matrix(pairs, network.lengths[inside], len(faces))
     depth = dijkstra(graph, indices=np.unique(pairs[crossing]), min_only=True)
     reach = share * min(areas[side].sum(), areas[~side].sum()) ** 0.5
     deepest = np.where(side, depth[side].max(), depth[~side].max())
@@ -182,18 +183,22 @@ def _move_boundary(
     band &= ~fixed[faces]
     if band[side].all() or band[~side].all():
         return
-    lengths, costs = network.lengths[inside], network.costs[inside]
     part = _Network(
-        pairs, lengths, costs, areas, network.centers[faces], network.conductivity[inside]
+        pairs,
+        network.lengths[inside],
+        network.costs[inside],
+        areas,
+        network.centers[faces],
+        network.conductivity[inside],
     )
     cut = _cheapest_cut(part, side, band)
-    if _count_pieces(pairs, cut) <= _count_pieces(pairs, side):
+    # A cut that breaks a part into pieces is not made.
+    n_after, n_before = (
+        label_components(len(faces), *pairs[which[pairs[:, 0]] == which[pairs[:, 1]]].T)[0]
+        for which in (cut, side)
+    )
+    if n_after <= n_before:
         labels[faces] = np.where(cut, *parts)
-
-
-def _symmetric_graph(pairs: Int[np.ndarray, "p 2"], weights: np.ndarray, n: int) -> sp.csr_array:
-    both = np.concatenate([pairs, pairs[:, ::-1]]).T
-    return sp.coo_array((np.concatenate([weights, weights]), both), shape=(n, n)).tocsr()
 
 
 def _cheapest_cut(
@@ -205,7 +210,14 @@ def _cheapest_cut(
     near that cut are free, and so on until they are few.
     """
     while np.count_nonzero(band) > MOST_FACES:
-        cell, length = _gather_cells(network, band)
+        # A cell is a connected set of faces of the band with centers in one cube of a grid. Each face
+        # beyond the band is a cell by itself.
+        length = float((network.areas[band].sum() / N_CELLS) ** 0.5)
+        cubes = np.floor(network.centers / length).astype(np.int64)
+        one, two = network.pairs.T
+        together = band[one] & band[two] & (cubes[one] == cubes[two]).all(axis=1)
+        together &= network.conductivity > CREASE
+        _, cell = label_components(len(band), one[together], two[together])
         free = np.zeros(cell.max() + 1, dtype=bool)
         free[cell[band]] = True
         of_cell = np.zeros(len(free), dtype=bool)
@@ -219,7 +231,7 @@ def _cheapest_cut(
         if not crossing.any():
             return cut
         near = np.unique(network.pairs[crossing])
-        graph = _symmetric_graph(network.pairs, network.lengths, len(side))
+        graph = adjacency_matrix(network.pairs, network.lengths, len(side))
         reach = CELLS_AROUND * length
         depth = dijkstra(graph, indices=near, min_only=True, limit=reach)
         narrow = band & (depth <= reach)
@@ -228,24 +240,6 @@ def _cheapest_cut(
             return _minimum_cut(network.pairs, network.costs, side, narrow)
         band = narrow
     return _minimum_cut(network.pairs, network.costs, side, band)
-
-
-def _gather_cells(
-    network: _Network, band: Bool[np.ndarray, " k"]
-) -> tuple[Int[np.ndarray, " k"], float]:
-    """Gather the faces of a band in about N_CELLS cells; return the cell of each face, and its side.
-
-    A cell is a connected set of faces of the band with centers in one cube of a grid. Each face
-    beyond the band is a cell by itself.
-    """
-    length = float((network.areas[band].sum() / N_CELLS) ** 0.5)
-    cubes = np.floor(network.centers / length).astype(np.int64)
-    one, two = network.pairs.T
-    together = band[one] & band[two] & (cubes[one] == cubes[two]).all(axis=1)
-    together &= network.conductivity > CREASE
-    pairs = network.pairs[together]
-    graph = _symmetric_graph(pairs, np.ones(len(pairs)), len(band))
-    return connected_components(graph, directed=False)[1].astype(np.int64), length
 
 
 def _minimum_cut(
@@ -264,7 +258,7 @@ def _minimum_cut(
     kept = ends[:, 0] != ends[:, 1]
     capacities = np.int64(1) + np.floor(CAPACITY * costs[kept] / costs[kept].sum()).astype(np.int64)
     capacities[(ends[kept] < 2).all(axis=1)] = 0
-    graph = sp.csr_matrix(_symmetric_graph(ends[kept], capacities, n_nodes).astype(np.int32))
+    graph = sp.csr_matrix(adjacency_matrix(ends[kept], capacities, n_nodes).astype(np.int32))
     # Maximum flow, minimum cut: the first side is what the source reaches in the residual graph.
     residual = graph - maximum_flow(graph, 0, 1).flow
     residual.data = (residual.data > 0).astype(np.int8)
@@ -272,10 +266,3 @@ def _minimum_cut(
     reached = np.zeros(graph.shape[0], dtype=bool)
     reached[breadth_first_order(residual, 0, return_predecessors=False)] = True
     return reached[node]
-
-
-def _count_pieces(pairs: Int[np.ndarray, "p 2"], side: Bool[np.ndarray, " k"]) -> int:
-    """Count the connected pieces of both sides together."""
-    whole = side[pairs[:, 0]] == side[pairs[:, 1]]
-    graph = _symmetric_graph(pairs[whole], np.ones(whole.sum()), len(side))
-    return int(connected_components(graph, directed=False)[0])

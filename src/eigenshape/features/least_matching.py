@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape._memory import available_memory, require_memory
-from eigenshape.features.matching_loops import match_rows
+from eigenshape.features.bipartite_loops import match_rows
 
 Points = Float[np.ndarray, "_ d"]
 Reach = Float[np.ndarray, " _"]
@@ -21,10 +21,10 @@ Partners = Int[np.ndarray, " n"]
 FINE = 1e-4
 # Relative margin for the rounding of a distance that is computed in two ways; 1e7 times the
 # rounding itself.
-SLACK = 1e-9
+DISTANCE_ROUNDING = 1e-9
 # Factor by which the search distance grows. A larger one lists more pairs in the last round, a
 # smaller one takes more rounds.
-GROWTH = 1.5
+DISTANCE_GROWTH = 1.5
 # Peak bytes of memory per pair while pairs are listed.
 BYTES_OF_PAIR = 150
 SHARE_OF_PAIRS = 0.5  # of the memory; the matching needs the rest
@@ -52,35 +52,29 @@ def least_perfect(one: Points, two: Points, norm: float) -> tuple[float, Int[np.
     partners = match_within(one, two, 0.0, norm)
     if (partners >= 0).all():
         return 0.0, partners
-    low, top = _lower_bound(one, two, norm), float(_lengths(one - two, norm).max())
-    distance = max(GROWTH * low, COARSE * top)
+    # Just below the distance at which each point has a neighbor in the other set
+    sides = (one, two), (two, one)
+    to_nearest = max(cKDTree(those).query(these, p=norm)[0].max() for these, those in sides)
+    low, top = float(to_nearest) * (1 - DISTANCE_ROUNDING), float(_lengths(one - two, norm).max())
+    distance = max(DISTANCE_GROWTH * low, COARSE * top)
     while True:
         near = near_pairs(one, two, min(distance, top), norm)
         found = _match_pairs(near, partners, len(two))
         if (found >= 0).all():
-            candidates = np.unique(near.distances[near.distances > low])
-            return _bisect_perfect(near, candidates, found, partners)
-        low, distance, partners = distance, GROWTH * distance, found
-
-
-def _bisect_perfect(
-    near: Pairs, distances: Reach, found: Partners, partners: Partners
-) -> tuple[float, Int[np.ndarray, " n"]]:
-    """Return the smallest of some distances that allows a perfect matching, and the matching.
-
-    Distances ascend. The last distance does, with the matching `found`; `partners` is the largest
-    known insufficient matching.
-    """
-    low, high = 0, len(distances) - 1
-    while low < high:
-        middle = (low + high) // 2
+            break
+        low, distance, partners = distance, DISTANCE_GROWTH * distance, found
+    # The last of these distances allows a perfect matching, `found`.
+    distances = np.unique(near.distances[near.distances > low])
+    first, last = 0, len(distances) - 1
+    while first < last:
+        middle = (first + last) // 2
         inside = near.distances <= distances[middle]
         tried = _match_pairs(Pairs(*(part[inside] for part in near)), partners, len(partners))
         if (tried >= 0).all():
-            high, found = middle, tried
+            last, found = middle, tried
         else:
-            low, partners = middle + 1, tried
-    return float(distances[high]), found
+            first, partners = middle + 1, tried
+    return float(distances[last]), found
 
 
 def least_distance(one: Points, two: Points, reach_one: Reach, reach_two: Reach) -> float:
@@ -139,46 +133,30 @@ def _match_pairs(near: Pairs, first: Partners, n_others: int) -> Int[np.ndarray,
 def near_pairs(some: Points, others: Points, distance: float, norm: float) -> Pairs:
     """List the pairs of points whose distance is at most the given one.
 
-    Raises
-    ------
-    InvalidShapeError
-        If the pairs do not fit into half of the memory.
+    Raise InvalidShapeError if the pairs do not fit into half of the memory.
     """
     if not len(some) or not len(others):
         return Pairs(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
     # The tree compares powers of distances, with a rounding of its own: it returns a few more, and
     # the comparison below decides.
-    reach = distance * (1 + SLACK)
+    reach = distance * (1 + DISTANCE_ROUNDING)
     trees = cKDTree(some), cKDTree(others)
-    _require_pairs_fit(*trees, reach, norm)
+    # If all pairs fit, there is no need to count them.
+    if len(some) * len(others) * BYTES_OF_PAIR > available_memory(SHARE_OF_PAIRS):
+        n_pairs = int(trees[0].count_neighbors(trees[1], reach, p=norm))
+        require_memory(
+            "Pairs of near points",
+            f"{n_pairs:.2g} pairs within {reach:.3g}",
+            {"lists": n_pairs * BYTES_OF_PAIR},
+            "Bring the sets nearer to each other, or take fewer points.",
+            share=SHARE_OF_PAIRS,
+            error=InvalidShapeError,
+        )
     found = trees[0].sparse_distance_matrix(trees[1], reach, p=norm, output_type="ndarray")
     i, j = found["i"].astype(np.int64), found["j"].astype(np.int64)
     distances = _lengths(some[i] - others[j], norm)
     near = distances <= distance
     return Pairs(i[near], j[near], distances[near])
-
-
-def _require_pairs_fit(one: cKDTree, two: cKDTree, reach: float, norm: float) -> None:
-    """Count the pairs within reach, and raise an error if a list of them is too large."""
-    if one.n * two.n * BYTES_OF_PAIR <= available_memory(SHARE_OF_PAIRS):
-        return  # all pairs fit: no need to count
-    n_pairs = int(one.count_neighbors(two, reach, p=norm))
-    require_memory(
-        "Pairs of near points",
-        f"{n_pairs:.2g} pairs within {reach:.3g}",
-        {"lists": n_pairs * BYTES_OF_PAIR},
-        "Bring the sets nearer to each other, or take fewer points.",
-        share=SHARE_OF_PAIRS,
-        error=InvalidShapeError,
-    )
-
-
-def _lower_bound(one: Points, two: Points, norm: float) -> float:
-    """Return a distance just below that at which each point has a neighbor in the other set."""
-    to_nearest = max(
-        cKDTree(those).query(these, p=norm)[0].max() for these, those in ((one, two), (two, one))
-    )
-    return float(to_nearest) * (1 - SLACK)
 
 
 def _lengths(vectors: Float[np.ndarray, "k d"], norm: float) -> Float[np.ndarray, " k"]:

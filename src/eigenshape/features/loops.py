@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Int
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse.csgraph import breadth_first_order
 
-from eigenshape.features.union_loops import spanning_forest
+from eigenshape.features.merge_loops import spanning_forest
+from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
@@ -46,7 +47,13 @@ def extended_loops(mesh: Mesh, order: Int[np.ndarray, " n"]) -> Int[np.ndarray, 
     falling = _find_generators(complex_, order[::-1])
     if not len(rising.edges):
         return np.empty((0, 2), dtype=np.int64)
-    crossing = _cuts_at_edges(complex_, rising)
+    # Cut j consists of the edge that begins loop j and of the edges crossed on the path of faces
+    # between its two sides. Each edge gets the cuts that contain it, cut j as bit j.
+    crossing: dict[int, int] = defaultdict(int)
+    forest = _root_forest(complex_.sides, rising.cotree, complex_.n_faces + 1)
+    for number, edge in enumerate(rising.edges.tolist()):
+        for step in (edge, *_path(forest, *complex_.sides[edge].tolist())):
+            crossing[step] ^= 1 << number
     tree = _root_forest(complex_.edges, falling.tree, len(order))
     # A row is an integer: bit j says whether the loop crosses cut j. `last` holds reduced rows by
     # their highest bit.
@@ -117,20 +124,6 @@ def _find_generators(complex_: _Complex, order: Int[np.ndarray, " n"]) -> _Gener
     return _Generators(tree, cotree, entering[~(tree | cotree)[entering]])
 
 
-def _cuts_at_edges(complex_: _Complex, rising: _Generators) -> dict[int, int]:
-    """Return, for each edge, the cuts that contain it, cut j as bit j.
-
-    Cut j consists of the edge that begins loop j and of the edges crossed on the path of faces
-    between its two sides.
-    """
-    tree = _root_forest(complex_.sides, rising.cotree, complex_.n_faces + 1)
-    crossing: dict[int, int] = defaultdict(int)
-    for number, edge in enumerate(rising.edges.tolist()):
-        for step in (edge, *_path(tree, *complex_.sides[edge].tolist())):
-            crossing[step] ^= 1 << number
-    return defaultdict(int, crossing)
-
-
 @dataclass(frozen=True, eq=False)
 class _RootedForest:
     """Trees below one common root.
@@ -149,10 +142,9 @@ def _root_forest(
 ) -> _RootedForest:
     edges = np.flatnonzero(kept)
     one, two = ends[edges].T
-    graph = sp.coo_array((np.ones(len(edges), dtype=np.int8), (one, two)), shape=(n + 1, n + 1))
-    _, labels = connected_components(graph, directed=False)
+    _, labels = label_components(n, one, two)
     # The first node of each tree becomes a child of node n, the common root.
-    _, firsts = np.unique(labels[:n], return_index=True)
+    _, firsts = np.unique(labels, return_index=True)
     rows, columns = np.append(one, firsts), np.append(two, np.full(len(firsts), n))
     graph = sp.coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n + 1, n + 1))
     order, parent = breadth_first_order(graph.tocsr(), n, directed=False)

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import freeze, vertex_values
+from eigenshape._arrays import vertex_values
 from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_loops import file_sides, find_corners, join_faces
 from eigenshape.features.region_tree import MergeTree, merge_regions, number_regions
@@ -90,12 +90,12 @@ def merge_tree(mesh: MeshLike, values: ArrayLike) -> MergeTree:
     place[roots] = region
     parent, basins = number_regions(kept, parent, place[climbs_to])
     return MergeTree(
-        maxima=freeze(tops[kept]),
-        values=freeze(values_at_tops[kept]),
-        persistence=freeze(persistence[kept]),
-        parent=freeze(parent),
-        basins=freeze(basins),
-        saddles=freeze(saddles[kept]),
+        maxima=tops[kept],
+        values=values_at_tops[kept],
+        persistence=persistence[kept],
+        parent=parent,
+        basins=basins,
+        saddles=saddles[kept],
     )
 
 

@@ -13,13 +13,13 @@ from eigenshape.features.part_merging import (
     PART_TIME,
     Merge,
     heat_coordinates,
+    join_means,
     merge_cheapest,
     region_means,
     tree_of_merges,
 )
 from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, adjacent_parts
-from eigenshape.features.thickness import inscribed_radii
 from eigenshape.geometry.measure import face_areas, face_normals, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
@@ -55,6 +55,14 @@ LEAST_SINE = 0.02
 # Added to shares of lines of sight, so that parts with few clear lines, such as flat sheets, are
 # neither joined nor kept for them.
 SIGHT_PRIOR = 0.05
+# Cosine of the widest angle between the normal and the chord of an inscribed ball. Beyond it, the
+# ball touches the same side of the surface, where noise decides its radius.
+LEAST_CHORD_COSINE = 0.3
+# A ball that shrinks by less than this share holds no further point; radii are not needed to more
+# digits.
+SHRINKAGE = 1e-6
+# Nearly all balls stop shrinking in five rounds.
+N_SHRINKAGES = 12
 
 
 def weigh_parts(
@@ -92,17 +100,13 @@ def weigh_parts(
         The merges of the given tree up to the fine cut, then the new ones. Their persistence is
         the odds o as o / (1 + o), at least `FINE_CONTRAST`.
     """
-    merges = _merges_below_cut(tree) + _merge_by_contrast(_measure(mesh, fine, spectrum), fine)
+    # The merges that come before the fine cut: regions are sorted by falling persistence.
+    ends = np.flatnonzero(tree.persistence < FINE_CONTRAST)[::-1]
+    columns = ends, tree.parent[ends], tree.persistence[ends]
+    merges = list(zip(*(column.tolist() for column in columns), strict=True))
+    merges += _merge_by_contrast(_measure(mesh, fine, spectrum), fine)
     points = FeaturePoints(tree.maxima, tree.values, tree.persistence)
     return tree_of_merges(Segmentation(tree.basins, points), merges)
-
-
-def _merges_below_cut(tree: PartTree) -> list[Merge]:
-    """List the merges that come before the fine cut. Regions are sorted by falling persistence."""
-    ends = np.flatnonzero(tree.persistence < FINE_CONTRAST)[::-1]
-    return list(
-        zip(ends.tolist(), tree.parent[ends].tolist(), tree.persistence[ends].tolist(), strict=True)
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +169,48 @@ def _measure(mesh: TriangleMesh, parts: Segmentation, spectrum: Spectrum) -> _Pa
         shares @ lines @ shares.T,
         shares @ clear @ shares.T,
     )
+
+
+def inscribed_radii(
+    tree: KDTree,
+    normals: Float[np.ndarray, "n 3"],
+    chosen: Int[np.ndarray, " m"],
+    largest: float,
+) -> Float[np.ndarray, " m"]:
+    """Return the radii of the largest balls that touch the surface at points from inside.
+
+    A ball shrinks until it holds no other point (Ma, Bae and Choi 2012): through the touching point
+    p and a point q inside, the ball with its center at p - R n has the radius
+    R = |p - q|² / (2 (p - q) · n).
+
+    Parameters
+    ----------
+    tree : KDTree
+        Of points of the surface.
+    normals : (n, 3) float
+        Outward unit normals of the points.
+    chosen : (m,) int
+        The points at which balls touch.
+    largest : float
+        Radius from which the balls shrink, as long as the points' coordinates.
+    """
+    points = tree.data
+    radii = np.full(len(chosen), largest)
+    live = np.arange(len(chosen))
+    for _ in range(N_SHRINKAGES):
+        here, inward = points[chosen[live]], -normals[chosen[live]]
+        gaps, nearest = tree.query(here + radii[live, None] * inward)
+        inside = gaps < radii[live] * (1 - SHRINKAGE)
+        live = live[inside]
+        chords = points[nearest[inside]] - here[inside]
+        heights = np.einsum("mi,mi->m", chords, inward[inside])
+        squares = np.einsum("mi,mi->m", chords, chords)
+        facing = heights > LEAST_CHORD_COSINE * np.sqrt(squares)
+        live = live[facing]
+        if not len(live):
+            break
+        radii[live] = squares[facing] / (2 * heights[facing])
+    return radii
 
 
 def lines_of_sight(
@@ -247,9 +293,7 @@ def _merge_by_contrast(parts: _Parts, fine: Segmentation) -> list[Merge]:
         return float(odds / (1 + odds))
 
     def join(remains: int, ends: int) -> None:
-        total = areas[remains] + areas[ends]
-        means[remains] = (areas[remains] * means[remains] + areas[ends] * means[ends]) / total
-        areas[remains] = total
+        join_means(areas, means, remains, ends)
         for sums in (sampled, logs):
             sums[remains] += sums[ends]
         row, ended = rows[remains], rows[ends]

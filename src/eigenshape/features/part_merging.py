@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, positive_values
+from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.region_tree import PartTree, number_regions
@@ -94,8 +94,16 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
     n_components, _ = vertex_components(mesh)
     seeds = segment(merge_tree(mesh, heat), n_regions=N_SEEDS + n_components - 1)
     areas, means = region_means(mesh, seeds.labels, heat_coordinates(spectrum, share))
-    merges = _merge_by_heat(areas, means, adjacent_parts(mesh, seeds.labels), seeds.features.values)
-    return tree_of_merges(seeds, merges)
+
+    def price(one: int, two: int) -> float:
+        weight = areas[one] * areas[two] / (areas[one] + areas[two])
+        return float(weight * np.square(means[one] - means[two]).sum())
+
+    def join(remains: int, ends: int) -> None:
+        join_means(areas, means, remains, ends)
+
+    adjacent = adjacent_parts(mesh, seeds.labels)
+    return tree_of_merges(seeds, merge_cheapest(adjacent, seeds.features.values, price, join))
 
 
 def heat_coordinates(spectrum: Spectrum, share: float) -> Float[np.ndarray, "n k"]:
@@ -125,11 +133,11 @@ def tree_of_merges(seeds: Segmentation, merges: list[Merge]) -> PartTree:
     order = np.concatenate([roots, ended[::-1]])
     parent, basins = number_regions(order, parent, seeds.labels)
     return PartTree(
-        maxima=freeze(seeds.features.vertices[order]),
-        values=freeze(seeds.features.values[order]),
-        persistence=freeze(persistence[order]),
-        parent=freeze(parent),
-        basins=freeze(basins),
+        maxima=seeds.features.vertices[order],
+        values=seeds.features.values[order],
+        persistence=persistence[order],
+        parent=parent,
+        basins=basins,
     )
 
 
@@ -147,24 +155,13 @@ def region_means(
     return region_areas, integrals @ values * areas.sum() ** 0.5 / region_areas[:, None]
 
 
-def _merge_by_heat(
-    areas: Float[np.ndarray, " r"],
-    means: Float[np.ndarray, "r k"],
-    adjacent: Int[np.ndarray, "p 2"],
-    heights: Float[np.ndarray, " r"],
-) -> list[Merge]:
-    """Merge regions by the price of `part_tree`; areas and means change in place."""
-
-    def price(one: int, two: int) -> float:
-        weight = areas[one] * areas[two] / (areas[one] + areas[two])
-        return float(weight * np.square(means[one] - means[two]).sum())
-
-    def join(remains: int, ends: int) -> None:
-        total = areas[remains] + areas[ends]
-        means[remains] = (areas[remains] * means[remains] + areas[ends] * means[ends]) / total
-        areas[remains] = total
-
-    return merge_cheapest(adjacent, heights, price, join)
+def join_means(
+    areas: Float[np.ndarray, " r"], means: Float[np.ndarray, "r k"], remains: int, ends: int
+) -> None:
+    """Let one region take over the area and the mean of another, in place."""
+    total = areas[remains] + areas[ends]
+    means[remains] = (areas[remains] * means[remains] + areas[ends] * means[ends]) / total
+    areas[remains] = total
 
 
 def merge_cheapest(

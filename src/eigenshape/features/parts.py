@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, finite_values, freeze, whole_number
+from eigenshape._arrays import ReadOnly, finite_values, whole_number
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
 from eigenshape.features.boundaries import CONCAVITY, move_boundaries, smooth_boundaries
@@ -175,7 +175,7 @@ def find_parts(
     tree = weigh_parts(outward, tree, fine, spectrum)
     fine = _join_fine_parts(rough, fine, segment(tree, persistence=FINE_CONTRAST))
     cut = segment(tree, persistence=contrast_at(float(fineness)))
-    found = PartDecomposition(outward, spectrum, freeze(heat), tree, fine, cut)
+    found = PartDecomposition(outward, spectrum, heat, tree, fine, cut)
     return replace(found, parts=smooth_cut(found, cut))
 
 
@@ -193,7 +193,7 @@ def _join_fine_parts(rough: Segmentation, fine: Segmentation, cut: Segmentation)
     `rough` has the labels of `fine` before smoothing; each part of the cut is a union of some.
     """
     _, first_faces = np.unique(rough.labels, return_index=True)
-    return Segmentation(freeze(cut.labels[first_faces][fine.labels]), cut.features)
+    return Segmentation(cut.labels[first_faces][fine.labels], cut.features)
 
 
 def part_spectrum(

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
-from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
+from eigenshape.geometry.facet_lists import label_components
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,9 +131,7 @@ def merge_regions(
 ) -> Int[np.ndarray, " m"]:
     """Merge each region that ends with its neighbor, and return what each region becomes."""
     m = len(neighbor)
-    links = (np.flatnonzero(ends), neighbor[ends])
-    graph = sp.coo_array((np.ones(len(links[0]), dtype=np.int8), links), shape=(m, m))
-    _, merged = connected_components(graph, directed=False)
+    _, merged = label_components(m, np.flatnonzero(ends), neighbor[ends])
     # Each component of the graph holds exactly one region that does not end.
     remains = np.empty(m, dtype=np.int64)
     remains[merged[~ends]] = np.flatnonzero(~ends)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
@@ -160,11 +160,11 @@ def segment(
     kept = np.flatnonzero(~ends)
     regions = merge_regions(np.maximum(tree.parent, 0), ends)[tree.basins]
     features = FeaturePoints(
-        vertices=freeze(tree.maxima[kept]),
-        values=freeze(tree.values[kept]),
-        persistence=freeze(tree.persistence[kept]),
+        vertices=tree.maxima[kept],
+        values=tree.values[kept],
+        persistence=tree.persistence[kept],
     )
-    return Segmentation(freeze(np.searchsorted(kept, regions)), features)
+    return Segmentation(np.searchsorted(kept, regions), features)
 
 
 def _above_largest_gap(tree: Tree) -> float:

@@ -5,11 +5,11 @@ from .conversion import from_arrays as from_arrays
 from .curvature import PrincipalCurvatures as PrincipalCurvatures
 from .curvature import gaussian_curvature as gaussian_curvature
 from .curvature import principal_curvatures as principal_curvatures
-from .distances.average_distance import average_geodesic_distance as average_geodesic_distance
 from .distances.closest import closest_points as closest_points
 from .distances.closest import signed_distance as signed_distance
 from .distances.closest import winding_numbers as winding_numbers
 from .distances.crossings import self_intersections as self_intersections
+from .distances.geodesic import average_geodesic_distance as average_geodesic_distance
 from .distances.geodesic import farthest_points as farthest_points
 from .distances.geodesic import geodesic_balls as geodesic_balls
 from .distances.geodesic import geodesic_distances as geodesic_distances

@@ -117,10 +117,7 @@ def as_mesh(value: object, name: str = "mesh") -> TriangleMesh:
 def as_simplicial(value: object, name: str = "mesh") -> Mesh:
     """Convert a value to a mesh of any dimension: a SimplicialMesh, or whatever `as_mesh` takes.
 
-    Raises
-    ------
-    InvalidParameterError, InvalidShapeError
-        As in `as_mesh`.
+    Errors are those of `as_mesh`.
     """
     if isinstance(value, TriangleMesh | SimplicialMesh):
         return value
@@ -187,37 +184,30 @@ def _conversion_error(
     given = describe_value(value)
     if shape is not None and shape is not value:
         given += f" that is a {shape!r}"
-    remedy = _remedy(value, reader) if shape is None else _use_of(shape)
-    return InvalidParameterError(f"{needed}; it is {given}. {remedy}")
-
-
-def _use_of(shape: Shape) -> str:
-    """Say how to turn a shape into the mesh that is needed, or which functions take the shape."""
+    module = type(value).__module__.partition(".")[0]
+    part = attribute_of(value, TriangleMesh | SimplicialMesh | PointCloud)
     if isinstance(shape, PointCloud):
-        return (
+        remedy = (
             "A point cloud has no faces; "
             "point_cloud_laplacian(cloud), persistence_diagram(cloud, values) and "
             "calculus.heat_distances(cloud, sources) take it."
         )
-    if shape.dim == 3:
-        return "Pass boundary_surface(mesh), the triangles around the tetrahedra."
-    if shape.dim == 2 and shape.points.shape[1] == 2:
-        return "Pass TriangleMesh(numpy.pad(mesh.points, ((0, 0), (0, 1))), mesh.simplices)."
-    return "cotangent_laplacian(mesh) and edge_graph(mesh) take a mesh of any dimension."
-
-
-def _remedy(value: object, reader: str) -> str:
-    """Say which call makes a shape of a value that is none."""
-    module = type(value).__module__.partition(".")[0]
-    part = attribute_of(value, TriangleMesh | SimplicialMesh | PointCloud)
-    if isinstance(value, str | os.PathLike):
-        return f"Pass {reader}({os.fspath(value)!r})."
-    if isinstance(value, np.ndarray):
-        return (
+    elif shape is not None and shape.dim == 3:
+        remedy = "Pass boundary_surface(mesh), the triangles around the tetrahedra."
+    elif shape is not None and shape.dim == 2 and shape.points.shape[1] == 2:
+        remedy = "Pass TriangleMesh(numpy.pad(mesh.points, ((0, 0), (0, 1))), mesh.simplices)."
+    elif shape is not None:
+        remedy = "cotangent_laplacian(mesh) and edge_graph(mesh) take a mesh of any dimension."
+    elif isinstance(value, str | os.PathLike):
+        remedy = f"Pass {reader}({os.fspath(value)!r})."
+    elif isinstance(value, np.ndarray):
+        remedy = (
             "Pass PointCloud(points, dim=2) if these are points without faces; "
             "a mesh is a pair (vertices, faces)."
         )
-    return f"Pass its attribute {part}." if part else BRIDGES.get(module, ACCEPTED)
+    else:
+        remedy = f"Pass its attribute {part}." if part else BRIDGES.get(module, ACCEPTED)
+    return InvalidParameterError(f"{needed}; it is {given}. {remedy}")
 
 
 def from_arrays(

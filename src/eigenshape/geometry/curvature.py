@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -14,7 +14,7 @@ from eigenshape.geometry.measure import scale_to_unit, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import dual_volumes, in_length, scaled_corners
-from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.topology import edge_table, neighbor_links
 
 # Vertices whose polynomials are fitted together: the products of monomials of 19 neighbors each
 # take 30 MB then.
@@ -186,13 +186,11 @@ def principal_curvatures(mesh: MeshLike) -> PrincipalCurvatures:
             f"{mesh.vertices[flat[0]].tolist()} cancel ({flat.size} such)."
         )
     points, scale = scale_to_unit(mesh)
-    first = _any_tangents(normals)
+    # Frames whose first axis is any unit vector orthogonal to the normal
+    first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    first = first / np.linalg.norm(first, axis=1, keepdims=True)
     frames = np.stack([first, np.cross(normals, first), normals], axis=1)
-    edges = edge_table(mesh).edges
-    links = sp.coo_array(
-        (np.ones(len(edges), dtype=np.int8), edges.T), shape=(mesh.n_vertices,) * 2
-    ).tocsr()
-    links = links + links.T + sp.eye_array(mesh.n_vertices, dtype=np.int8, format="csr")
+    links = neighbor_links(mesh) + sp.eye_array(mesh.n_vertices, format="csr")
     values = np.empty((mesh.n_vertices, 2))
     directions = np.empty((mesh.n_vertices, 2, 3))
     for start in range(0, mesh.n_vertices, VERTICES_AT_ONCE):
@@ -200,14 +198,7 @@ def principal_curvatures(mesh: MeshLike) -> PrincipalCurvatures:
         near = (links[rows] @ links).tocsr()
         jets = _fit_jets(points, frames[rows], rows, near)
         values[rows], directions[rows] = _shape_operator(jets, frames[rows])
-    return PrincipalCurvatures(freeze(in_length(values, scale, -1)), freeze(directions))
-
-
-def _any_tangents(normals: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """Return a unit vector orthogonal to each normal."""
-    axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    tangents = np.cross(normals, axes)
-    return tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
+    return PrincipalCurvatures(in_length(values, scale, -1), directions)
 
 
 def _fit_jets(

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze
+from eigenshape._arrays import ReadOnly, finite_rows
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -82,7 +82,7 @@ def enclosing_ball(points: ArrayLike) -> EnclosingBall:
     unit, inner = size_one(unit - middle)
     center = _center(unit)
     radius = np.sqrt(((unit - center) ** 2).sum(axis=1).max())
-    return EnclosingBall(freeze(scale * (middle + inner * center)), float(scale * inner * radius))
+    return EnclosingBall(scale * (middle + inner * center), float(scale * inner * radius))
 
 
 def _center(points: Points) -> Float[np.ndarray, " d"]:

@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, half_edges
 
@@ -92,8 +93,9 @@ def face_neighbors(mesh: TriangleMesh) -> Neighbors:
     """List the pairs of neighboring faces."""
     table = edge_table(mesh)
     at_edge = table.face_edges.ravel()
-    order = np.argsort(at_edge, kind="stable")
-    one, two = order[table.n_faces[at_edge[order]] == 2].reshape(-1, 2).T
+    one, two = shared_facets(table.face_edges)
+    is_pair = table.n_faces[at_edge[one]] == 2
+    one, two = one[is_pair], two[is_pair]
     sides = half_edges(mesh).reshape(3, mesh.n_faces, 2).transpose(1, 0, 2).reshape(-1, 2)
     return Neighbors(at_edge[one], one // 3, two // 3, sides[one, 0] == sides[two, 1])
 

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Int
+from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 
 # The corners of a facet are packed into one integer while that stays below this bound: sorting
@@ -70,7 +72,7 @@ def list_facets(simplices: Int[np.ndarray, "s corners"], n_points: int) -> Facet
     else:
         facets, inverse, counts = np.unique(ends.T, axis=0, return_inverse=True, return_counts=True)
     of_simplices = inverse.reshape(dim + 1, -1).T
-    return FacetTable(freeze(facets), freeze(of_simplices), freeze(counts))
+    return FacetTable(facets, of_simplices, counts)
 
 
 def state_without_facets(mesh: object) -> dict[str, Any]:
@@ -79,3 +81,25 @@ def state_without_facets(mesh: object) -> dict[str, Any]:
     Facets would make a pickle three times as large; the next process lists them again.
     """
     return {name: value for name, value in vars(mesh).items() if name != "facets"}
+
+
+def shared_facets(
+    simplex_facets: Int[np.ndarray, "..."],
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """Return pairs of sides that lie on one facet; they chain all sides of the facet.
+
+    Side (m+1)·s + a is the one of simplex s opposite to its corner a.
+    """
+    facets = simplex_facets.ravel()
+    order = np.argsort(facets, kind="stable")
+    same = facets[order][1:] == facets[order][:-1]
+    return order[:-1][same], order[1:][same]
+
+
+def label_components(
+    n: int, one: Int[np.ndarray, " k"], two: Int[np.ndarray, " k"]
+) -> tuple[int, Int[np.ndarray, " n"]]:
+    """Count the groups of n things of which k pairs are linked, and return the group of each."""
+    graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(n, n))
+    count, labels = connected_components(graph, directed=False)
+    return int(count), labels.astype(np.int64)

@@ -1,13 +1,11 @@
 """The facets of a mesh, and the components that are connected through facets."""
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Int
-from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.facet_lists import FacetTable
+from eigenshape.geometry.facet_lists import FacetTable, label_components, shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
@@ -96,25 +94,6 @@ def boundary_surface(mesh: MeshLike) -> TriangleMesh:
     return TriangleMesh(solid.points[used], renumbered.reshape(-1, 3))
 
 
-def _corners_of_facets(mesh: Mesh) -> Int[np.ndarray, "s corners m"]:
-    """Return for each corner of each simplex the other corners, sorted by their points."""
-    corners = np.arange(mesh.dim + 1)
-    others = np.array([np.delete(corners, corner) for corner in corners])
-    order = np.argsort(mesh.simplices[:, others], axis=2)
-    return np.take_along_axis(np.broadcast_to(others, order.shape), order, axis=2)
-
-
-def _neighbors(table: FacetTable) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-    """Return pairs of sides that lie on one facet; they chain all sides of the facet.
-
-    Side (m+1)·s + a is the one of simplex s opposite to its corner a.
-    """
-    at = table.simplex_facets.ravel()
-    order = np.argsort(at, kind="stable")
-    same = at[order][1:] == at[order][:-1]
-    return order[:-1][same], order[1:][same]
-
-
 def facet_components(table: FacetTable) -> tuple[int, Int[np.ndarray, " s"]]:
     """Count the components that are connected through facets, and return that of each simplex.
 
@@ -122,8 +101,28 @@ def facet_components(table: FacetTable) -> tuple[int, Int[np.ndarray, " s"]]:
     separate: no heat flows through there.
     """
     n, corners = table.simplex_facets.shape
-    one, two = (side // corners for side in _neighbors(table))
-    return _components(n, one, two)
+    one, two = shared_facets(table.simplex_facets)
+    return label_components(n, one // corners, two // corners)
+
+
+def corner_fans(mesh: Mesh) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " c"]]:
+    """Group the corners of simplices into fans; return the point of each fan, and each corner's fan.
+
+    A fan consists of simplices at one point that are connected through facets at that point.
+    """
+    # For each corner of each simplex the other corners, sorted by their points
+    corners = np.arange(mesh.dim + 1)
+    others = np.array([np.delete(corners, corner) for corner in corners])
+    order = np.argsort(mesh.simplices[:, others], axis=2)
+    facets = np.take_along_axis(np.broadcast_to(others, order.shape), order, axis=2)
+    n, n_corners = mesh.simplices.shape
+    ids = (np.arange(n)[:, None, None] * n_corners + facets).reshape(-1, mesh.dim)
+    # So the corners of a facet stand in one order on both of its sides.
+    one, two = shared_facets(facet_table(mesh).simplex_facets)
+    count, fans = label_components(n * n_corners, ids[one].ravel(), ids[two].ravel())
+    points = np.empty(count, dtype=np.int64)
+    points[fans] = mesh.simplices.ravel()
+    return points, fans
 
 
 def without_pinches(mesh: Mesh) -> SimplicialMesh:
@@ -134,22 +133,8 @@ def without_pinches(mesh: Mesh) -> SimplicialMesh:
     than a facet. Simplices keep their order, copies take the place of their point in the order of
     points, and points without simplices are removed.
     """
-    corners, table = _corners_of_facets(mesh), facet_table(mesh)
-    n, n_corners = mesh.simplices.shape
-    ids = (np.arange(n)[:, None, None] * n_corners + corners).reshape(-1, mesh.dim)
-    one, two = _neighbors(table)
-    count, fans = _components(n * n_corners, ids[one].ravel(), ids[two].ravel())
-    points = np.empty(count, dtype=np.int64)
-    points[fans] = mesh.simplices.ravel()
+    points, fans = corner_fans(mesh)
     order = np.argsort(points, kind="stable")
-    places = np.empty(count, dtype=np.int64)
-    places[order] = np.arange(count)
-    return SimplicialMesh(mesh.points[points[order]], places[fans].reshape(n, n_corners))
-
-
-def _components(
-    n: int, one: Int[np.ndarray, " k"], two: Int[np.ndarray, " k"]
-) -> tuple[int, Int[np.ndarray, " n"]]:
-    graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(n, n))
-    count, labels = connected_components(graph, directed=False)
-    return int(count), labels.astype(np.int64)
+    places = np.empty(len(points), dtype=np.int64)
+    places[order] = np.arange(len(points))
+    return SimplicialMesh(mesh.points[points[order]], places[fans].reshape(mesh.simplices.shape))

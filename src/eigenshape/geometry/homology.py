@@ -6,12 +6,13 @@ from jaxtyping import Int
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.face_turns import face_turns
-from eigenshape.geometry.facets import boundary_surface, facet_table
+from eigenshape.geometry.facets import boundary_facets, boundary_surface, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     is_manifold,
     require_simplices_everywhere,
+    unique_edges,
     vertex_components,
 )
 
@@ -57,7 +58,12 @@ def betti_numbers(mesh: MeshLike) -> tuple[int, ...]:
             f"Betti numbers need triangles, or tetrahedra in R^3; the mesh is a {mesh!r}."
         )
     require_simplices_everywhere(mesh)
-    surface = _surface(mesh) if mesh.dim == 2 else boundary_surface(mesh)
+    if isinstance(mesh, TriangleMesh):
+        surface = mesh
+    elif mesh.dim == 2:  # the same triangles; coordinates do not matter
+        surface = TriangleMesh(np.zeros((mesh.n_points, 3)), mesh.simplices)
+    else:
+        surface = boundary_surface(mesh)
     if not is_manifold(surface):
         noun = "surface" if mesh.dim == 2 else "boundary of the solid"
         raise InvalidShapeError(
@@ -67,7 +73,12 @@ def betti_numbers(mesh: MeshLike) -> tuple[int, ...]:
     n_components, _ = vertex_components(mesh)
     characteristic = mesh.n_points - len(edges_of(mesh)) + len(mesh.simplices)
     if mesh.dim == 2:
-        n_closed = _count_closed(surface)
+        # Components that have no boundary and two sides
+        _, labels = vertex_components(surface)
+        closed = np.ones(n_components, dtype=bool)
+        closed[labels[boundary_facets(surface)]] = False
+        closed[labels[surface.faces[~face_turns(surface).orientable]]] = False
+        n_closed = int(closed.sum())
         return n_components, n_components + n_closed - characteristic, n_closed
     characteristic += len(facet_table(mesh).facets) - 2 * len(mesh.simplices)
     # All but the outermost sheet of the boundary of each component surround a cavity.
@@ -78,25 +89,4 @@ def betti_numbers(mesh: MeshLike) -> tuple[int, ...]:
 def edges_of(mesh: Mesh) -> Int[np.ndarray, "e 2"]:
     """Return the edges of a mesh of any dimension, the lower point first, in lexicographic order."""
     first, second = np.triu_indices(mesh.dim + 1, 1)
-    ends = np.sort(mesh.simplices, axis=1)
-    keys = np.unique(ends[:, first] * mesh.n_points + ends[:, second])
-    return np.column_stack(np.divmod(keys, mesh.n_points))
-
-
-def _surface(mesh: Mesh) -> TriangleMesh:
-    """Return a mesh with the same triangles; coordinates do not matter."""
-    if isinstance(mesh, TriangleMesh):
-        return mesh
-    return TriangleMesh(np.zeros((mesh.n_points, 3)), mesh.simplices)
-
-
-def _count_closed(surface: TriangleMesh) -> int:
-    """Count the components that have no boundary and two sides."""
-    _, labels = vertex_components(surface)
-    table = facet_table(surface)
-    n_components = int(labels.max()) + 1
-    closed = np.ones(n_components, dtype=bool)
-    closed[labels[table.facets[table.boundary].ravel()]] = False
-    sided = face_turns(surface).orientable
-    closed[labels[surface.faces[~sided].ravel()]] = False
-    return int(closed.sum())
+    return unique_edges(mesh.simplices[:, first], mesh.simplices[:, second], mesh.n_points)

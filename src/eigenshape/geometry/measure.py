@@ -7,7 +7,7 @@ from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
-from eigenshape.geometry.simplices import in_length, scaled_corners, size_one
+from eigenshape.geometry.simplices import at_points, in_length, scaled_corners, size_one
 from eigenshape.geometry.topology import edge_table
 
 
@@ -185,12 +185,7 @@ def vertex_normals(mesh: MeshLike) -> Float[np.ndarray, "n 3"]:
 def mean_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
     """Return `vertex_normals` of any mesh; normals of neighbors that disagree cancel in part."""
     vectors = area_vectors(scaled_corners(mesh)[0])
-    sums = [
-        np.bincount(
-            mesh.faces.ravel(), weights=np.repeat(vectors[:, axis], 3), minlength=mesh.n_vertices
-        )
-        for axis in range(3)
-    ]
+    sums = [at_points(mesh, vectors[:, axis]) for axis in range(3)]
     return _unit(np.column_stack(sums))
 
 

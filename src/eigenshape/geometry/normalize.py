@@ -72,20 +72,16 @@ def normalize_mesh(mesh: MeshLike, measure: Measure) -> TriangleMesh:
 
 
 def _diameter(points: Points) -> float:
-    corners = _hull(points)
-    # All points of a sphere lie on its hull, so distances are computed for a thousand at a time.
-    return max(
-        float(cdist(rows, corners).max())
-        for rows in np.split(corners, range(1000, len(corners), 1000))
-    )
-
-
-def _hull(points: Points) -> Float[np.ndarray, "h 3"]:
+    # The ends of a diameter are corners of the convex hull: of the space, of a plane, or of a line.
     axes = np.linalg.svd(points, full_matrices=False)[2]
+    along = points @ axes[0]
+    corners = points[[np.argmin(along), np.argmax(along)]]
     for dimension in (3, 2):
         try:
-            return points[ConvexHull(points @ axes[:dimension].T).vertices]
+            corners = points[ConvexHull(points @ axes[:dimension].T).vertices]
+            break
         except QhullError:  # flat or straight: no hull with volume, or with area
             continue
-    along = points @ axes[0]
-    return points[[np.argmin(along), np.argmax(along)]]
+    # All points of a sphere lie on its hull, so distances are computed for a thousand at a time.
+    blocks = np.split(corners, range(1000, len(corners), 1000))
+    return max(float(cdist(rows, corners).max()) for rows in blocks)

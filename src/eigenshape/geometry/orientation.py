@@ -83,10 +83,7 @@ def orient_closed_outward(mesh: TriangleMesh) -> TriangleMesh:
     An open mesh, whose signed volume says nothing, is returned as it is; `orient_outward` decides
     for those.
 
-    Raises
-    ------
-    InvalidShapeError
-        If two neighboring faces of a closed mesh are turned against each other.
+    Raise InvalidShapeError if two neighboring faces of a closed mesh are turned against each other.
     """
     if not is_closed(mesh) or enclosed_volume(mesh) >= 0:
         return mesh
@@ -138,8 +135,14 @@ def _faces_in(
     starts = np.searchsorted(piece[rows], closed)
     ends = np.searchsorted(piece[rows], closed, side="right")
     pieces = [corners[rows[start:end]] for start, end in zip(starts, ends, strict=True)]
-    volumes = np.array([_relative_volume(faces) for faces in pieces])
-    inward = volumes < -NEGLIGIBLE_VOLUME
+    inward = np.zeros(len(pieces), dtype=bool)
+    for number, faces in enumerate(pieces):
+        # A tiny piece is scaled up first, because its volume would underflow.
+        local, _ = size_one(faces - faces.mean(axis=(0, 1)))
+        a, b, c = local.transpose(1, 0, 2)
+        volume = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6
+        area = float(np.linalg.norm(area_vectors(local), axis=1).sum())
+        inward[number] = area > 0 and volume / area**1.5 < -NEGLIGIBLE_VOLUME
     if not inward.any() or len(pieces) == 1:
         return inward
     low, high = (
@@ -154,15 +157,6 @@ def _faces_in(
                 found[number] = inward[other]
                 break
     return found
-
-
-def _relative_volume(corners: Float[np.ndarray, "f 3 3"]) -> float:
-    """Return the signed volume under faces divided by area^1.5; 0 if the faces have no area."""
-    # A tiny piece is scaled up first, because its volume would underflow.
-    corners, _ = size_one(corners - corners.mean(axis=(0, 1)))
-    a, b, c = corners.transpose(1, 0, 2)
-    area = float(np.linalg.norm(area_vectors(corners), axis=1).sum())
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6 / area**1.5 if area else 0.0
 
 
 def _winding_number(corners: Float[np.ndarray, "f 3 3"], point: Float[np.ndarray, "3"]) -> float:

@@ -21,10 +21,8 @@ from eigenshape.geometry.topology import (
 def require_sound(mesh: Mesh) -> None:
     """Raise an error if a mesh cannot carry finite elements.
 
-    Raises
-    ------
-    InvalidShapeError
-        If a simplex has no volume or the corners of another, or a point has no simplex.
+    A simplex without volume, two simplices with the same corners and a point without simplex are
+    refused.
     """
     require_volumes(mesh)
     require_simplices_everywhere(mesh)
@@ -35,11 +33,6 @@ def require_different_simplices(mesh: Mesh) -> None:
     """Raise an error if two simplices have the same corners, in any order.
 
     Their volume would count twice.
-
-    Raises
-    ------
-    InvalidShapeError
-        With the indices and corners of the first such pair, and the number of such simplices.
     """
     repeated = repeated_simplices(mesh)
     if len(repeated):
@@ -57,11 +50,6 @@ def require_joined(mesh: Mesh) -> None:
 
     Heat does not cross such an edge, so descriptors would be those of the pieces. Pieces that touch
     elsewhere, and closed pieces, are accepted as separate parts.
-
-    Raises
-    ------
-    InvalidShapeError
-        With the first such edge and the number of such edges.
     """
     n_components, labels = vertex_components(mesh)
     if n_components == 1:
@@ -80,11 +68,8 @@ def require_joined(mesh: Mesh) -> None:
 def require_describable(mesh: Mesh) -> None:
     """Raise an error if a descriptor of the mesh would not describe the shape.
 
-    Raises
-    ------
-    InvalidShapeError
-        If a point has no simplex, two simplices have the same corners, or pieces lie edge on edge
-        without sharing vertices.
+    A point without simplex, two simplices with the same corners and pieces that lie edge on edge
+    without sharing vertices are refused.
     """
     require_simplices_everywhere(mesh)
     require_different_simplices(mesh)
@@ -92,13 +77,7 @@ def require_describable(mesh: Mesh) -> None:
 
 
 def require_oriented(mesh: TriangleMesh) -> None:
-    """Raise an error if two neighboring faces are turned against each other.
-
-    Raises
-    ------
-    InvalidShapeError
-        With the first such edge and the number of such edges.
-    """
+    """Raise an error if two neighboring faces are turned against each other."""
     edges = inconsistent_edges(mesh)
     if not len(edges):
         return

@@ -58,10 +58,7 @@ def in_length(
 ) -> Float[np.ndarray, "..."]:
     """Return values times `scale` to the given power; `scale` is a power of two.
 
-    Raises
-    ------
-    InvalidShapeError
-        If floats cannot represent lengths to that power.
+    Raise InvalidShapeError if floats cannot represent them.
     """
     exponent = power * (int(np.frexp(scale)[1]) - 1)
     if abs(exponent) > LARGEST_EXPONENT:
@@ -218,9 +215,14 @@ def mean_side_length(mesh: MeshLike) -> float:
     """
     mesh = as_simplicial(mesh)
     corners, scale = scaled_corners(mesh)
-    first, second = np.triu_indices(corners.shape[1], 1)
-    lengths = np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
+    lengths = side_lengths(corners)
     return float(in_length(lengths.mean(keepdims=True), scale, 1)[0, 0])
+
+
+def side_lengths(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, "s sides"]:
+    """Return the lengths of the sides of each simplex, in the order of `np.triu_indices`."""
+    first, second = np.triu_indices(corners.shape[1], 1)
+    return np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
 
 
 def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
@@ -234,13 +236,7 @@ def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
 
 
 def require_span(points: Float[np.ndarray, "n d"], dim: int, noun: str) -> None:
-    """Raise an error if points lie in a flat of fewer than `dim` dimensions, up to rounding.
-
-    Raises
-    ------
-    InvalidShapeError
-        The message names the flat.
-    """
+    """Raise an error if points lie in a flat of fewer than `dim` dimensions, up to rounding."""
     offsets = size_one(points)[0]
     offsets = offsets - offsets[0]
     for found in range(dim):
@@ -264,11 +260,8 @@ def require_span(points: Float[np.ndarray, "n d"], dim: int, noun: str) -> None:
 def require_volumes(mesh: Mesh) -> None:
     """Raise an error if a simplex has no volume.
 
-    Raises
-    ------
-    InvalidShapeError
-        With the index and corners of the first such simplex and their number; or if the points of
-        the mesh lie in a flat, so that simplices have volume by rounding only.
+    If the points of the mesh lie in a flat, simplices have volume by rounding only, and are
+    refused, too.
     """
     flat = degenerate_simplices(mesh)
     plural, singular, measure = MEASURES.get(mesh.dim, ("Simplices", "simplex", "volume"))

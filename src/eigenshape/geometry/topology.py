@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Int
-from scipy.sparse.csgraph import connected_components
+from jaxtyping import Bool, Float, Int
 
 from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
-from eigenshape.geometry.facets import boundary_facets, facet_table
+from eigenshape.geometry.facet_lists import label_components, shared_facets
+from eigenshape.geometry.facets import boundary_facets, corner_fans, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
 
@@ -87,10 +87,28 @@ def face_pairs(table: EdgeTable) -> tuple[Int[np.ndarray, "p 2"], Int[np.ndarray
 
     More than two faces at one edge give the pairs of a chain through all of them.
     """
-    at_edge = table.face_edges.ravel()
-    order = np.argsort(at_edge, kind="stable")
-    first = np.flatnonzero(at_edge[order][1:] == at_edge[order][:-1])
-    return np.column_stack([order[first], order[first + 1]]) // 3, at_edge[order[first]]
+    one, two = shared_facets(table.face_edges)
+    return np.column_stack([one, two]) // 3, table.face_edges.ravel()[one]
+
+
+def neighbor_links(mesh: TriangleMesh) -> sp.csr_array:
+    """Return the symmetric matrix with a 1 for each two vertices that an edge connects."""
+    edges = edge_table(mesh).edges
+    return adjacency_matrix(edges, np.ones(len(edges)), mesh.n_vertices)
+
+
+def adjacency_matrix(edges: Int[np.ndarray, "e 2"], values: np.ndarray, n: int) -> sp.csr_array:
+    """Return the symmetric matrix of weighted edges, each given once."""
+    both = np.concatenate([edges, edges[:, ::-1]]).T
+    return sp.coo_array((np.tile(values, 2), both), shape=(n, n)).tocsr()
+
+
+def unique_edges(
+    one: Int[np.ndarray, "..."], two: Int[np.ndarray, "..."], n: int
+) -> Int[np.ndarray, "e 2"]:
+    """Return pairs of n points without duplicates, the lower first, in lexicographic order."""
+    keys = np.unique(np.minimum(one, two) * n + np.maximum(one, two))
+    return np.column_stack(np.divmod(keys, n))
 
 
 def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:
@@ -127,11 +145,9 @@ def vertex_components(mesh: MeshLike) -> tuple[int, Int[np.ndarray, " n"]]:
     (2, [0, 0, 0, 0, 1, 1, 1, 1])
     """
     mesh = as_simplicial(mesh)
-    corners = mesh.simplices
-    ends = np.column_stack([np.repeat(corners[:, 0], mesh.dim), corners[:, 1:].ravel()])
-    graph = sp.coo_array((np.ones(len(ends), dtype=np.int8), ends.T), shape=(mesh.n_points,) * 2)
-    count, labels = connected_components(graph, directed=False)
-    return int(count), labels.astype(np.int64)
+    # A simplex is connected if its first corner is linked to each other one.
+    first, others = mesh.simplices[:, 0], mesh.simplices[:, 1:]
+    return label_components(mesh.n_points, np.repeat(first, mesh.dim), others.ravel())
 
 
 def unreferenced_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
@@ -142,13 +158,7 @@ def unreferenced_vertices(mesh: Mesh) -> Int[np.ndarray, " k"]:
 
 
 def require_simplices_everywhere(mesh: Mesh) -> None:
-    """Raise an error if a point has no simplex.
-
-    Raises
-    ------
-    InvalidShapeError
-        With the index and coordinates of the first such point, and the number of such points.
-    """
+    """Raise an error if a point has no simplex."""
     loose = unreferenced_vertices(mesh)
     if loose.size:
         point, simplex = ("vertex", "face") if mesh.dim == 2 else ("point", "simplex")
@@ -189,6 +199,13 @@ def repeated_simplices(mesh: Mesh) -> Int[np.ndarray, "k 2"]:
     return pairs[np.argsort(pairs[:, 1])]
 
 
+def number_places(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
+    """Return for each point the number of its place; equal points have the same place."""
+    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
+    _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
+    return place.ravel().astype(np.int64)
+
+
 def seams(mesh: Mesh) -> Int[np.ndarray, "k 2 m"]:
     """Return pairs of boundary facets with corners at the same places but different vertices.
 
@@ -196,9 +213,7 @@ def seams(mesh: Mesh) -> Int[np.ndarray, "k 2 m"]:
     """
     facets = boundary_facets(mesh)
     used, numbers = np.unique(facets, return_inverse=True)
-    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
-    _, place = np.unique(mesh.points[used] + 0.0, axis=0, return_inverse=True)
-    places = place.ravel()[numbers.reshape(facets.shape)]
+    places = number_places(mesh.points[used])[numbers.reshape(facets.shape)]
     by_place = np.argsort(places, axis=1, kind="stable")
     facets, places = (np.take_along_axis(rows, by_place, axis=1) for rows in (facets, places))
     order, _, repeats = sorted_rows(places)
@@ -330,34 +345,8 @@ def non_manifold_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
 
 def non_manifold_vertices(mesh: TriangleMesh) -> Int[np.ndarray, " k"]:
     """Return the vertices whose faces form more than one fan."""
-    n_fans = np.bincount(_corner_fans(mesh)[1], minlength=mesh.n_vertices)
+    n_fans = np.bincount(corner_fans(mesh)[0], minlength=mesh.n_vertices)
     return np.flatnonzero(n_fans > 1)
-
-
-def _corner_fans(mesh: TriangleMesh) -> tuple[Int[np.ndarray, " c"], Int[np.ndarray, " k"]]:
-    """Group the corners of faces into fans; return the fan of each corner, and each fan's vertex.
-
-    A fan consists of faces at one vertex that are connected through edges at that vertex.
-    """
-    table, f = edge_table(mesh), mesh.n_faces
-    corners = np.arange(3 * f).reshape(f, 3)
-    at_edge = table.face_edges.ravel()
-    order = np.argsort(at_edge, kind="stable")
-    neighbors = at_edge[order][1:] == at_edge[order][:-1]
-    one, two = order[:-1][neighbors], order[1:][neighbors]
-    links = []
-    for shift_one in (1, 2):
-        for shift_two in (1, 2):
-            a = corners[one // 3, (one + shift_one) % 3]
-            b = corners[two // 3, (two + shift_two) % 3]
-            same = mesh.faces.ravel()[a] == mesh.faces.ravel()[b]
-            links.append(np.stack([a[same], b[same]]))
-    pairs = np.concatenate(links, axis=1)
-    graph = sp.coo_array((np.ones(pairs.shape[1], dtype=np.int8), pairs), shape=(3 * f, 3 * f))
-    count, fan = connected_components(graph, directed=False)
-    vertex = np.empty(count, dtype=np.int64)
-    vertex[fan] = mesh.faces.ravel()
-    return fan.astype(np.int64), vertex
 
 
 def euler_characteristic(mesh: MeshLike) -> int:

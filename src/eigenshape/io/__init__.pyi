@@ -10,13 +10,13 @@ from .edits import write_edits as write_edits
 from .fields import read_fields as read_fields
 from .fields import write_fields as write_fields
 from .folders import find_items as find_items
+from .formats.registry import MESH_FORMATS as MESH_FORMATS
+from .formats.registry import SHAPE_FORMATS as SHAPE_FORMATS
 from .labeled_shapes import read_label_names as read_label_names
 from .labeled_shapes import read_labeled_shape as read_labeled_shape
 from .labeled_shapes import read_labeled_shapes as read_labeled_shapes
 from .mesh_files import read_mesh as read_mesh
 from .mesh_files import write_mesh as write_mesh
-from .parsing import MESH_FORMATS as MESH_FORMATS
-from .shape_files import SHAPE_FORMATS as SHAPE_FORMATS
 from .shape_files import read_points as read_points
 from .shape_files import read_shape as read_shape
 from .shape_files import write_points as write_points

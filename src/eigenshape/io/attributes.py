@@ -1,6 +1,6 @@
 """What a mesh file holds besides positions and faces: texture coordinates, materials, colors, groups."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from eigenshape._arrays import ReadOnly
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.sources import SourceFile
 
 SAME_NORMAL = 1000  # steps from 0 to 1; normals that agree to a step are one
 
@@ -37,15 +38,6 @@ class Material:
     image_name: str = ""
 
     _repr_html_ = html_repr
-
-
-@dataclass(frozen=True, eq=False)
-class SourceFile:
-    """A mesh file as it was read, of which a file of the same format is made again."""
-
-    path: Path
-    suffix: str
-    data: bytes = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +124,24 @@ class MeshAttributes(ReadOnly):
         }
 
 
+@dataclass(frozen=True, eq=False)
+class WriteJob:
+    """A mesh to write with its attributes, and a list of what the file does not keep."""
+
+    mesh: TriangleMesh
+    path: Path
+    suffix: str
+    binary: bool
+    attributes: MeshAttributes
+    face_labels: Int[np.ndarray, " f"] | None
+    lost: list[str]
+
+    def lose(self, kinds: Iterable[str]) -> None:
+        """Note that further content is lost, and what there is of some kinds of content."""
+        contents = self.attributes.contents
+        self.lost.extend([*self.attributes.others, *(kind for kind in kinds if contents[kind])])
+
+
 def plain_attributes(mesh: TriangleMesh) -> MeshAttributes:
     """Return the attributes of a mesh of which nothing but positions and faces is known."""
     none = np.full(mesh.n_faces, -1)
@@ -155,6 +165,7 @@ def label_attributes(
         face_materials=numbers.ravel(),
         materials=tuple(materials),
         colors=None,
+        source=None,
     )
 
 
@@ -184,11 +195,6 @@ def unit_rows(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
     """Give vectors the length 1, and leave those of length 0."""
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.where(lengths > 0, lengths, 1.0)
-
-
-def loss_sentence(names: Sequence[str], path: Path) -> str:
-    """Name in one sentence what a written file does not keep; empty if it keeps everything."""
-    return f"{path.name} does not keep: {', '.join(dict.fromkeys(names))}." if names else ""
 
 
 def linear_colors(colors: Float[np.ndarray, "*rows"]) -> Float[np.ndarray, "*rows"]:

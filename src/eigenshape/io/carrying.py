@@ -17,6 +17,7 @@ from eigenshape.io.attributes import MeshAttributes, unit_rows
 
 # Faces are searched this many times as far from the middle of a new face as its corners are.
 REACH = 1.5
+MOST_COPIES = 8  # faces at one place and of one side that keep their own attributes
 # Values on both sides of an edge differ by more than this where there is a seam. Interpolation
 # rounds coordinates, and colors to whole numbers.
 SEAMS = {"texture_coordinates": 1e-6, "colors": 1}
@@ -62,8 +63,17 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
     if np.array_equal(old.faces, mesh.faces) and np.array_equal(old.vertices, mesh.vertices):
         return attributes
     places = _places(old, mesh)
-    starts = _nearest_faces(old, mesh, places)
-    faces, weights = _corner_places(attributes, mesh, starts, places[: old.n_faces])
+    starts, is_old = _nearest_faces(old, mesh, places)
+    # A face at the places of an old one has its very values; corners of others lie on old faces.
+    faces, weights = np.column_stack([starts] * 3), np.zeros((mesh.n_faces, 3, 3))
+    old_order = np.argsort(places[: old.n_faces][starts], axis=1, kind="stable")
+    order = np.argsort(places[old.n_faces :], axis=1, kind="stable")
+    weights[np.arange(mesh.n_faces)[:, None], order, old_order] = 1.0
+    left = np.flatnonzero(~is_old)
+    if left.size:
+        new_corners = mesh.vertices[mesh.faces[left]]
+        neighbors = _neighbors(attributes, places[: old.n_faces])
+        faces[left], weights[left] = _corner_places(old, new_corners, starts[left], neighbors)
     columns = (3 * faces[:, :, None] + np.arange(3)).ravel()
     rows = np.repeat(np.arange(3 * mesh.n_faces), 3)
     shape = (3 * mesh.n_faces, 3 * old.n_faces)
@@ -121,18 +131,27 @@ def _places(old: TriangleMesh, new: TriangleMesh) -> Int[np.ndarray, "g 3"]:
 
 def _nearest_faces(
     old: TriangleMesh, new: TriangleMesh, places: Int[np.ndarray, "g 3"]
-) -> Int[np.ndarray, " f"]:
-    """Return the old face at the places of each new one, or the nearest; the right side of a sheet."""
+) -> tuple[Int[np.ndarray, " f"], Bool[np.ndarray, " f"]]:
+    """Return the old face at the places of each new one, or the nearest, and whether it is there.
+
+    On a sheet of two sides it is the right side.
+    """
     n_old = old.n_faces
     keys = np.unique(np.sort(places, axis=1), axis=0, return_inverse=True)[1].ravel()
     # Whether a face goes around its places in their order, or the other way around
     turned = np.argsort(places, axis=1, kind="stable")
     sides = 2 * keys + np.isin(turned @ [9, 3, 1], [5, 15, 19])  # 012, 120 and 201 in base 3
-    first = np.full(sides.max() + 2, -1)
-    first[sides[:n_old][::-1]] = np.arange(n_old)[::-1]
+    # Of several faces at one place, such as a label on a wall, the first new one is the first old one.
+    olds = np.full((sides.max() + 2, MOST_COPIES), -1)
+    old_ranks, ranks = _ranks(sides[:n_old]), _ranks(sides[n_old:])
+    olds[sides[:n_old][::-1], old_ranks[::-1]] = np.arange(n_old)[::-1]
+    first = olds[:, 0]
     same, other = first[sides[n_old:]], first[sides[n_old:] ^ 1]
     found = np.where(same >= 0, same, other)
-    left = np.flatnonzero(found < 0)
+    copies = olds[sides[n_old:], ranks]
+    found = np.where(copies >= 0, copies, found)
+    is_old = found >= 0
+    left = np.flatnonzero(~is_old)
     if left.size:
         middles = new.vertices[new.faces[left]].mean(axis=1)
         nearest = closest_points(old, middles).simplices
@@ -145,24 +164,30 @@ def _nearest_faces(
             twins >= 0
         )
         found[left] = np.where(away, twins, nearest)
-    return found
+    return found, is_old
+
+
+def _ranks(sides: Int[np.ndarray, " g"]) -> Int[np.ndarray, " g"]:
+    """Return how many faces before each one have the same places, up to a limit."""
+    order = np.argsort(sides, kind="stable")
+    ranks = np.empty_like(order)
+    ranks[order] = np.arange(len(sides)) - np.searchsorted(sides[order], sides[order])
+    return ranks.clip(max=MOST_COPIES - 1)
 
 
 def _corner_places(
-    attributes: MeshAttributes,
-    mesh: TriangleMesh,
-    starts: Int[np.ndarray, " f"],
-    places: Int[np.ndarray, "o 3"],
-) -> tuple[Int[np.ndarray, "f 3"], Float[np.ndarray, "f 3 3"]]:
+    old: TriangleMesh,
+    new_corners: Float[np.ndarray, "k 3 3"],
+    starts: Int[np.ndarray, " k"],
+    neighbors: Int[np.ndarray, "o 3"],
+) -> tuple[Int[np.ndarray, "k 3"], Float[np.ndarray, "k 3 3"]]:
     """Return for each corner the old face in which its nearest point lies, and the weights there."""
-    old = attributes.mesh
     middle = old.vertices.mean(axis=0)
     corners, scale = size_one(old.vertices[old.faces] - middle)
-    wanted = (mesh.vertices[mesh.faces] - middle) / scale
+    wanted = (new_corners - middle) / scale
     middles = wanted.mean(axis=1)
     radii = np.linalg.norm(wanted - middles[:, None], axis=2).max(axis=1)
     gaps = np.linalg.norm(corners[starts].mean(axis=1) - middles, axis=1)
-    neighbors = _neighbors(attributes, places)
     found: tuple[np.ndarray, np.ndarray] = nearest_around(
         wanted, middles, starts, (REACH * np.maximum(radii, gaps)) ** 2, corners, neighbors
     )

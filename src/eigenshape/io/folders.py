@@ -15,7 +15,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape._workers import Item
-from eigenshape.io.shape_files import POINTS, SHAPE_FORMATS
+from eigenshape.io.formats.registry import POINT_FORMATS, SHAPE_FORMATS
 from eigenshape.retrieval.store.damage import StoreWarning
 
 NAME, LABEL, TAGS = "name", "label", "tags"  # columns of a table of labels; others are attributes
@@ -102,11 +102,11 @@ def _items_of(source: Path) -> Iterator[Item]:
         yield Item(source.stem, source)
         return
     known = sorted(path for path in _files_below(source) if path.suffix.lower() in SHAPE_FORMATS)
-    meshes = {path.with_suffix("") for path in known if path.suffix.lower() not in POINTS}
+    meshes = {path.with_suffix("") for path in known if path.suffix.lower() not in POINT_FORMATS}
     paths = [
         path
         for path in known
-        if path.suffix.lower() not in POINTS or path.with_suffix("") not in meshes
+        if path.suffix.lower() not in POINT_FORMATS or path.with_suffix("") not in meshes
     ]
     stems = Counter(path.with_suffix("") for path in paths)
     for path in paths:

@@ -1,49 +1,39 @@
 """Read and write meshes. The content of a file is checked before a mesh is returned."""
 
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, overload
 
 import numpy as np
-from jaxtyping import Int, UInt8
+from jaxtyping import Float, Int, UInt8
 
-from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape._files import as_path, read_regular, replace_file
+from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidShapeError
+from eigenshape._files import as_path, replace_file
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io import glb_attributes, obj_attributes, off, ply, ply_attributes, stl
+from eigenshape.geometry.repairs.repair_report import PLURALS, count_nouns
 from eigenshape.io.attributes import (
     MeshAttributes,
-    SourceFile,
+    WriteJob,
     label_attributes,
-    loss_sentence,
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.cells import require_kind
-from eigenshape.io.fields import FIELD_FORMATS, format_fields, read_field_attributes
-from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, require_finite, suffix_of
+from eigenshape.io.fields import format_fields, read_field_attributes
+from eigenshape.io.formats.cells import SEGMENTS, require_kind, select_cells, split_sentence
+from eigenshape.io.formats.registry import (
+    MESH_FORMATS,
+    WITH_COLORS,
+    WRITTEN,
+    CellKind,
+    format_of,
+    suffix_of,
+    suffixes_with,
+)
+from eigenshape.io.sources import SourceFile, naming, open_file
 
-TEXT: dict[str, Callable[..., bytes]] = {
-    ".off": off.format_mesh,
-    ".ply": ply.format_text,
-    ".stl": stl.format_text,
-}
-BINARY: dict[str, Callable[..., bytes]] = {".ply": ply.format_binary, ".stl": stl.format_binary}
-WRITTEN = (".off", ".obj", ".ply", ".stl", ".glb", *FIELD_FORMATS)
-LABELED = (".ply", ".glb", ".obj")  # formats that hold parts
-TEXT_FORMATS = (*TEXT, ".obj")
-BINARY_FORMATS = (*BINARY, ".glb", *FIELD_FORMATS)
-GLTF = (".glb", ".gltf")
-WITH_ATTRIBUTES = (
-    *GLTF,
-    ".obj",
-    ".ply",
-    *FIELD_FORMATS,
-)  # formats that hold more than positions and faces
+KINDS = {2: SEGMENTS, 3: "triangles"}  # of cells, by their number of corners
 
 
 @overload
@@ -82,7 +72,7 @@ def read_mesh(
     Parameters
     ----------
     path : str or Path
-        A file in OFF, OBJ, PLY, STL, GLB or glTF, or a surface in .mesh, .msh, .vtk, .vtu or .npz.
+        A file of a format in `eigenshape.io.MESH_FORMATS`, such as .off, .obj, .ply, .stl or .glb.
     file_format : str, optional
         Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
     cells : {"triangles", "quads", "tetrahedra"}, optional
@@ -138,7 +128,7 @@ def read_mesh(
             if not left_out:
                 return mesh, _read_attributes(source, mesh)
             # Attributes are listed by the faces of the file, so they are read with all of them.
-            points, faces = parse_mesh(source.path, source.suffix, source.data, cells)
+            points, faces = parse_file(source, cells)
             whole = TriangleMesh(np.where(np.isfinite(points), points, 0.0), faces)
             return mesh, carry_attributes(_read_attributes(source, whole), mesh)
         except FileFormatError:
@@ -160,26 +150,90 @@ def load_mesh(
 def _load(
     path: str | Path, file_format: str | None, cells: CellKind | None, drop_missing: bool
 ) -> tuple[SourceFile, TriangleMesh, tuple[str, ...]]:
-    path = as_path(path)
-    suffix = suffix_of(path, file_format, MESH_FORMATS)
     require_kind(cells)
-    data = read_regular(path)
-    with naming(path):
-        points, simplices = parse_mesh(path, suffix, data, cells)
+    source = open_file(path, file_format, MESH_FORMATS)
+    with naming(source.path):
+        points, simplices = parse_file(source, cells)
         require_surface(points, simplices)
         points, simplices, _, report = require_finite(points, simplices, drop_missing=drop_missing)
-        return SourceFile(path, suffix, data), TriangleMesh(points, simplices), report
+        return source, TriangleMesh(points, simplices), report
+
+
+def parse_file(
+    source: SourceFile, cells: CellKind | None
+) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "s corners"]]:
+    """Return points and the selected simplices, of shape (0, 3) if there are only points.
+
+    Warns
+    -----
+    UserWarning
+        If hexahedra, wedges or pyramids were split.
+    """
+    known = format_of(source.suffix)
+    folder = (source.path.parent,) if "beside" in known.traits else ()
+    points, found = known.load().parse(source.data, *folder)
+    blocks = found if isinstance(found, dict) else {KINDS[found.shape[1]]: found}
+    simplices = select_cells(points, blocks, cells)
+    if simplices.shape[1] == 4 and (sentence := split_sentence(blocks)):
+        warnings.warn(f"{source.path}: {sentence}", stacklevel=4)
+    return points, simplices
+
+
+def require_finite(
+    points: Float[np.ndarray, "n d"],
+    simplices: Int[np.ndarray, "s corners"],
+    *,
+    drop_missing: bool,
+) -> tuple[
+    Float[np.ndarray, "m d"],
+    Int[np.ndarray, "r corners"],
+    Int[np.ndarray, " m"],
+    tuple[str, ...],
+]:
+    """Leave out points that are not finite, and the simplices at them, if that is requested.
+
+    Returns the points and simplices that stay, the indices of these points in the file, and a
+    report of one sentence or none.
+
+    Raise InvalidShapeError if a point is not finite, and such points are not to be left out, or no
+    face is without one.
+    """
+    is_surface = len(simplices) > 0 and simplices.shape[1] == points.shape[1] == 3
+    noun = "vertex" if is_surface else "point"
+    missing = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    stays = ~np.isin(simplices, missing).any(axis=1)
+    nothing_stays = len(simplices) > 0 and not stays.any()
+    if missing.size and (nothing_stays or not drop_missing):
+        first = int(missing[0])
+        remedy = (
+            "Without them no face is left."
+            if nothing_stays
+            else "Scanners write such points if they measured nothing: drop_missing=True, or "
+            "--repair drop_missing, leaves them out, and the faces at them."
+        )
+        raise InvalidShapeError(
+            f"{PLURALS.get(noun, 'points')} must be finite; {noun} {first} is {points[first].tolist()} "
+            f"({missing.size} such). {remedy}"
+        )
+    kept = np.delete(np.arange(len(points)), missing)
+    if not missing.size:
+        return points, simplices, kept, ()
+    # An index is lower by the number of missing points before it.
+    renumbered = simplices[stays] - np.searchsorted(missing, simplices[stays])
+    sentence = f"drop_missing left out {count_nouns(missing.size, noun)} without finite coordinates"
+    if len(simplices):
+        cell = "face" if is_surface else "cell"
+        sentence += f" and {count_nouns(int((~stays).sum()), cell)} at them"
+    return points[kept], renumbered, kept, (sentence,)
 
 
 def _read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
-    if source.suffix in GLTF:
-        return glb_attributes.read_attributes(source, mesh)
-    if source.suffix == ".obj":
-        return obj_attributes.read_attributes(source, mesh)
-    if source.suffix == ".ply":
-        return ply_attributes.read_attributes(source, mesh)
-    if source.suffix in FIELD_FORMATS:
-        return read_field_attributes(source.data, source.suffix, mesh)
+    known = format_of(source.suffix)
+    if "attributes" in known.traits:
+        attributes: MeshAttributes = known.load("_attributes").read_attributes(source, mesh)
+        return attributes
+    if "fields" in known.traits:
+        return read_field_attributes(source, mesh)
     return plain_attributes(mesh)
 
 
@@ -222,10 +276,10 @@ def write_mesh(
     mesh : MeshLike
         With n vertices and f faces.
     path : str or Path
-        Must end in .off, .obj, .ply, .stl, .glb, .vtu, .vtk or .npz.
+        Its suffix, such as .ply, names the format. Another one raises an error that lists all.
     binary : bool, optional
-        Whether to write binary data. By default True for PLY and STL. OFF and OBJ are always text,
-        GLB, VTU, VTK and NPZ always binary.
+        Whether to write binary data, where the format has both forms, such as PLY and STL. By
+        default True.
     colors : (n, 3) uint8, optional
         Red, green and blue of each vertex; for PLY, OBJ and GLB.
     face_labels : (f,) int, optional
@@ -289,14 +343,15 @@ def save_mesh(
 ) -> str:
     """Write a mesh as `write_mesh` does, and return a sentence that names what is lost, or none."""
     suffix = suffix_of(path, None, WRITTEN)
+    known = format_of(suffix)
     held = attributes or plain_attributes(mesh)
     if not np.array_equal(held.mesh.faces, mesh.faces):
         raise InvalidParameterError(
             f"attributes must belong to the {mesh.n_faces} faces of the mesh; they belong to {held.mesh.n_faces} "
             "other ones. Carry them by es.io.carry_attributes(attributes, repaired_mesh)."
         )
-    is_binary = suffix in BINARY_FORMATS if binary is None else binary
-    kinds = BINARY_FORMATS if is_binary else TEXT_FORMATS
+    is_binary = "binary" in known.traits if binary is None else binary
+    kinds = suffixes_with("binary" if is_binary else "text")
     if suffix not in kinds:
         raise InvalidParameterError(
             f"binary={binary} is for {', '.join(kinds)}; the suffix is {suffix}."
@@ -306,73 +361,48 @@ def save_mesh(
     if face_labels is not None:
         _require_labels(face_labels, mesh, suffix)
     lost: list[str] = []
-    if face_labels is not None and suffix != ".ply":
+    if face_labels is not None and "labels" not in known.traits:
         if held.contents["materials"]:
             lost.append("materials and images, since each part has a material of its own")
         gray = np.full((mesh.n_vertices, 3), 200, np.uint8)
         held = label_attributes(held, face_labels, gray if colors is None else colors)
-        held = replace(held, source=None)
     elif colors is not None:
         opaque = np.column_stack([colors, np.full(len(colors), 255, np.uint8)])
         held = replace(held, colors=opaque[mesh.faces], source=None)
+    job = WriteJob(mesh, path, suffix, is_binary, held, face_labels, lost)
     try:
-        files = _encode(mesh, path, is_binary, face_labels, held, lost)
+        if "attributes" in known.traits:
+            files = known.load("_attributes").write(job)
+        elif "fields" in known.traits:
+            job.lose([kind for kind in held.contents if kind != "fields"])
+            files = {path: format_fields(mesh, suffix, held.fields)}
+        else:
+            job.lose(held.contents)
+            module = known.load()
+            files = {path: (module.format_binary if is_binary else module.format_text)(mesh)}
     except FileFormatError as err:
         raise FileFormatError(f"{path} cannot hold the mesh. {err}") from err
     for place, data in files.items():
         replace_file(place, data)
-    return loss_sentence(lost, path)
-
-
-def _encode(
-    mesh: TriangleMesh,
-    path: Path,
-    binary: bool,
-    face_labels: Int[np.ndarray, " f"] | None,
-    held: MeshAttributes,
-    lost: list[str],
-) -> dict[Path, bytes]:
-    """Return the files to write, and add to `lost` what they do not keep."""
-    suffix, source = path.suffix.lower(), held.source
-    if source and suffix == ".glb" and source.suffix in GLTF:
-        data, more = glb_attributes.rewrite(source, held, mesh)
-        lost += more
-        return {path: data}
-    if source and suffix == source.suffix == ".obj" and held.from_file.mean() > 0.5:
-        files, more = obj_attributes.rewrite(source, held, mesh, path)
-        lost += more
-        return files
-    lost += held.others
-    if suffix in (".obj", ".glb") and held.fields:
-        lost.append("fields")
-    if suffix == ".obj":
-        return obj_attributes.write_new(held, mesh, path)
-    if suffix == ".glb":
-        data = glb_attributes.write_new(held, mesh)
-    elif suffix == ".ply":
-        write = ply.format_binary if binary else ply.format_text
-        data = write(mesh, *ply_attributes.columns(held, mesh, face_labels, lost))
-    elif suffix in FIELD_FORMATS:
-        lost += [name for name, there in held.contents.items() if there and name != "fields"]
-        data = format_fields(mesh, suffix, held.fields)
-    else:
-        lost += [name for name, there in held.contents.items() if there]
-        data = (BINARY if binary else TEXT)[suffix](mesh)
-    return {path: data}
+    return f"{path.name} does not keep: {', '.join(dict.fromkeys(lost))}." if lost else ""
 
 
 def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
-    if suffix not in LABELED or colors.dtype != np.uint8 or colors.shape != (mesh.n_vertices, 3):
+    if (
+        suffix not in WITH_COLORS
+        or colors.dtype != np.uint8
+        or colors.shape != (mesh.n_vertices, 3)
+    ):
         raise InvalidParameterError(
-            f"colors must be ({mesh.n_vertices}, 3) uint8 and go to {', '.join(LABELED)}; they are {colors.shape} "
+            f"colors must be ({mesh.n_vertices}, 3) uint8 and go to {', '.join(WITH_COLORS)}; they are {colors.shape} "
             f"{colors.dtype} and go to {suffix}."
         )
 
 
 def _require_labels(labels: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
-    if suffix not in LABELED or labels.shape != (mesh.n_faces,):
+    if suffix not in WITH_COLORS or labels.shape != (mesh.n_faces,):
         raise InvalidParameterError(
-            f"face_labels must be ({mesh.n_faces},) and go to {', '.join(LABELED)}; they are {labels.shape} and "
+            f"face_labels must be ({mesh.n_faces},) and go to {', '.join(WITH_COLORS)}; they are {labels.shape} and "
             f"go to {suffix}."
         )
     beyond = np.flatnonzero(labels != labels.astype(np.int32))

@@ -2,23 +2,17 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidShapeError
-from eigenshape._files import as_path, read_regular, replace_file
+from eigenshape._files import as_path, replace_file
 from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.io import pcd, ply, points
-from eigenshape.io.cell_kinds import CellKind
-from eigenshape.io.cells import require_kind
-from eigenshape.io.parsing import MESH_FORMATS, naming, parse_mesh, require_finite, suffix_of
-
-POINTS = {".pts": points.parse, ".xyz": points.parse, ".pcd": pcd.parse}
-WRITERS = {".xyz": points.format_text, ".pts": points.format_counted, ".ply": ply.format_points}
-SHAPE_FORMATS = (*MESH_FORMATS, *POINTS)
+from eigenshape.io.formats.cells import require_kind
+from eigenshape.io.formats.registry import SHAPE_FORMATS, WRITTEN_CLOUDS, CellKind, format_of
+from eigenshape.io.mesh_files import parse_file, require_finite
+from eigenshape.io.sources import naming, open_file
 
 
 def read_shape(
@@ -45,7 +39,7 @@ def read_shape(
     Parameters
     ----------
     path : str or Path
-        A file in OFF, OBJ, PLY, STL, GLB, glTF, .mesh, .msh, .vtk, .vtu, .pts, .xyz or .pcd.
+        A file of a format in `eigenshape.io.SHAPE_FORMATS`, such as .ply, .msh, .vtu or .xyz.
     file_format : str, optional
         Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
     dim : int
@@ -104,15 +98,10 @@ def load_shape(
     cells: CellKind | None = None,
 ) -> tuple[Shape, tuple[str, ...]]:
     """Read a shape as `read_shape` does, and report what was left out."""
-    path = as_path(path)
-    suffix = suffix_of(path, file_format, SHAPE_FORMATS)
     require_kind(cells)
-    data = read_regular(path)
-    with naming(path):
-        if suffix in POINTS:
-            points, simplices = POINTS[suffix](data), np.empty((0, 3), dtype=np.int64)
-        else:
-            points, simplices = parse_mesh(path, suffix, data, cells)
+    source = open_file(path, file_format, SHAPE_FORMATS)
+    with naming(source.path):
+        points, simplices = parse_file(source, cells)
         n_cells, n_corners = simplices.shape
         points, simplices, _, report = require_finite(points, simplices, drop_missing=drop_missing)
         if not n_cells:
@@ -202,12 +191,12 @@ def write_points(cloud: PointCloud, path: str | Path) -> None:
     require_type(cloud, PointCloud, "cloud")
     path = as_path(path)
     suffix = path.suffix.lower()
-    if suffix not in WRITERS:
+    if suffix not in WRITTEN_CLOUDS:
         raise FileFormatError(
-            f"{path} must end in {', '.join(WRITERS)} to hold points; it ends in {path.suffix!r}."
+            f"{path} must end in {', '.join(WRITTEN_CLOUDS)} to hold points; it ends in {path.suffix!r}."
         )
     if cloud.points.shape[1] != 3:
         raise InvalidShapeError(
             f"Files of points hold three coordinates; these points have {cloud.points.shape[1]}."
         )
-    replace_file(path, WRITERS[suffix](cloud.points))
+    replace_file(path, format_of(suffix).load().format_points(cloud.points, suffix))

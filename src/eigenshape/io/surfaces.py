@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 
-from eigenshape._files import as_path, read_regular
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
@@ -12,10 +11,10 @@ from eigenshape.geometry.repairs.repair import repair, suggest_repairs
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
-from eigenshape.io import pcd
-from eigenshape.io.mesh_files import require_surface
-from eigenshape.io.parsing import naming, parse_mesh, require_finite, suffix_of
-from eigenshape.io.shape_files import POINTS, SHAPE_FORMATS
+from eigenshape.io.formats import pcd
+from eigenshape.io.formats.registry import SHAPE_FORMATS
+from eigenshape.io.mesh_files import parse_file, require_finite, require_surface
+from eigenshape.io.sources import naming, open_file
 from eigenshape.scans.frames import triangulate_frame
 from eigenshape.scans.reconstruction import reconstruct_surface
 
@@ -67,17 +66,12 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
     >>> ball.report
     ('reconstruct_surface made 2,000 vertices and 3,996 faces of 642 points',)
     """
-    path = as_path(path)
-    suffix = suffix_of(path, file_format, SHAPE_FORMATS)
-    data = read_regular(path)
-    with naming(path):
-        if suffix in POINTS:
-            points = POINTS[suffix](data)
-        else:
-            points, simplices = parse_mesh(path, suffix, data, None)
-            if len(simplices):
-                return _surface_of_cells(points, simplices)
-        n_rows = pcd.n_rows(data) if suffix == ".pcd" else 1
+    source = open_file(path, file_format, SHAPE_FORMATS)
+    with naming(source.path):
+        points, simplices = parse_file(source, None)
+        if len(simplices):
+            return _surface_of_cells(points, simplices)
+        n_rows = pcd.n_rows(source.data) if source.suffix == ".pcd" else 1
         if n_rows > 1:
             return triangulate_frame(points.reshape(n_rows, -1, 3))
         return _surface_of_cloud(points)

@@ -18,7 +18,7 @@ UNLIKE, LEAST_COST = 0.5, 0.2
 # search; without regions one to five different assignments are left, and their errors are two to
 # three times as large.
 N_REGIONS, N_ALIKE = 30, 4
-WIDTH = 1000  # partial assignments that are extended at a time
+BEAM_WIDTH = 1000  # partial assignments that are extended at a time
 N_ASSIGNMENTS = 30  # that are bent roughly, which takes half a second
 # Two assignments differ if they take more than this share of the points farther apart than APART.
 DIFFERENT, APART = 0.2, 0.12
@@ -67,7 +67,7 @@ def assign_far_points(
             # No assignment has more than N_ALIKE extensions among the best N_ALIKE of its kind.
             one = np.argsort(-worth, axis=1, kind="stable")[:, :N_ALIKE].ravel()
             old = np.repeat(np.arange(len(worth)), len(one) // len(worth))
-            kept = _best_of_kinds(worth[old, one], kind[old])[:WIDTH]
+            kept = _best_of_kinds(worth[old, one], kind[old])[:BEAM_WIDTH]
             old, one = old[kept], one[kept]
             kinds = kind[old]
         sums = np.hstack([sums[old] + for_old[old, :, one], for_new[old, one][:, None]])

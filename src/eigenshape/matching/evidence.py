@@ -9,14 +9,14 @@ from jaxtyping import Float, Int
 from scipy.special import expit
 
 from eigenshape.geometry.measure import area_vectors, face_areas
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.simplices import at_points
+from eigenshape.geometry.topology import edge_table, neighbor_links
 from eigenshape.matching.fitting import Fit
 from eigenshape.matching.pairs import Pairs, couplings, place_points
 from eigenshape.matching.surface import Surface
 
 SMOOTHING = 10  # means over neighbors: local evidence is that of a disc of about three edges
-FARTHEST = 0.3  # units: longer distances say no more
+FARTHEST_SPREAD = 0.3  # units: longer distances say no more
 MOST_STRETCH = 5.0  # the same, for ratios of lengths
 N_OTHERS = 2  # maps of other starts that are compared
 LEAST_MISFIT = 1e-4  # a pair of equal shapes has less, which says no more
@@ -107,7 +107,9 @@ def vertex_evidence(
     fit, pairs = maps[0].fit, maps[0].pairs
     others = [other.fit for other in maps[1 : N_OTHERS + 1]]
     places, n = fit.places, part.mesh.n_vertices
-    local = _vertex_means(part.mesh, signed_area_ratios(part, whole, places))
+    ratios = signed_area_ratios(part, whole, places)
+    n_faces = np.bincount(part.mesh.faces.ravel(), minlength=n)
+    local = at_points(part.mesh, ratios) / np.maximum(n_faces, 1)
     misfits = place_points(part, whole, pairs, np.arange(n))[1]
     edges = edge_table(part.mesh).edges
     ours = np.linalg.norm(np.subtract(*part.mesh.vertices[edges.T]), axis=1)
@@ -119,9 +121,10 @@ def vertex_evidence(
     spread = np.zeros(n)
     for other in others:
         gap = whole.mesh.vertices[places] - whole.mesh.vertices[other.places]
-        spread += np.minimum(np.linalg.norm(gap, axis=1), FARTHEST) / len(others)
-    mean = _neighbor_means(edges, n)
-    columns = [local, misfits, np.minimum(away, FARTHEST), spread, stretch, fit.gaps]
+        spread += np.minimum(np.linalg.norm(gap, axis=1), FARTHEST_SPREAD) / len(others)
+    links = neighbor_links(part.mesh) + sp.eye_array(n)
+    mean = sp.csr_array(sp.diags_array(1 / links.sum(axis=1)) @ links)
+    columns = [local, misfits, np.minimum(away, FARTHEST_SPREAD), spread, stretch, fit.gaps]
     for _ in range(SMOOTHING):
         columns = [mean @ column for column in columns]
     rim = part.weights.min(axis=1)[part.nearest]
@@ -133,20 +136,6 @@ def vertex_evidence(
     return np.column_stack(rows)
 
 
-def _vertex_means(mesh: TriangleMesh, values: Float[np.ndarray, " f"]) -> Float[np.ndarray, " n"]:
-    """Return the mean of a value over the faces at each vertex."""
-    corners = mesh.faces.ravel()
-    sums = np.bincount(corners, weights=np.repeat(values, 3), minlength=mesh.n_vertices)
-    return sums / np.maximum(np.bincount(corners, minlength=mesh.n_vertices), 1)
-
-
 def confidence(evidence: Float[np.ndarray, "n c"]) -> Float[np.ndarray, " n"]:
     """Return the probability that a vertex is right, from its evidence."""
     return expit(CALIBRATION[0] + evidence @ CALIBRATION[1:])
-
-
-def _neighbor_means(edges: Int[np.ndarray, "e 2"], n: int) -> sp.csr_array:
-    """Return the matrix of means over each vertex and its neighbors."""
-    links = sp.coo_array((np.ones(len(edges)), edges.T), shape=(n, n)).tocsr()
-    links = links + links.T + sp.eye_array(n)
-    return sp.csr_array(sp.diags_array(1 / links.sum(axis=1)) @ links)

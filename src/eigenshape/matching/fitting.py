@@ -34,12 +34,12 @@ N_FIRST, N_NEXT = 12, 2  # turns of the frames in the first step, and in each la
 SLIDING_STIFFNESS = (
     (1.0,) * 6 + (0.5,) * 4 + (0.3,) * 4 + (0.1,) * 4 + (0.05, 0.03, 0.02, 0.02, 0.02)
 )
-SIZES = 0.8, 1.25  # least and most stretch of a frame that costs nothing
-FACING = 0.08  # length, in units, that a difference of normals counts for
+FREE_SIZES = 0.8, 1.25  # least and most stretch of a frame that costs nothing
+NORMAL_LENGTH = 0.08  # length, in units, that a difference of normals counts for
 SOFT = 0.03  # units from the whole at which the pull on a point is halved
 # Share of a step along the surface; the rest is towards its plane
 ALONG, SLIDING_ALONG = 0.5, 0.1
-FARTHEST = 0.2  # units: longer gaps say no more
+LARGEST_GAP = 0.2  # units: longer gaps say no more
 TINY = np.finfo(float).tiny
 
 
@@ -119,7 +119,13 @@ def _plan(
     frames = part.points[:n_frames]
     n, m = part.mesh.n_vertices, len(frames)
     samples = np.unique(np.linspace(0, n - 1, min(n, n_samples)).astype(np.int64))
-    carriers, portions = _carriers(part.distances[:m])
+    # The nearest frames carry a vertex. A frame lets go of a vertex that is as far from it as from
+    # the next frame.
+    nearest = nearest_rows(part.distances[:m], min(N_CARRIERS, m - 1) + 1)
+    lengths = np.take_along_axis(part.distances[:m].T, nearest, axis=1).astype(np.float64)
+    portions = np.maximum(1 - lengths[:, :-1] / np.maximum(lengths[:, -1:], TINY), 1e-4) ** 2
+    portions /= portions.sum(axis=1, keepdims=True)
+    carriers = nearest[:, :-1]
     near = np.argsort(part.between[:m, :m], axis=1, kind="stable")[:, 1 : N_LINKS + 1]
     starts, ends = np.repeat(np.arange(m), near.shape[1]), near.ravel()
     one, two = np.concatenate([starts, ends]), np.concatenate([ends, starts])
@@ -130,7 +136,7 @@ def _plan(
     return FitPlan(
         part,
         whole,
-        cKDTree(np.hstack([whole.mesh.vertices, FACING * whole.normals])),
+        cKDTree(np.hstack([whole.mesh.vertices, NORMAL_LENGTH * whole.normals])),
         frames,
         samples,
         areas / areas.sum(),
@@ -144,18 +150,6 @@ def _plan(
         compared,
         areas_compared / areas_compared.sum(),
     )
-
-
-def _carriers(
-    distances: Float[np.ndarray, "m n"],
-) -> tuple[Int[np.ndarray, "n c"], Float[np.ndarray, "n c"]]:
-    """Return the nearest frames of each vertex, and how far each carries it."""
-    count = min(N_CARRIERS, len(distances) - 1)
-    found = nearest_rows(distances, count + 1)
-    lengths = np.take_along_axis(distances.T, found, axis=1).astype(np.float64)
-    # A frame lets go of a vertex that is as far from it as from the next frame.
-    portions = np.maximum(1 - lengths[:, :-1] / np.maximum(lengths[:, -1:], TINY), 1e-4) ** 2
-    return found[:, :-1], portions / portions.sum(axis=1, keepdims=True)
 
 
 def fit_part(plan: FitPlan, ends: Int[np.ndarray, " m"]) -> Fit:
@@ -176,32 +170,41 @@ def _fit(
     plan: FitPlan, ends: Int[np.ndarray, " m"], stiffnesses: tuple[float, ...], along: float
 ) -> Fit:
     """Bend a part step by step, ever less stiff."""
+    part, whole, pull = plan.part, plan.whole, plan.pull
     # Each sample goes where the frames that carry it go.
     carriers, portions = plan.carriers[plan.samples], plan.portions[plan.samples]
-    targets = np.einsum("sc,scd->sd", portions, plan.whole.mesh.vertices[ends[carriers]])
-    pose = _lay_down(plan, targets)
-    pull = plan.pull
-    for step, stiffness in enumerate(stiffnesses):
-        if step >= N_GIVEN:
-            targets, pull = _nearest_targets(plan, pose, along)
-        pose = _bend(plan, pose, targets, pull, stiffness, N_FIRST if step == 0 else N_NEXT)
-    points, normals = _carry(plan, pose, plan.compared)
-    gaps, found = plan.tree.query(np.hstack([points, FACING * normals]))
-    gaps = np.minimum(gaps, FARTHEST)
-    return Fit(found, gaps, float(plan.shares @ gaps * np.sqrt(_strain(plan, pose))))
+    targets = np.einsum("sc,scd->sd", portions, whole.mesh.vertices[ends[carriers]])
 
-
-def _lay_down(plan: FitPlan, targets: Float[np.ndarray, "s 3"]) -> _Pose:
-    """Return the rigid motion that brings samples nearest to their targets (Kabsch 1976)."""
-    points = plan.part.mesh.vertices[plan.samples]
-    pull = plan.pull
-    middle, target = pull @ points, pull @ targets
-    left, _, right = np.linalg.svd(((targets - target) * pull[:, None]).T @ (points - middle))
+    # Start with the rigid motion that brings samples nearest to their targets (Kabsch 1976).
+    samples, frames = part.mesh.vertices[plan.samples], part.mesh.vertices[plan.frames]
+    middle, target = pull @ samples, pull @ targets
+    left, _, right = np.linalg.svd(((targets - target) * pull[:, None]).T @ (samples - middle))
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     turn = left @ right
-    frames = plan.part.mesh.vertices[plan.frames]
     turns = np.repeat(turn[None], len(frames), axis=0)
-    return _Pose(turns, target + (frames - middle) @ turn.T)
+    pose = _Pose(turns, target + (frames - middle) @ turn.T)
+
+    for step, stiffness in enumerate(stiffnesses):
+        if step >= N_GIVEN:
+            # The nearest points of the whole that face the same way pull, the more the nearer.
+            points, normals = _carry(plan, pose, plan.samples)
+            nearest = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))[1]
+            planes = whole.normals[nearest]
+            steps = whole.mesh.vertices[nearest] - points
+            flat = np.einsum("si,si->s", steps, planes)[:, None] * planes
+            targets = points + flat + along * (steps - flat)
+            facing = np.clip(np.einsum("si,si->s", normals, planes), 0, 1)
+            pull = plan.pull * facing / (1 + (steps**2).sum(axis=1) / SOFT**2)
+        pose = _bend(plan, pose, targets, pull, stiffness, N_FIRST if step == 0 else N_NEXT)
+
+    points, normals = _carry(plan, pose, plan.compared)
+    gaps, found = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))
+    gaps = np.minimum(gaps, LARGEST_GAP)
+    # Strain: how far edges are from what their frames make of them, as a share of squares
+    moved = pose.places[plan.two] - pose.places[plan.one]
+    wrong = np.einsum("eij,ej->ei", pose.turns[plan.one], plan.links) - moved
+    strain = float((wrong**2).sum() / max(float((plan.links**2).sum()), TINY))
+    return Fit(found, gaps, float(plan.shares @ gaps * np.sqrt(strain)))
 
 
 def _bend(
@@ -228,48 +231,20 @@ def _bend(
         add_pulls(turns, carriers, portions, plan.arms, pull, targets, right)
         add_tensions(turns, plan.one, plan.two, plan.links, weight, right)
         places = cho_solve(factor, right, check_finite=False)
-        turn_frames(places, plan.one, plan.two, plan.links, *SIZES, turns)
+        turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
     return _Pose(turns, places)
-
-
-def _offsets(
-    plan: FitPlan, turns: Float[np.ndarray, "m 3 3"], vertices: Int[np.ndarray, " v"]
-) -> Float[np.ndarray, "v 3"]:
-    """Return mean offsets of vertices from the frames that carry them, as the frames turn."""
-    mesh, carriers = plan.part.mesh, plan.carriers[vertices]
-    arms = mesh.vertices[vertices][:, None] - mesh.vertices[plan.frames[carriers]]
-    turned = np.einsum("vcij,vcj->vci", turns[carriers], arms)
-    return np.einsum("vc,vci->vi", plan.portions[vertices], turned)
 
 
 def _carry(
     plan: FitPlan, pose: _Pose, vertices: Int[np.ndarray, " v"]
 ) -> tuple[Float[np.ndarray, "v 3"], Float[np.ndarray, "v 3"]]:
     """Return where the frames carry vertices, and their normals there."""
-    carriers, portions = plan.carriers[vertices], plan.portions[vertices]
+    mesh, carriers, portions = plan.part.mesh, plan.carriers[vertices], plan.portions[vertices]
     centers = np.einsum("vc,vci->vi", portions, pose.places[carriers])
+    arms = mesh.vertices[vertices][:, None] - mesh.vertices[plan.frames[carriers]]
+    turned = np.einsum("vcij,vcj->vci", pose.turns[carriers], arms)
+    points = centers + np.einsum("vc,vci->vi", portions, turned)
     turns = np.einsum("vc,vcij->vij", portions, pose.turns[carriers])
     normals = np.einsum("vij,vj->vi", turns, plan.part.normals[vertices])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
-    return centers + _offsets(plan, pose.turns, vertices), normals
-
-
-def _nearest_targets(
-    plan: FitPlan, pose: _Pose, along: float
-) -> tuple[Float[np.ndarray, "s 3"], Float[np.ndarray, " s"]]:
-    """Return the nearest points of the whole that face the same way, and how strong they pull."""
-    points, normals = _carry(plan, pose, plan.samples)
-    nearest = plan.tree.query(np.hstack([points, FACING * normals]))[1]
-    planes = plan.whole.normals[nearest]
-    steps = plan.whole.mesh.vertices[nearest] - points
-    flat = np.einsum("si,si->s", steps, planes)[:, None] * planes
-    away = (steps**2).sum(axis=1)
-    facing = np.clip(np.einsum("si,si->s", normals, planes), 0, 1)
-    return points + flat + along * (steps - flat), plan.pull * facing / (1 + away / SOFT**2)
-
-
-def _strain(plan: FitPlan, pose: _Pose) -> float:
-    """Return how far edges are from what their frames make of them, as a share of squares."""
-    moved = pose.places[plan.two] - pose.places[plan.one]
-    wrong = np.einsum("eij,ej->ei", pose.turns[plan.one], plan.links) - moved
-    return float((wrong**2).sum() / max(float((plan.links**2).sum()), TINY))
+    return points, normals

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr, short_repr
@@ -152,11 +152,11 @@ def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -
     tell(n_steps, "")
     return FusedScan(
         made.mesh,
-        freeze(joined),
+        joined,
         motions,
-        freeze(scores),
-        freeze(owners[made.source_vertices]),
-        freeze(numbers[made.source_vertices]),
+        scores,
+        owners[made.source_vertices],
+        numbers[made.source_vertices],
     )
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
@@ -24,10 +23,15 @@ from eigenshape.matching.evidence import (
     vertex_evidence,
 )
 from eigenshape.matching.fitting import plan_fit
-from eigenshape.matching.growth import find_maps, first_support
+from eigenshape.matching.growth import equally_good_maps, find_maps, first_support
 from eigenshape.matching.pairs import Pairs, patch_differences
-from eigenshape.matching.pieces import Piece, report_left_out, split_pieces
-from eigenshape.matching.rivals import count_places, equally_good_maps
+from eigenshape.matching.pieces import (
+    Piece,
+    WorkingCopy,
+    carry_map,
+    report_left_out,
+    split_pieces,
+)
 from eigenshape.matching.scale import MOST_AREA, N_PART, choose_factor, require_scale
 from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.matching.spectral_refinement import modes_of_part, refine_places
@@ -39,7 +43,6 @@ from eigenshape.matching.target import (
     as_target,
     require_matchable,
 )
-from eigenshape.matching.working_copy import WorkingCopy, carry_map
 
 # Support of the part turned inside out, as a share of that of the part, from which nothing tells
 # the outside from the inside, and so left from right.
@@ -217,12 +220,12 @@ def _match_pieces(
         return float(np.average([getattr(one.quality, what) for one in found], weights=areas))
 
     return ShapeMatch(
-        vertices=freeze(corners[np.arange(n), weights.argmax(axis=1)]),
-        faces=freeze(faces),
-        corners=freeze(corners),
-        weights=freeze(weights),
-        confidence=freeze(sure),
-        evidence=freeze(evidence),
+        vertices=corners[np.arange(n), weights.argmax(axis=1)],
+        faces=faces,
+        corners=corners,
+        weights=weights,
+        confidence=sure,
+        evidence=evidence,
         score=mean("score"),
         orientation=mean("orientation"),
         coverage=mean("coverage"),
@@ -250,29 +253,22 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
         quality = rate_map(part, whole, differences, best.pairs, best.fit.places)
         evidence = vertex_evidence(part, whole, differences, maps, quality)
         faces, weights = refine_places(modes, target.modes, whole.mesh, best.fit.places)
-        rivals = equally_good_maps(plan, differences, maps)
+        n_equally_good, n_places = equally_good_maps(plan, differences, maps)
         # Each of several equally good places is as likely as the others.
-        sure = confidence(evidence) / count_places(plan, best, rivals)
-        n_equally_good = 1 + len(rivals)
+        sure = confidence(evidence) / n_places
     else:
         # Too few points agree for a map: take the most similar patch of each, and trust none.
         partners = differences.argmin(axis=1)
         places = whole.points[partners][part.nearest]
         pairs = Pairs(np.arange(len(partners)), partners, np.ones(len(partners)))
         quality = rate_map(part, whole, differences, pairs, places)
-        faces, weights = _at_vertices(whole.mesh, places)
+        # Of the faces at each vertex the first one, with all weight on the vertex
+        first = np.zeros(whole.mesh.n_vertices, dtype=np.int64)
+        first[whole.mesh.faces[::-1].ravel()] = np.repeat(np.arange(whole.mesh.n_faces)[::-1], 3)
+        faces = first[places]
+        weights = (whole.mesh.faces[faces] == places[:, None]).astype(np.float64)
         sure, evidence = np.zeros(len(places)), np.zeros((len(places), N_COLUMNS))
         n_equally_good = 1
     values = np.column_stack([sure, evidence])
     faces, weights, values = carry_map(copy, target.piece.copy, faces, weights, values)
     return _Piece(faces, weights, values[:, 0], values[:, 1:], quality, handed, n_equally_good)
-
-
-def _at_vertices(
-    mesh: TriangleMesh, places: Int[np.ndarray, " n"]
-) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
-    """Return a face at each vertex, and the weights of the vertex in it."""
-    first = np.zeros(mesh.n_vertices, dtype=np.int64)
-    first[mesh.faces[::-1].ravel()] = np.repeat(np.arange(mesh.n_faces)[::-1], 3)
-    faces = first[places]
-    return faces, (mesh.faces[faces] == places[:, None]).astype(np.float64)

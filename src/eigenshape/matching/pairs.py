@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Bool, Complex64, Float, Int
-from scipy.sparse.csgraph import connected_components
 
+from eigenshape.geometry.facet_lists import label_components
 from eigenshape.matching.match_loops import couple_pairs, nearest_rows, place_by_distances
 from eigenshape.matching.surface import Surface, View
 
@@ -16,7 +15,7 @@ N_CANDIDATES = 5  # partners that are tried for each point; ten found nothing mo
 # many times. Near a rim both discs are cut alike, and weigh more than the product of their weights.
 FOREIGN, RIM_SHARE = 1.2, 0.5
 # Share of a distance by which two pairs may disagree and still support each other
-SLACK = 0.4
+DISTANCE_SLACK = 0.4
 # The same, for starts. What a wide one finds a narrow one misses and the other way round: of 15 hard
 # pairs of the tuning half each has maps that are nearest to the truth, and the best fit is taken.
 START_SLACKS = 0.4, 0.3, 0.2
@@ -106,7 +105,7 @@ def couplings(
     whole: Surface,
     points: Int[np.ndarray, " c"],
     partners: Int[np.ndarray, " c"],
-    slack: float = SLACK,
+    slack: float = DISTANCE_SLACK,
 ) -> Complex64[np.ndarray, "c c"]:
     """Return how candidate pairs support each other; see `couple_pairs`."""
     found = np.empty((len(points),) * 2, dtype=np.complex64)
@@ -115,20 +114,23 @@ def couplings(
     return found
 
 
-def supports(
-    coupling: Complex64[np.ndarray, "c c"], points: Int[np.ndarray, " c"], rounds: int
-) -> Float[np.ndarray, " c"]:
-    """Return the support of each candidate, in the sum of squares 1.
+def select_pairs(
+    coupling: Complex64[np.ndarray, "c c"],
+    points: Int[np.ndarray, " c"],
+    partners: Int[np.ndarray, " c"],
+    rounds: int,
+) -> tuple[Pairs, Int[np.ndarray, " p"]]:
+    """Return the best candidate of each point if it is well supported, and their numbers.
 
-    x_i ← |Σ_j c_ij x_j|: those that agree with a pair in distance must also agree in the turn that
-    takes directions on the part to directions on the whole. So pairs of a mirror image, whose turns
-    all differ, get little. The candidates of one point compete: each is multiplied by its share of
-    the best.
+    The support of a candidate is x_i ← |Σ_j c_ij x_j|: those that agree with a pair in distance must
+    also agree in the turn that takes directions on the part to directions on the whole. So pairs of a
+    mirror image, whose turns all differ, get little.
     """
     support = np.full(len(points), 1.0)
     best = np.empty(points.max() + 1)
     for _ in range(rounds):
         found = np.abs(coupling @ support.astype(np.complex64)).astype(np.float64)
+        # The candidates of one point compete: each is multiplied by its share of the best.
         best[:] = np.finfo(float).tiny
         np.maximum.at(best, points, found)
         found *= found / best[points]
@@ -136,20 +138,11 @@ def supports(
         if length == 0:
             break
         support = found / length
-    return support
-
-
-def select_pairs(
-    coupling: Complex64[np.ndarray, "c c"],
-    points: Int[np.ndarray, " c"],
-    partners: Int[np.ndarray, " c"],
-    support: Float[np.ndarray, " c"],
-) -> tuple[Pairs, Int[np.ndarray, " p"]]:
-    """Return the best candidate of each point if it is well supported, and their numbers."""
     order = np.argsort(-support, kind="stable")
     order = order[support[order] > LEAST_SUPPORT * support[order[0]]]
     first = np.unique(points[order], return_index=True)[1]
     chosen = order[np.sort(first)]
+    # What only unselected candidates supported goes.
     ours = coupling[np.ix_(chosen, chosen)]
     agreement = np.abs(ours @ support[chosen].astype(np.complex64))
     chosen = chosen[agreement > LEAST_AGREEMENT * np.median(agreement)]
@@ -173,15 +166,17 @@ def grow_pairs(
         away = part.between[pairs.points].min(axis=0)
         reach = (REACH + WANDER * away)[:, None]
         moves = whole.columns[places]
-        wanted = costs + (moves / reach) ** 2 + OCCUPIED * _occupied(part, whole, pairs)
+        # Places that pairs of far points have taken cost more.
+        far = (part.between[:, pairs.points] > BLOCKED * CROWDED).astype(np.float32)
+        taken = (whole.between[:, pairs.partners] < CROWDED).astype(np.float32)
+        wanted = costs + (moves / reach) ** 2 + OCCUPIED * (far @ taken.T > 0)
         partners = nearest_rows(np.ascontiguousarray(wanted.T), N_NEARBY)
         nearby = np.take_along_axis(moves, partners, axis=1)
         allowed = nearby <= np.maximum(2 * reach, nearby.min(axis=1, keepdims=True))
         points = np.repeat(np.arange(n_points), allowed.sum(axis=1))
         partners = partners[allowed]
         coupling = couplings(part, whole, points, partners)
-        support = supports(coupling, points, NEXT_ROUNDS)
-        pairs, _ = select_pairs(coupling, points, partners, support)
+        pairs, _ = select_pairs(coupling, points, partners, NEXT_ROUNDS)
     return _without_conflicts(part, whole, pairs)
 
 
@@ -213,13 +208,6 @@ def _without_conflicts(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
     return pairs.select(kept)
 
 
-def _occupied(part: Surface, whole: Surface, pairs: Pairs) -> Bool[np.ndarray, "m k"]:
-    """Return, for each point of the part, which points of the whole pairs of far points take."""
-    far = (part.between[:, pairs.points] > BLOCKED * CROWDED).astype(np.float32)
-    taken = (whole.between[:, pairs.partners] < CROWDED).astype(np.float32)
-    return far @ taken.T > 0
-
-
 def _continuous(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
     """Return the largest set of pairs that is connected by neighbors that keep their distances."""
     n = len(pairs.points)
@@ -234,7 +222,6 @@ def _continuous(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
     agree &= np.isfinite(longest)
     good = 2 * np.bincount(one, weights=agree, minlength=n) >= near.shape[1]
     links = agree & good[one] & good[two]
-    graph = sp.coo_array((np.ones(links.sum()), (one[links], two[links])), shape=(n, n))
-    labels = connected_components(graph, directed=False)[1]
+    _, labels = label_components(n, one[links], two[links])
     sizes = np.bincount(labels[good], minlength=n)
     return pairs.select(good & (labels == sizes.argmax()))

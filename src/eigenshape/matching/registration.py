@@ -1,15 +1,15 @@
 """Place one scan of a rigid shape beside another: by patches first, then point to plane."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_rows, freeze
+from eigenshape._arrays import ReadOnly, finite_rows
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -34,16 +34,16 @@ N_RATED, N_REFINED = 60, 12  # motions that are rated, and those of them that ar
 # the angles between normals, and between normals and the line, differ by at most ANGLE_SLACK.
 LENGTH_SLACK, LEAST_LENGTH = 0.03, 0.08
 ANGLE_SLACK = 0.35  # radians
-FACING = 0.6  # least cosine of two normals of one place
+FACING_COSINE = 0.6  # least cosine of two normals of one place
 PAIR_REACH = 0.05  # distance of the two ends of a pair that a motion explains
 # Distance at which points lie on each other: for a rough motion, and for a refined one. The noise
 # of a depth camera is about 0.003.
-ROUGH, EXACT = 0.02, 0.008
+ROUGH, PRECISE = 0.02, 0.008
 # A point this far in front of what the other camera saw, in the middle of its picture, contradicts
 # the motion: that camera would have seen it.
 IN_FRONT = 0.04
 SAME_PIXEL = 1.5  # edges in the picture between such a point and what was seen
-ROUNDS, FIRST_REACH, LAST_REACH, SHRINK = 25, 0.08, 0.012, 0.85  # of point to plane
+N_STEPS, FIRST_REACH, LAST_REACH, SHRINK = 25, 0.08, 0.012, 0.85  # of point to plane
 FEWEST_POINTS = 20  # that determine a motion
 # Motions closer than this count as one before they are refined.
 SAME_TURN, SAME_PLACE = 0.2, 0.1  # radians, and sides of the box
@@ -91,19 +91,16 @@ class Registration(ReadOnly):
     def inverse(self) -> "Registration":
         """Return the motion that places the second scan on the first."""
         back = self.rotation.T
-        return Registration(freeze(back.copy()), freeze(-back @ self.translation), self.score)
+        return Registration(back.copy(), -back @ self.translation, self.score)
 
     def after(self, first: "Registration") -> "Registration":
         """Return the motion that does another one first; its score is the lower of the two."""
         require_type(first, Registration, "first")
-        return Registration(
-            freeze(self.rotation @ first.rotation),
-            freeze(self.rotation @ first.translation + self.translation),
-            min(self.score, first.score),
-        )
+        place = self.rotation @ first.translation + self.translation
+        return Registration(self.rotation @ first.rotation, place, min(self.score, first.score))
 
 
-NO_MOTION = Registration(freeze(np.eye(3)), freeze(np.zeros(3)), -1.0)
+NO_MOTION = Registration(np.eye(3), np.zeros(3), -1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,65 +198,39 @@ def register_scans(first: MeshLike, second: MeshLike) -> Registration:
     >>> bool(np.abs(found.move(turned.vertices) - scan.vertices).max() < 0.01)
     True
     """
-    scans = [
-        describe_scan(as_mesh(mesh, name)) for mesh, name in ((first, "first"), (second, "second"))
-    ]
-    return register_described(*scans)
+    one, two = as_mesh(first, "first"), as_mesh(second, "second")
+    return register_described(describe_scan(one), describe_scan(two))
 
 
 def register_described(first: Scan, second: Scan) -> Registration:
     """Return the motion of the first scan on the second; a score of -1 if no pairs agree."""
     unit = max(first.size, second.size)
-    rated = [
-        (_rate(first, second, motion, unit, ROUGH), number, motion)
-        for number, motion in enumerate(_motions(first, second, unit))
-    ]
-    rated.sort(key=lambda each: (-each[0], each[1]))
+    motions = _find_motions(first, second, unit)
+    motions.sort(key=lambda motion: -_rate(first, second, motion, unit, ROUGH))
+    # Refinement takes most of the time, so motions that lead to one place are refined once.
     different: list[Registration] = []
-    for _, _, motion in rated:
-        if len(different) < N_REFINED and not any(_same(motion, one, unit) for one in different):
+    for motion in motions:
+        is_new = True
+        for one in different:
+            turn = Rotation.from_matrix(motion.rotation @ one.rotation.T).magnitude()
+            gap = np.linalg.norm(motion.translation - one.translation)
+            is_new &= bool(turn >= SAME_TURN or gap >= SAME_PLACE * unit)
+        if is_new:
             different.append(motion)
+        if len(different) == N_REFINED:
+            break
     best = NO_MOTION
     for motion in different:
         refined = _refine(first, second, motion, unit)
-        score = _rate(first, second, refined, unit, EXACT)
+        score = _rate(first, second, refined, unit, PRECISE)
         if score > best.score:
-            best = Registration(refined.rotation, refined.translation, score)
+            best = replace(refined, score=score)
+    # Both scans lie with their middles at the origin: the motion goes from middle to middle.
     away = best.translation + second.middle - best.rotation @ first.middle
-    return Registration(best.rotation, freeze(away), best.score)
+    return replace(best, translation=away)
 
 
-def _motions(first: Scan, second: Scan, unit: float) -> list[Registration]:
-    """Return motions that groups of agreeing pairs of patches give, the best supported first."""
-    pairs = _similar_patches(first, second)
-    ours, theirs = first.points.vertices[pairs[:, 0]], second.points.vertices[pairs[:, 1]]
-    starts, ends = first.mesh.vertices[ours], second.mesh.vertices[theirs]
-    start_normals, end_normals = first.normals[ours], second.normals[theirs]
-    agrees = _agreement(starts, start_normals, ends, end_normals, unit)
-    counts = agrees.sum(axis=1)
-    found = []
-    for seed in np.argsort(-counts, kind="stable")[:N_SEEDS].tolist():
-        partners = np.flatnonzero(agrees[seed])
-        if len(partners) < 3:
-            break
-        # Of the pairs that agree with the seed, those that agree with most others of them
-        support = agrees[np.ix_(partners, partners)].sum(axis=1)
-        partners = partners[np.argsort(-support, kind="stable")[:N_PARTNERS]]
-        members = np.append(seed, partners)
-        for _ in range(4):
-            motion = _rigid_motion(starts[members], ends[members])
-            near = np.linalg.norm(motion.move(starts) - ends, axis=1) < PAIR_REACH * unit
-            turned = start_normals @ motion.rotation.T
-            near &= np.einsum("pi,pi->p", turned, end_normals) > FACING
-            if near.sum() < 4:
-                break
-            members = np.flatnonzero(near)
-        found.append((len(members), motion))
-    found.sort(key=lambda each: -each[0])
-    return [motion for _, motion in found[:N_RATED]]
-
-
-def _similar_patches(first: Scan, second: Scan) -> Int[np.ndarray, "p 2"]:
+def _pair_patches(first: Scan, second: Scan) -> Int[np.ndarray, "p 2"]:
     """Pair each patch of either scan with those that are most like it, the most similar first."""
     # Radii of patches are shares of the box, and lengths are the same on both scans.
     step = np.log(first.size / second.size) / np.log(RADII[1] / RADII[0])
@@ -274,72 +245,78 @@ def _similar_patches(first: Scan, second: Scan) -> Int[np.ndarray, "p 2"]:
     return pairs[order[:MOST_CANDIDATES]]
 
 
-def _agreement(
-    starts: Float[np.ndarray, "p 3"],
-    start_normals: Float[np.ndarray, "p 3"],
-    ends: Float[np.ndarray, "p 3"],
-    end_normals: Float[np.ndarray, "p 3"],
-    unit: float,
-) -> Bool[np.ndarray, "p p"]:
-    """Return which pairs may belong to one motion: point pair features (Drost et al. 2010)."""
-    ours, our_sizes, our_angles = _features(starts, start_normals)
-    theirs, their_sizes, their_angles = _features(ends, end_normals)
-    agrees = np.abs(our_sizes - their_sizes) < LENGTH_SLACK * unit
-    agrees &= np.minimum(our_sizes, their_sizes) > LEAST_LENGTH * unit
-    to_line = np.abs(our_angles - their_angles) < ANGLE_SLACK
+def _find_motions(first: Scan, second: Scan, unit: float) -> list[Registration]:
+    """Return motions that groups of agreeing pairs of patches give, the best supported first."""
+    pairs = _pair_patches(first, second)
+    ours, theirs = first.points.vertices[pairs[:, 0]], second.points.vertices[pairs[:, 1]]
+    starts, ends = first.mesh.vertices[ours], second.mesh.vertices[theirs]
+    start_normals, end_normals = first.normals[ours], second.normals[theirs]
+
+    # Point pair features (Drost et al. 2010) tell which pairs may belong to one motion: distances,
+    # angles between normals, and angles of each normal with each line.
+    features = []
+    for points, normals in ((starts, start_normals), (ends, end_normals)):
+        lines = points[:, None] - points[None]
+        sizes = np.linalg.norm(lines, axis=2)
+        along = np.einsum("pi,pqi->pq", normals, lines) / np.where(sizes > 0, sizes, 1)
+        between = np.arccos(np.clip(normals @ normals.T, -1, 1))
+        features.append((sizes, between, np.arccos(np.clip(along, -1, 1))))
+    (sizes, between, tilts), (their_sizes, their_between, their_tilts) = features
+    agrees = np.abs(sizes - their_sizes) < LENGTH_SLACK * unit
+    agrees &= np.minimum(sizes, their_sizes) > LEAST_LENGTH * unit
+    agrees &= np.abs(between - their_between) < ANGLE_SLACK
+    to_line = np.abs(tilts - their_tilts) < ANGLE_SLACK
     agrees &= to_line & to_line.T
-    return agrees & (np.abs(ours - theirs) < ANGLE_SLACK)
+
+    found = []
+    counts = agrees.sum(axis=1)
+    for seed in np.argsort(-counts, kind="stable")[:N_SEEDS].tolist():
+        partners = np.flatnonzero(agrees[seed])
+        if len(partners) < 3:
+            break
+        # Of the pairs that agree with the seed, those that agree with most others of them
+        support = agrees[np.ix_(partners, partners)].sum(axis=1)
+        partners = partners[np.argsort(-support, kind="stable")[:N_PARTNERS]]
+        members = np.append(seed, partners)
+        # The motion of the group explains further pairs, which determine it better.
+        for _ in range(4):
+            motion = _fit_motion(starts[members], ends[members])
+            near = np.linalg.norm(motion.move(starts) - ends, axis=1) < PAIR_REACH * unit
+            turned = start_normals @ motion.rotation.T
+            near &= np.einsum("pi,pi->p", turned, end_normals) > FACING_COSINE
+            if near.sum() < 4:
+                break
+            members = np.flatnonzero(near)
+        found.append((len(members), motion))
+    found.sort(key=lambda each: -each[0])
+    return [motion for _, motion in found[:N_RATED]]
 
 
-def _features(
-    points: Float[np.ndarray, "p 3"], normals: Float[np.ndarray, "p 3"]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return angles between normals, distances, and angles of each normal with each line."""
-    lines = points[:, None] - points[None]
-    sizes = np.linalg.norm(lines, axis=2)
-    along = np.einsum("pi,pqi->pq", normals, lines) / np.where(sizes > 0, sizes, 1)
-    between = np.arccos(np.clip(normals @ normals.T, -1, 1))
-    return between, sizes, np.arccos(np.clip(along, -1, 1))
-
-
-def _rigid_motion(starts: Float[np.ndarray, "p 3"], ends: Float[np.ndarray, "p 3"]) -> Registration:
+def _fit_motion(starts: Float[np.ndarray, "p 3"], ends: Float[np.ndarray, "p 3"]) -> Registration:
     """Return the motion with the least squares of distances (Kabsch 1976)."""
     middle, target = starts.mean(axis=0), ends.mean(axis=0)
     left, _, right = np.linalg.svd((starts - middle).T @ (ends - target))
     side = np.sign(np.linalg.det(left @ right))
     rotation = (left @ np.diag([1.0, 1.0, side]) @ right).T
-    return Registration(freeze(rotation), freeze(target - rotation @ middle), 0.0)
+    return Registration(rotation.copy(), target - rotation @ middle, 0.0)
 
 
 def _rate(first: Scan, second: Scan, motion: Registration, unit: float, reach: float) -> float:
     """Return the mean share that lies on the other scan, less what contradicts the motion."""
-    shares = [
-        _share(one, other, way, unit, reach)
-        for one, other, way in ((first, second, motion), (second, first, motion.inverse()))
-    ]
-    return float(np.mean([on for on, _ in shares]) - sum(wrong for _, wrong in shares))
-
-
-def _share(
-    one: Scan, other: Scan, motion: Registration, unit: float, reach: float
-) -> tuple[float, float]:
-    """Return the share of a scan that lies on the other, and the share in front of it."""
-    points = motion.move(one.mesh.vertices[one.samples])
-    normals = one.normals[one.samples] @ motion.rotation.T
-    distances, nearest = other.tree.query(points)
-    facing = np.einsum("si,si->s", normals, other.normals[nearest]) > FACING
-    axes, tree, spacing = other.picture
-    aside, behind = tree.query(points @ axes)
-    depth = points @ other.towards_camera
-    seen = other.mesh.vertices[behind] @ other.towards_camera
-    in_front = (aside < SAME_PIXEL * spacing) & (depth > seen + IN_FRONT * unit)
-    return float(((distances < reach * unit) & facing).mean()), float(in_front.mean())
-
-
-def _same(one: Registration, other: Registration, unit: float) -> bool:
-    turn = Rotation.from_matrix(one.rotation @ other.rotation.T).magnitude()
-    place = np.linalg.norm(one.translation - other.translation)
-    return bool(turn < SAME_TURN and place < SAME_PLACE * unit)
+    lying, contradicting = [], []
+    for one, other, way in ((first, second, motion), (second, first, motion.inverse())):
+        points = way.move(one.mesh.vertices[one.samples])
+        normals = one.normals[one.samples] @ way.rotation.T
+        distances, nearest = other.tree.query(points)
+        facing = np.einsum("si,si->s", normals, other.normals[nearest]) > FACING_COSINE
+        lying.append(((distances < reach * unit) & facing).mean())
+        # What the other camera saw behind a point, it could not have seen through it.
+        axes, tree, spacing = other.picture
+        aside, behind = tree.query(points @ axes)
+        seen = other.mesh.vertices[behind] @ other.towards_camera
+        in_front = points @ other.towards_camera > seen + IN_FRONT * unit
+        contradicting.append((in_front & (aside < SAME_PIXEL * spacing)).mean())
+    return float(np.mean(lying) - sum(contradicting))
 
 
 def _refine(first: Scan, second: Scan, motion: Registration, unit: float) -> Registration:
@@ -347,23 +324,22 @@ def _refine(first: Scan, second: Scan, motion: Registration, unit: float) -> Reg
     points, normals = first.mesh.vertices[first.samples], first.normals[first.samples]
     # What the planes leave free, such as a ball turning in its socket, stays as it is.
     weights = 1e-3 * np.concatenate([np.full(3, unit**2), np.ones(3)])
-    for number in range(ROUNDS):
+    for number in range(N_STEPS):
+        # Far points come first, to find the way; later ones are partners that are known.
         reach = max(FIRST_REACH * SHRINK**number, LAST_REACH) * unit
         moved, turned = motion.move(points), normals @ motion.rotation.T
         distances, nearest = second.tree.query(moved)
         planes = second.normals[nearest]
-        near = (distances < reach) & (np.einsum("si,si->s", turned, planes) > FACING)
+        near = (distances < reach) & (np.einsum("si,si->s", turned, planes) > FACING_COSINE)
         if near.sum() < FEWEST_POINTS:
             return motion
+        # One step of Gauss and Newton: a small turn and a shift that close the gaps to the planes
         places, planes = moved[near], planes[near]
         gaps = np.einsum("si,si->s", second.mesh.vertices[nearest[near]] - places, planes)
         rows = np.hstack([np.cross(places, planes), planes])
         system = rows.T @ rows + np.diag(weights * len(rows))
         change = np.linalg.solve(system, rows.T @ gaps)
         turn = Rotation.from_rotvec(change[:3]).as_matrix()
-        motion = Registration(
-            freeze(turn @ motion.rotation),
-            freeze(turn @ motion.translation + change[3:]),
-            motion.score,
-        )
+        place = turn @ motion.translation + change[3:]
+        motion = Registration(turn @ motion.rotation, place, motion.score)
     return motion

@@ -11,9 +11,9 @@ from eigenshape.geometry.topology import boundary_loops
 from eigenshape.matching.evidence import rate_map
 from eigenshape.matching.fitting import plan_fit
 from eigenshape.matching.growth import fitted_maps
-from eigenshape.matching.pairs import Pairs, patch_differences
+from eigenshape.matching.pairs import patch_differences
 from eigenshape.matching.pieces import Piece
-from eigenshape.matching.surface import Surface, describe_surface
+from eigenshape.matching.surface import describe_surface
 from eigenshape.matching.target import LEAST_AREA, MatchTarget
 
 N_PART = 300  # points of the part
@@ -83,8 +83,9 @@ def is_complete(mesh: TriangleMesh) -> bool:
 def _find_factor(part: Piece, target: MatchTarget) -> float:
     """Return the factor at which the largest piece of a part fits that of the whole best."""
     mesh, whole = part.copy.mesh, target.pieces[0]
-    ours, theirs = (float(np.ptp(m.vertices, axis=0).max()) for m in (mesh, whole.piece.copy.mesh))
-    factors = SIZES * theirs / ours
+    copies = mesh, whole.piece.copy.mesh
+    size, whole_size = (float(np.ptp(copy.vertices, axis=0).max()) for copy in copies)
+    factors = SIZES * whole_size / size
     share = part.area / whole.piece.area
     factors = factors[factors**2 * share <= MOST_AREA]
     best, highest = 1.0, -1.0
@@ -97,16 +98,15 @@ def _find_factor(part: Piece, target: MatchTarget) -> float:
             one = maps[0]
             quality = rate_map(surface, whole.surface, differences, one.pairs, one.fit.places)
             score = quality.score * np.sqrt(surface.area)
-        if score > highest:
+        if score <= highest:
+            continue
+        best, highest = factor, score
+        if maps:
             # Between the sizes that are tried, distances between pairs say how large the part is.
-            stretch = _stretch(surface, whole.surface, maps[0].pairs) if maps else 1.0
-            best, highest = factor * stretch, score
+            points, partners = maps[0].pairs.points, maps[0].pairs.partners
+            ours = surface.between[np.ix_(points, points)].astype(np.float64)
+            theirs = whole.surface.between[np.ix_(partners, partners)]
+            known = (ours > 0) & (theirs > 0)
+            if known.any():
+                best *= float(np.quantile(theirs[known] / ours[known], UNCUT))
     return best
-
-
-def _stretch(part: Surface, whole: Surface, pairs: Pairs) -> float:
-    """Return how much larger than the part it is on the whole, from distances between pairs."""
-    ours = part.between[np.ix_(pairs.points, pairs.points)].astype(np.float64)
-    theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
-    known = (ours > 0) & (theirs > 0)
-    return float(np.quantile(theirs[known] / ours[known], UNCUT)) if known.any() else 1.0

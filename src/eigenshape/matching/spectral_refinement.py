@@ -7,14 +7,14 @@ from jaxtyping import Float, Int
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.matching.refinement_loops import nearest_face_points
+from eigenshape.matching.match_loops import nearest_face_points
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.solve import solve_spectrum
 
 N_MODES = (100, 150)  # of the whole, round by round; 200 more improve the error by 0.01
 MODES_PER_VERTEX = 1 / 5  # at most: higher ones of a coarse mesh are no longer those of the shape
 # Modes of the part reach this many times as far up as those of the whole.
-MARGIN = 1.2
+SPECTRAL_MARGIN = 1.2
 # Modes of a part are more than its share of the area says, since its boundary is free.
 EXTRA = 1.25, 15
 ROWS_AT_ONCE = 1000  # vertices whose distances to all others are in memory at a time
@@ -37,9 +37,9 @@ def lowest_modes(mesh: TriangleMesh, count: int = N_MODES[-1]) -> Modes:
 
 
 def modes_of_part(mesh: TriangleMesh, whole: Modes) -> Modes:
-    """Return the modes of a part below `MARGIN` times the largest eigenvalue of the whole."""
+    """Return the modes of a part below `SPECTRAL_MARGIN` times the largest eigenvalue of the whole."""
     areas = dual_volumes(mesh)
-    share = MARGIN * areas.sum() / whole.areas.sum()
+    share = SPECTRAL_MARGIN * areas.sum() / whole.areas.sum()
     count = int(len(whole.eigenvalues) * share * EXTRA[0]) + EXTRA[1]
     return lowest_modes(mesh, count)
 
@@ -58,9 +58,22 @@ def refine_places(
         if wanted >= len(whole.eigenvalues):
             break
     theirs = np.ascontiguousarray(whole.functions[:, : smooth.shape[1]])
+    return places_in_faces(mesh, theirs, smooth, places)
+
+
+def places_in_faces(
+    mesh: TriangleMesh,
+    corners: Float[np.ndarray, "n k"],
+    points: Float[np.ndarray, "p k"],
+    vertices: Int[np.ndarray, " p"],
+) -> tuple[Int[np.ndarray, " p"], Float[np.ndarray, "p 3"]]:
+    """Return the face at a given vertex that is nearest to each point, and the weights in it.
+
+    Points and vertices are compared in k dimensions, whichever they are.
+    """
     order = np.argsort(mesh.faces.ravel(), kind="stable")
     starts = np.searchsorted(mesh.faces.ravel()[order], np.arange(mesh.n_vertices + 1))
-    return nearest_face_points(smooth, theirs, mesh.faces, starts, order // 3, places)
+    return nearest_face_points(points, corners, mesh.faces, starts, order // 3, vertices)
 
 
 def smooth_places(
@@ -68,7 +81,7 @@ def smooth_places(
 ) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n k"]]:
     """Return the vertices of a map that so many modes make smooth, and the smooth modes there."""
     k = min(wanted, len(whole.eigenvalues))
-    low = part.eigenvalues < MARGIN * whole.eigenvalues[k - 1]
+    low = part.eigenvalues < SPECTRAL_MARGIN * whole.eigenvalues[k - 1]
     low[0] = True
     ours, theirs = part.functions[:, low], whole.functions[:, :k]
     matrix = (ours * part.areas[:, None]).T @ theirs[places]

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Complex64, Float, Float32, Int
 
 from eigenshape.geometry.distances.geodesic import farthest_points
@@ -11,7 +10,7 @@ from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.topology import neighbor_links
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.codebook import BASES, default_codebook, whiten_numbers
 from eigenshape.retrieval.patches.patch_loops import (
@@ -81,9 +80,13 @@ def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
     areas, normals = dual_volumes(mesh), mean_normals(mesh)
     numbers = describe_discs(mesh, chosen, rows, MATCHED_RADII, normals, areas)
     weights = whole_shares(mesh, rows, MATCHED_RADII)
+    # Turned inside out, the heights of discs change their signs.
+    turned = numbers.copy()
+    for ring in range(RINGS):
+        first = ring * RING_NUMBERS + TURN_BINS
+        heights = slice(first, first + HEIGHT_BINS)
+        turned[:, :, heights] = numbers[:, :, heights][:, :, ::-1]
     distances = rows.astype(np.float32)
-    between = np.ascontiguousarray(distances[:, chosen])
-    weights = weights.astype(np.float32)
     return Surface(
         mesh,
         areas,
@@ -93,9 +96,9 @@ def describe_surface(mesh: TriangleMesh, unit: float, n_points: int) -> Surface:
         np.ascontiguousarray(distances.T),
         nearest,
         whiten_discs(numbers),
-        weights,
-        whiten_discs(_turned_numbers(numbers)),
-        between,
+        weights.astype(np.float32),
+        whiten_discs(turned),
+        np.ascontiguousarray(distances[:, chosen]),
         _directions(mesh, chosen, rows, normals),
     )
 
@@ -121,16 +124,6 @@ def whiten_discs(numbers: Float32[np.ndarray, "m r c"]) -> Float32[np.ndarray, "
     return np.stack(rows, axis=1).astype(np.float32)
 
 
-def _turned_numbers(numbers: Float32[np.ndarray, "m r c"]) -> Float32[np.ndarray, "m r c"]:
-    """Return the numbers of discs of the surface turned inside out: heights change their signs."""
-    found = numbers.copy()
-    for ring in range(RINGS):
-        first = ring * RING_NUMBERS + TURN_BINS
-        heights = slice(first, first + HEIGHT_BINS)
-        found[:, :, heights] = numbers[:, :, heights][:, :, ::-1]
-    return found
-
-
 def _directions(
     mesh: TriangleMesh,
     points: Int[np.ndarray, " m"],
@@ -141,18 +134,19 @@ def _directions(
 
     The gradient is fitted to the vertices of two rings around the point, in its tangent plane.
     """
-    edges = edge_table(mesh).edges
-    ones = np.ones(len(edges))
-    links = sp.coo_array((ones, edges.T), shape=(mesh.n_vertices,) * 2).tocsr()
-    links = links + links.T
+    links = neighbor_links(mesh)
     rings = (links + links @ links)[points].tocsr()
     found = np.empty((len(points),) * 2, dtype=np.complex64)
     for number, point in enumerate(points):
         around = rings.indices[rings.indptr[number] : rings.indptr[number + 1]]
         around = around[around != point]
         arms = mesh.vertices[around] - mesh.vertices[point]
+        # Two unit vectors that with the normal form a right-handed frame
+        normal = normals[point]
+        first = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
+        first /= np.linalg.norm(first)
+        frame = np.stack([first, np.cross(normal, first)])
         # Unfold the arms into the tangent plane, with their lengths.
-        frame = _tangent_frame(normals[point])
         flat = arms @ frame.T
         lengths = np.linalg.norm(flat, axis=1)
         stretch = np.linalg.norm(arms, axis=1) / np.maximum(lengths, np.finfo(float).tiny)
@@ -163,11 +157,3 @@ def _directions(
         slopes = np.linalg.lstsq(flat, rises.T, rcond=None)[0]
         found[number] = -(slopes[0] + 1j * slopes[1])
     return found / np.maximum(np.abs(found), 1)
-
-
-def _tangent_frame(normal: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "2 3"]:
-    """Return two unit vectors that with the normal form a right-handed frame."""
-    helper = np.eye(3)[np.argmin(np.abs(normal))]
-    first = np.cross(helper, normal)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first)])

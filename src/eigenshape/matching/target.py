@@ -3,20 +3,36 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Int
 
 from eigenshape._text import html_repr
-from eigenshape._threads import one_blas_thread
+from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.distances.geodesic import geodesic_waves
+from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_describable, require_oriented
+from eigenshape.geometry.simplices import dual_volumes
+from eigenshape.geometry.topology import is_closed
 from eigenshape.matching.pieces import Piece, report_left_out, split_pieces
 from eigenshape.matching.spectral_refinement import Modes, lowest_modes
-from eigenshape.matching.surface import UNIT, Surface, describe_surface
-from eigenshape.matching.views import describe_views
+from eigenshape.matching.surface import (
+    MATCHED_RADII,
+    UNIT,
+    Surface,
+    View,
+    describe_surface,
+    whiten_discs,
+)
+from eigenshape.retrieval.patches.patches import describe_discs, whole_shares
+from eigenshape.scans.partial import view_of
 
 N_WHOLE = 500  # points of the whole; 1,000 take four times as long for the same error
 # Pieces with less of the area of the whole are not matched: they have too few patches.
 LEAST_AREA = 0.01
+# Viewpoints around a whole. On 46 hard pairs of the tuning half, the five most similar points hold
+# the right one for 0.37 of the points of scans without views, for 0.46 with six, 0.50 with 14.
+N_VIEWS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,15 +132,40 @@ def prepare_target(whole: MeshLike) -> MatchTarget:
     mesh = as_mesh(whole, "whole")
     require_matchable(mesh)
     pieces = split_pieces(mesh, LEAST_AREA)
-    report = report_left_out(mesh, pieces, "whole")
-    return MatchTarget(mesh, tuple(_prepare_piece(piece) for piece in pieces), report)
+    prepared = []
+    for piece in pieces:
+        unit = UNIT * float(np.sqrt(piece.area))
+        surface = describe_surface(piece.copy.mesh, unit, N_WHOLE)
+        surface = replace(surface, views=describe_views(surface.mesh, surface.points))
+        prepared.append(TargetPiece(piece, unit, surface, lowest_modes(surface.mesh)))
+    return MatchTarget(mesh, tuple(prepared), report_left_out(mesh, pieces, "whole"))
 
 
-def _prepare_piece(piece: Piece) -> TargetPiece:
-    unit = UNIT * float(np.sqrt(piece.area))
-    surface = describe_surface(piece.copy.mesh, unit, N_WHOLE)
-    surface = replace(surface, views=describe_views(surface.mesh, surface.points))
-    return TargetPiece(piece, unit, surface, lowest_modes(surface.mesh))
+def describe_views(mesh: TriangleMesh, points: Int[np.ndarray, " m"]) -> tuple[View, ...]:
+    """Describe those of some vertices that each viewpoint sees, by discs that end where the view ends.
+
+    An open mesh has no views.
+    """
+    if not is_closed(mesh):
+        return ()
+
+    def describe_view(number: int) -> View:
+        view = view_of(mesh, number)
+        piece, sources = view.mesh, view.source_vertices
+        places = np.full(max(sources.max(), points.max()) + 1, -1)
+        places[sources] = np.arange(piece.n_vertices)
+        seen = np.flatnonzero(places[points] >= 0)
+        chosen = places[points[seen]]
+        wave, reach = geodesic_waves(piece), float(MATCHED_RADII[-1])
+        rows = np.array([wave(vertex, reach) for vertex in chosen.tolist()])
+        rows = rows.reshape(len(chosen), piece.n_vertices)
+        normals, areas = mean_normals(piece), dual_volumes(piece)
+        numbers = describe_discs(piece, chosen, rows, MATCHED_RADII, normals, areas)
+        weights = whole_shares(piece, rows, MATCHED_RADII).astype(np.float32)
+        return View(seen, whiten_discs(numbers), weights)
+
+    views = map_in_threads(describe_view, list(range(N_VIEWS)))
+    return tuple(view for view in views if len(view.points))
 
 
 def as_target(whole: MeshLike | MatchTarget) -> MatchTarget:

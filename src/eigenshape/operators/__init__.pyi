@@ -1,6 +1,5 @@
 from .anisotropic import anisotropic_laplacian as anisotropic_laplacian
 from .anisotropic import curvature_tensors as curvature_tensors
-from .boundary import dirichlet_laplacian as dirichlet_laplacian
 from .catalog import OPERATORS as OPERATORS
 from .catalog import Operator as Operator
 from .catalog import build_laplacian as build_laplacian
@@ -16,8 +15,8 @@ from .clouds.neighbors import neighbor_graph as neighbor_graph
 from .connection import connection_laplacian as connection_laplacian
 from .connection import tangent_frames as tangent_frames
 from .cotangent import cotangent_laplacian as cotangent_laplacian
+from .cotangent import mean_curvature as mean_curvature
 from .crouzeix_raviart import crouzeix_raviart_laplacian as crouzeix_raviart_laplacian
-from .curvature import mean_curvature as mean_curvature
 from .fem import fem_boundary_nodes as fem_boundary_nodes
 from .fem import fem_laplacian as fem_laplacian
 from .fem import fem_nodes as fem_nodes
@@ -25,6 +24,7 @@ from .graph import edge_graph as edge_graph
 from .graph import graph_laplacian as graph_laplacian
 from .laplacian import GaussianKernel as GaussianKernel
 from .laplacian import Laplacian as Laplacian
+from .laplacian import dirichlet_laplacian as dirichlet_laplacian
 from .robust import robust_laplacian as robust_laplacian
 from .smoothing import denoise as denoise
 from .smoothing import noise_level as noise_level

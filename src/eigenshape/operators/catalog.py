@@ -154,9 +154,11 @@ def build_laplacian(
         )
     entry = OPERATORS[name]
     if not isinstance(shape, entry.shapes):
+        fitting = [other for other, its in OPERATORS.items() if isinstance(shape, its.shapes)]
+        hint = f"It is for {', '.join(fitting)}." if fitting else "No operator is for that."
         raise InvalidParameterError(
             f"The {name} operator takes {' or '.join(kind.__name__ for kind in entry.shapes)}; the shape is a "
-            f"{type(shape).__name__}. {_instead(shape)}"
+            f"{type(shape).__name__}. {hint}"
         )
     unknown = [option for option in options if option not in entry.options]
     if unknown:
@@ -193,8 +195,3 @@ def default_operator(shape: Shape | sp.sparray) -> str:
     if isinstance(shape, PointCloud):
         return "point-cloud"
     return "cotangent" if isinstance(shape, MESHES) else "weighted"
-
-
-def _instead(shape: object) -> str:
-    names = [name for name, entry in OPERATORS.items() if isinstance(shape, entry.shapes)]
-    return f"It is for {', '.join(names)}." if names else "No operator is for that."

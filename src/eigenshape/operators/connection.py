@@ -2,7 +2,7 @@
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Complex, Float
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -11,7 +11,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.choices import Mass
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.directions import corner_products, vertex_directions
+from eigenshape.operators.directions import half_cotangents, vertex_directions
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import edge_keys, side_ends
 
@@ -81,16 +81,23 @@ def connection_laplacian(mesh: MeshLike, mass: Mass = "lumped") -> Laplacian:
     sides = vertex_directions(mesh)
     turns = np.exp(1j * (sides.at_head + np.pi - sides.at_tail))
     flat_turns = flatten_turns(turns)
-    weights = _weights(mesh)
-    flat = np.repeat(_faces_to_flatten(mesh, weights), 3)
-    stiffness = _transport_matrix(
-        mesh, scalar.stiffness.diagonal(), -weights * np.where(flat, flat_turns, turns)
-    )
+    weights = half_cotangents(mesh)
+    # Faces are made flat until the weights of all others sum to 0 or more at every edge. What is
+    # left is a sum of squares edge by edge, and a flat face is one by itself.
+    _, edges = np.unique(edge_keys(mesh.faces, mesh.n_vertices), return_inverse=True)
+    flat = np.zeros(len(weights), dtype=bool)
+    while True:
+        kept = np.where(flat, 0.0, weights)
+        short = np.bincount(edges, weights=kept)[edges] < -COCIRCULAR
+        more = (short & (kept < 0)).reshape(-1, 3).any(axis=1)
+        if not more.any():
+            break
+        flat |= np.repeat(more, 3)
+    entries = -weights * np.where(flat, flat_turns, turns)
+    stiffness = _transport_matrix(mesh, scalar.stiffness.diagonal(), entries)
     shares = np.repeat(MASS_SHARES[mass] * face_areas(mesh), 3)
-    return Laplacian(
-        _real(stiffness),
-        _real(_transport_matrix(mesh, scalar.mass.diagonal(), shares * flat_turns)),
-    )
+    masses = _transport_matrix(mesh, scalar.mass.diagonal(), shares * flat_turns)
+    return Laplacian(as_real(stiffness), as_real(masses))
 
 
 def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
@@ -141,34 +148,10 @@ def tangent_frames(mesh: MeshLike) -> Float[np.ndarray, "n 2 3"]:
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
-def _weights(mesh: TriangleMesh) -> Float[np.ndarray, " h"]:
-    """Return half of the cotangent opposite to each side."""
-    cosines, sines = corner_products(mesh)
-    return np.roll((cosines / sines).reshape(-1, 3), 1, axis=1).ravel() / 2
-
-
 def flatten_turns(turns: Complex[np.ndarray, " h"]) -> Complex[np.ndarray, " h"]:
     """Turn the three of each face by a third of its curvature each, so that they lead back to the same vector."""
     around = turns.reshape(-1, 3).prod(axis=1)
     return turns * np.repeat(np.exp(-1j * np.angle(around) / 3), 3)
-
-
-def _faces_to_flatten(
-    mesh: TriangleMesh, weights: Float[np.ndarray, " h"]
-) -> Bool[np.ndarray, " f"]:
-    """Choose faces so that the weights of all others sum to 0 or more at every edge.
-
-    What is left is a sum of squares edge by edge, and a flat face is one by itself.
-    """
-    _, edges = np.unique(edge_keys(mesh.faces, mesh.n_vertices), return_inverse=True)
-    flat = np.zeros(mesh.n_faces, dtype=bool)
-    while True:
-        kept = np.where(np.repeat(flat, 3), 0.0, weights)
-        short = np.bincount(edges, weights=kept)[edges] < -COCIRCULAR
-        more = (short & (kept < 0)).reshape(-1, 3).any(axis=1)
-        if not more.any():
-            return flat
-        flat |= more
 
 
 def _transport_matrix(
@@ -180,7 +163,7 @@ def _transport_matrix(
     return (sp.diags_array(diagonal.astype(complex)) + half + half.conj().T).tocsr()
 
 
-def _real(matrix: sp.csr_array) -> sp.csr_array:
+def as_real(matrix: sp.csr_array) -> sp.csr_array:
     """Write a Hermitian matrix of n complex numbers as a symmetric one of 2n real numbers."""
     quarter = sp.csr_array(np.array([[0.0, -1.0], [1.0, 0.0]]))
     return (sp.kron(matrix.real, sp.eye_array(2)) + sp.kron(matrix.imag, quarter)).tocsr()

@@ -17,6 +17,7 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import (
     in_length,
     scaled_corners,
+    side_lengths,
     simplex_volumes,
     triangular_sides,
 )
@@ -95,7 +96,7 @@ def interpolation_constants(mesh: Mesh) -> Float[np.ndarray, " s"]:
     ∇(w∘A) is at most |A| times as long as ∇w. The smaller of both is taken.
     """
     corners, scale = scaled_corners(mesh)
-    lengths = _edge_lengths(corners)
+    lengths = side_lengths(corners)
     longest, m = lengths.max(axis=1), mesh.dim
     if m == 1:
         bounds = longest / pi
@@ -106,22 +107,15 @@ def interpolation_constants(mesh: Mesh) -> Float[np.ndarray, " s"]:
             (longest / pi) ** 2 + (lengths**2).sum(axis=1) / (m**2 * (m + 1) ** 2 * (m + 2))
         )
     if m == 3:
-        bounds = np.minimum(bounds, REGULAR_TETRAHEDRON * _stretch(corners))
+        # |A| of the linear map to each tetrahedron from the regular one with edges of length 1
+        regular = np.linalg.cholesky((np.eye(3) + 1) / 2).T
+        maps = triangular_sides(corners)[1] @ np.linalg.inv(regular)
+        stretch = np.linalg.norm(maps, 2, axis=(1, 2))
+        bounds = np.minimum(bounds, REGULAR_TETRAHEDRON * stretch)
     return in_length(bounds, scale, 1)
 
 
 def longest_edges(mesh: Mesh) -> Float[np.ndarray, " s"]:
     """Return the length of the longest edge of each simplex."""
     corners, scale = scaled_corners(mesh)
-    return in_length(_edge_lengths(corners).max(axis=1), scale, 1)
-
-
-def _edge_lengths(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, "s edges"]:
-    first, second = np.triu_indices(corners.shape[1], 1)
-    return np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
-
-
-def _stretch(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:
-    """Return |A| of the linear map to each tetrahedron from the regular one with edges of length 1."""
-    regular = np.linalg.cholesky((np.eye(3) + 1) / 2).T
-    return np.linalg.norm(triangular_sides(corners)[1] @ np.linalg.inv(regular), 2, axis=(1, 2))
+    return in_length(side_lengths(corners).max(axis=1), scale, 1)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
 from eigenshape.geometry.simplices import scaled_corners
@@ -40,20 +41,35 @@ class Directions:
 def vertex_directions(mesh: TriangleMesh) -> Directions:
     """Measure the directions of edges around each vertex (Sharp, Soliman, Crane 2019).
 
-    Raises
-    ------
-    InvalidShapeError
-        If the mesh is no manifold, two neighboring faces are turned against each other, a face has
-        no area or a vertex no face; the message names the first.
+    Raise InvalidShapeError if the mesh is no manifold, two neighboring faces are turned against
+    each other, a face has no area or a vertex no face.
     """
     require_sound(mesh)
     require_oriented_manifold(mesh)
     twins = side_twins(mesh)
-    first, inner = _first_sides(mesh, twins)
-    cosines, sines = corner_products(mesh)
-    at_tail, at_head, around = _walk_around(mesh, first, twins, np.arctan2(sines, cosines))
-    scale = np.where(inner, 2 * np.pi / around, 1.0)
     tails, heads = side_ends(mesh.faces)
+    # The first side of a vertex is that of its first face, or on a boundary that without a twin.
+    _, first = np.unique(tails, return_index=True)
+    boundary = np.flatnonzero(twins < 0)
+    first[tails[boundary]] = boundary
+    inner = np.ones(mesh.n_vertices, dtype=bool)
+    inner[tails[boundary]] = False
+
+    # Walk around all vertices at once, from side to side of a corner, and sum up the angles.
+    cosines, sines = corner_products(mesh)
+    angles = np.arctan2(sines, cosines)
+    at_tail, at_head = np.empty(len(angles)), np.empty(len(angles))
+    around = np.zeros(mesh.n_vertices)
+    walking, side = np.arange(mesh.n_vertices), first
+    while walking.size:
+        at_tail[side] = around[walking]
+        around[walking] += angles[side]
+        last = side - side % 3 + (side + 2) % 3
+        at_head[last] = around[walking]
+        side = twins[last]
+        on = (side >= 0) & (side != first[walking])
+        walking, side = walking[on], side[on]
+    scale = np.where(inner, 2 * np.pi / around, 1.0)
     return Directions(at_tail * scale[tails], at_head * scale[heads], first)
 
 
@@ -66,57 +82,26 @@ def corner_products(mesh: TriangleMesh) -> tuple[Float[np.ndarray, " h"], Float[
     return np.einsum("fij,fij->fi", to_next, to_last).ravel(), sines.ravel()
 
 
+def half_cotangents(mesh: TriangleMesh) -> Float[np.ndarray, " h"]:
+    """Return half of the cotangent opposite to each side."""
+    cosines, sines = corner_products(mesh)
+    return np.roll((cosines / sines).reshape(-1, 3), 1, axis=1).ravel() / 2
+
+
 def side_twins(mesh: TriangleMesh) -> Int[np.ndarray, " h"]:
     """Return the side that lies on each, -1 on a boundary."""
     keys = edge_keys(mesh.faces, mesh.n_vertices)
-    order = np.argsort(keys, kind="stable")
-    same = keys[order][1:] == keys[order][:-1]
-    one, two = order[:-1][same], order[1:][same]
+    one, two = shared_facets(keys)
     twins = np.full(len(keys), -1)
     twins[one], twins[two] = two, one
     return twins
 
 
-def _first_sides(mesh: TriangleMesh, twins: Int[np.ndarray, " h"]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first side of each vertex, and whether it lies inside."""
-    tails = mesh.faces.ravel()
-    _, first = np.unique(tails, return_index=True)
-    boundary = np.flatnonzero(twins < 0)
-    first[tails[boundary]] = boundary
-    inner = np.ones(mesh.n_vertices, dtype=bool)
-    inner[tails[boundary]] = False
-    return first, inner
-
-
-def _walk_around(
-    mesh: TriangleMesh,
-    first: Int[np.ndarray, " n"],
-    twins: Int[np.ndarray, " h"],
-    angles: Float[np.ndarray, " h"],
-) -> tuple[Float[np.ndarray, " h"], Float[np.ndarray, " h"], Float[np.ndarray, " n"]]:
-    """Walk around all vertices at once, from side to side of a corner, and sum up the angles."""
-    at_tail, at_head = np.empty(len(angles)), np.empty(len(angles))
-    around = np.zeros(mesh.n_vertices)
-    walking, side = np.arange(mesh.n_vertices), first
-    while walking.size:
-        at_tail[side] = around[walking]
-        around[walking] += angles[side]
-        last = side - side % 3 + (side + 2) % 3
-        at_head[last] = around[walking]
-        side = twins[last]
-        on = (side >= 0) & (side != first[walking])
-        walking, side = walking[on], side[on]
-    return at_tail, at_head, around
-
-
 def require_oriented_manifold(mesh: TriangleMesh) -> None:
     """Raise an error if vertices have no tangent planes with a side to look at them from.
 
-    Raises
-    ------
-    InvalidShapeError
-        If an edge has more than two faces, a vertex more than one fan of faces, or two neighboring
-        faces are turned against each other.
+    An edge has at most two faces, a vertex one fan of faces, and neighboring faces are turned
+    alike.
     """
     edges, vertices = non_manifold_edges(mesh), non_manifold_vertices(mesh)
     if len(edges):

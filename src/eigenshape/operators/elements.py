@@ -94,19 +94,15 @@ def number_nodes(
     """
     named = np.sort(simplices[:, local_nodes(simplices.shape[1] - 1, order)], axis=2)
     n_corners = 1 + np.count_nonzero(np.diff(named, axis=2), axis=2)
-    _, firsts, numbers = np.unique(_keys(n_corners, named), return_index=True, return_inverse=True)
-    return named.reshape(-1, order)[firsts], numbers.reshape(n_corners.shape)
-
-
-def _keys(
-    n_corners: Int[np.ndarray, "s nodes"], named: Int[np.ndarray, "s nodes order"]
-) -> np.ndarray:
-    """Return a sort key for each node: one integer if it fits into 64 bits, otherwise several."""
-    base, order = int(named.max()) + 1, named.shape[2]
+    # A sort key for each node: one integer if it fits into 64 bits, otherwise several
+    base = int(named.max()) + 1
     if (order + 1) * base**order < 2**63:
-        return (n_corners * base**order + named @ base ** np.arange(order)[::-1]).ravel()
-    fields = [n_corners, *np.moveaxis(named, 2, 0)]
-    return np.rec.fromarrays([field.ravel() for field in fields])
+        keys = (n_corners * base**order + named @ base ** np.arange(order)[::-1]).ravel()
+    else:
+        fields = [n_corners, *np.moveaxis(named, 2, 0)]
+        keys = np.rec.fromarrays([field.ravel() for field in fields])
+    _, firsts, numbers = np.unique(keys, return_index=True, return_inverse=True)
+    return named.reshape(-1, order)[firsts], numbers.reshape(n_corners.shape)
 
 
 @lru_cache

@@ -4,13 +4,14 @@ from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.geometry.topology import adjacency_matrix
+from eigenshape.operators.laplacian import Laplacian, require_square
 
 Kind = Literal["combinatorial", "weighted", "normalized"]
 EdgeWeights = Literal["unit", "inverse_length"]
@@ -75,36 +76,25 @@ def graph_laplacian(
         adjacency.data[:] = 1.0
     degrees = sp.diags_array(adjacency.sum(axis=1)).tocsr()
     if kind == "normalized":
-        _require_neighbors(adjacency)
+        alone = np.flatnonzero(np.diff(adjacency.indptr) == 0)
+        if alone.size:
+            raise InvalidParameterError(
+                f"For a normalized Laplacian every point must have an edge; point {alone[0]} has none "
+                f"({alone.size} such). Choose combinatorial or weighted, or drop such points."
+            )
         return Laplacian((degrees - adjacency).tocsr(), degrees)
     return Laplacian((degrees - adjacency).tocsr(), sp.eye_array(adjacency.shape[0], format="csr"))
 
 
 def _as_adjacency(graph: sp.sparray | sp.spmatrix) -> sp.csr_array:
-    if (
-        not sp.issparse(graph)
-        or graph.ndim != 2
-        or graph.shape[0] != graph.shape[1]
-        or not graph.shape[0]
-    ):
-        raise InvalidParameterError(
-            "A graph must be a mesh or a square sparse matrix; it is a "
-            f"{type(graph).__name__} of shape {np.shape(graph)}."
-        )
+    """Return a copy of a graph without explicit zeros, or raise an error if it is none."""
+    require_square(graph, "A graph", "a mesh or a square sparse matrix")
     if graph.dtype.kind not in "biuf":
         raise InvalidParameterError(
             f"Weights of edges must be real numbers; the type is {graph.dtype}."
         )
     adjacency = sp.csr_array(graph, dtype=np.float64, copy=True)
     adjacency.sum_duplicates()
-    _require_weights(adjacency)
-    adjacency.eliminate_zeros()
-    _require_no_loops(adjacency)
-    _require_symmetric(adjacency)
-    return adjacency
-
-
-def _require_weights(adjacency: sp.csr_array) -> None:
     bad = np.flatnonzero(~(np.isfinite(adjacency.data) & (adjacency.data >= 0)))
     if bad.size:
         entries = adjacency.tocoo()
@@ -112,18 +102,13 @@ def _require_weights(adjacency: sp.csr_array) -> None:
             f"Weights of edges must be finite and not negative; entry ({entries.row[bad[0]]}, {entries.col[bad[0]]}) "
             f"is {entries.data[bad[0]]} ({bad.size} such)."
         )
-
-
-def _require_no_loops(adjacency: sp.csr_array) -> None:
+    adjacency.eliminate_zeros()
     loops = np.flatnonzero(adjacency.diagonal())
     if loops.size:
         raise InvalidParameterError(
             f"A point must not be its own neighbor; entry ({loops[0]}, {loops[0]}) is "
             f"{adjacency.diagonal()[loops[0]]} ({loops.size} such). Loops cancel in D - A: set the diagonal to zero."
         )
-
-
-def _require_symmetric(adjacency: sp.csr_array) -> None:
     off = (abs(adjacency - adjacency.T) - WEIGHT_ASYMMETRY * adjacency.maximum(adjacency.T)).tocoo()
     bad = np.flatnonzero(off.data > 0)
     if bad.size:
@@ -132,15 +117,7 @@ def _require_symmetric(adjacency: sp.csr_array) -> None:
             f"A graph must be symmetric; entry ({row}, {column}) is {adjacency[row, column]} and entry "
             f"({column}, {row}) is {adjacency[column, row]}."
         )
-
-
-def _require_neighbors(adjacency: sp.csr_array) -> None:
-    alone = np.flatnonzero(np.diff(adjacency.indptr) == 0)
-    if alone.size:
-        raise InvalidParameterError(
-            f"For a normalized Laplacian every point must have an edge; point {alone[0]} has none "
-            f"({alone.size} such). Choose combinatorial or weighted, or drop such points."
-        )
+    return adjacency
 
 
 def edge_graph(mesh: MeshLike, weights: EdgeWeights = "unit") -> sp.csr_array:
@@ -178,19 +155,24 @@ def edge_graph(mesh: MeshLike, weights: EdgeWeights = "unit") -> sp.csr_array:
             f"weights must be 'unit' or 'inverse_length'; it is {weights!r}."
         )
     require_distinct_corners(mesh)
-    edges = _edges(mesh)
-    values = np.ones(len(edges)) if weights == "unit" else 1 / _lengths(mesh, edges)
+    edges = edges_of(mesh)
+    values = np.ones(len(edges))
+    if weights == "inverse_length":
+        ends, scale = size_one(mesh.points[edges])
+        lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+        bad = np.flatnonzero(lengths == 0)
+        if bad.size:
+            one, two = edges[bad[0]]
+            raise InvalidShapeError(
+                f"Edges must have length; edge ({one}, {two}) is from {mesh.points[one].tolist()} to "
+                f"{mesh.points[two].tolist()} ({bad.size} such). {try_auto()}"
+            )
+        values = 1 / in_length(lengths, scale, 1)
     return adjacency_matrix(edges, values, mesh.n_points)
 
 
 def require_distinct_corners(mesh: Mesh) -> None:
-    """Refuse a mesh with a simplex that has a corner twice, naming the first.
-
-    Raises
-    ------
-    InvalidShapeError
-        With the index, corners and number of such simplices.
-    """
+    """Refuse a mesh with a simplex that has a corner twice, naming the first."""
     ordered = np.sort(mesh.simplices, axis=1)
     bad = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
     if bad.size:
@@ -199,32 +181,3 @@ def require_distinct_corners(mesh: Mesh) -> None:
             f"{plural} must have distinct corners; {singular} {bad[0]} is {mesh.simplices[bad[0]].tolist()} "
             f"({bad.size} such). {try_auto()}"
         )
-
-
-def _edges(mesh: Mesh) -> Int[np.ndarray, "e 2"]:
-    first, second = np.triu_indices(mesh.simplices.shape[1], 1)
-    ends = np.stack([mesh.simplices[:, first].ravel(), mesh.simplices[:, second].ravel()])
-    keys = np.unique(ends.min(axis=0) * mesh.n_points + ends.max(axis=0))
-    return np.column_stack(np.divmod(keys, mesh.n_points))
-
-
-def _lengths(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> Float[np.ndarray, " e"]:
-    ends, scale = size_one(mesh.points[edges])
-    lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-    bad = np.flatnonzero(lengths == 0)
-    if bad.size:
-        one, two = edges[bad[0]]
-        raise InvalidShapeError(
-            f"Edges must have length; edge ({one}, {two}) is from {mesh.points[one].tolist()} to "
-            f"{mesh.points[two].tolist()} ({bad.size} such). {try_auto()}"
-        )
-    return in_length(lengths, scale, 1)
-
-
-def adjacency_matrix(
-    edges: Int[np.ndarray, "e 2"], values: Float[np.ndarray, " e"], n: int
-) -> sp.csr_array:
-    """Return the symmetric matrix of weighted edges, each given once."""
-    one, two = edges.T
-    ends = (np.concatenate([one, two]), np.concatenate([two, one]))
-    return sp.coo_array((np.tile(values, 2), ends), shape=(n, n)).tocsr()

@@ -1,14 +1,21 @@
-"""The one form that every discretization of the Laplace operator takes."""
+"""The one form that every discretization of the Laplace operator takes, and its boundary conditions.
 
-from dataclasses import dataclass
+Every operator has the Neumann condition by default: points that are not fixed are free. Fixing the
+whole boundary gives the Dirichlet condition, fixing a part of it the mixed one.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arguments import require_type
+from eigenshape._arrays import ReadOnly, as_array
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
+from eigenshape._typing import ArrayLike
 from eigenshape.sparse.frozen import freeze_sparse
 
 # Largest difference of W_ij and W_ji, relative to the largest entry, that is accepted as rounding.
@@ -150,15 +157,81 @@ def find_zero_row_sums(matrix: sp.sparray) -> Bool[np.ndarray, " n"]:
     return np.asarray(sums <= ZERO_ROW_SUM * sizes)
 
 
+def dirichlet_laplacian(
+    laplacian: Laplacian, fixed: ArrayLike
+) -> tuple[Laplacian, Int[np.ndarray, " free"]]:
+    """Restrict an operator to functions that are zero at some points.
+
+    Parameters
+    ----------
+    laplacian : Laplacian
+    fixed : (c,) int
+        Points where functions are zero; duplicates are allowed.
+        `es.geometry.boundary_vertices(mesh)` is the whole boundary of a mesh.
+
+    Returns
+    -------
+    inner : Laplacian
+        On the free points. Rows of W no longer sum to zero, and W is positive definite on each
+        component that has a fixed point.
+    free : (n - c,) int
+        The free points, ascending: row i of `inner` is point free[i].
+
+    Raises
+    ------
+    InvalidParameterError
+        If a fixed point is out of range, or no point is free.
+
+    See Also
+    --------
+    solve_spectrum : Its argument `fixed` solves this operator and returns all points.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> square = es.shapes.grid(3, 3)
+    >>> rim = es.geometry.boundary_vertices(square)
+    >>> inner, free = es.operators.dirichlet_laplacian(es.cotangent_laplacian(square), rim)
+    >>> inner.n_points, free.tolist()
+    (4, [5, 6, 9, 10])
+    """
+    require_type(laplacian, Laplacian, "laplacian")
+    points = require_points(fixed, laplacian.n_points)
+    if not points.size:  # a copy of a million rows takes a second
+        return laplacian, np.arange(laplacian.n_points)
+    free = np.setdiff1d(np.arange(laplacian.n_points), points)
+    if not free.size:
+        raise InvalidParameterError(
+            f"At least one point must be free; all {laplacian.n_points} are fixed."
+        )
+    cut = {name: getattr(laplacian, name)[free][:, free] for name in ("stiffness", "mass")}
+    return replace(laplacian, **cut), free
+
+
+def require_points(fixed: ArrayLike, n_points: int) -> Int[np.ndarray, " c"]:
+    """Return `fixed` as an array of points, in its order and with its duplicates.
+
+    Raise InvalidParameterError if an entry is no point number, or out of range.
+    """
+    points = np.atleast_1d(as_array(fixed, "fixed"))
+    if points.size and points.dtype.kind not in "iu":
+        raise InvalidParameterError(
+            f"fixed must be a list of point numbers; the type of its entries is {points.dtype}. "
+            f"Pass np.flatnonzero(mask) for a mask."
+        )
+    bad = np.flatnonzero((points < 0) | (points >= n_points))
+    if bad.size:
+        raise InvalidParameterError(
+            f"fixed must hold points 0..{n_points - 1}; entry {bad[0]} is {points[bad[0]]}."
+        )
+    return points.astype(np.int64)
+
+
 def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:
     """Raise an error if the matrices of an operator are not all of it.
 
     The correction of a kernel changes eigenvalues after they are computed, so an equation with the
     matrices would silently be that of the uncorrected operator.
-
-    Raises
-    ------
-    InvalidParameterError
     """
     if laplacian.kernel is not None and laplacian.kernel.corrected:
         raise InvalidParameterError(
@@ -168,27 +241,19 @@ def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:
         )
 
 
-def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
-    _require_square(name, value)
-    matrix = freeze_sparse(sp.csr_array(value, dtype=np.float64))
-    _require_finite(name, matrix)
-    _require_symmetric(name, matrix)
-    return matrix
-
-
-def _require_square(name: str, matrix: sp.sparray) -> None:
-    if (
-        not sp.issparse(matrix)
-        or matrix.ndim != 2
-        or matrix.shape[0] != matrix.shape[1]
-        or not matrix.shape[0]
-    ):
+def require_square(matrix: Any, name: str, wanted: str = "a square sparse matrix") -> None:
+    """Raise an error if a value is not a square sparse matrix with rows."""
+    shape = np.shape(matrix)
+    if not sp.issparse(matrix) or len(shape) != 2 or shape[0] != shape[1] or not shape[0]:
         raise InvalidParameterError(
-            f"{name} must be a square sparse matrix; it is a {type(matrix).__name__} of shape {np.shape(matrix)}."
+            f"{name} must be {wanted}; it is a {type(matrix).__name__} of shape {shape}."
         )
 
 
-def _require_finite(name: str, matrix: sp.csr_array) -> None:
+def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
+    """Return a read-only copy of a matrix, or raise an error if it is not finite and symmetric."""
+    require_square(value, name)
+    matrix = freeze_sparse(sp.csr_array(value, dtype=np.float64))
     bad = np.flatnonzero(~np.isfinite(matrix.data))
     if bad.size:
         entries = matrix.tocoo()
@@ -196,16 +261,12 @@ def _require_finite(name: str, matrix: sp.csr_array) -> None:
         raise InvalidParameterError(
             f"{name} must be finite; entry ({row}, {column}) is {entries.data[bad[0]]} ({bad.size} such)."
         )
-
-
-def _require_symmetric(name: str, matrix: sp.csr_array) -> None:
     differences = abs(matrix - matrix.T).tocoo()
-    if not differences.nnz:
-        return
-    worst = differences.data.argmax()
-    if differences.data[worst] > ASYMMETRY * abs(matrix.data).max():
+    worst = differences.data.argmax() if differences.nnz else 0
+    if differences.nnz and differences.data[worst] > ASYMMETRY * abs(matrix.data).max():
         row, column = differences.row[worst], differences.col[worst]
         raise InvalidParameterError(
             f"{name} must be symmetric; entry ({row}, {column}) is {matrix[row, column]} "
             f"and entry ({column}, {row}) is {matrix[column, row]}."
         )
+    return matrix

@@ -2,13 +2,11 @@
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_different_simplices
 from eigenshape.geometry.simplices import (
     degenerate_simplices,
@@ -109,18 +107,28 @@ def robust_laplacian(
             )
         delaunay, scale = delaunay_cover(mesh, mollify)
         copies = 1
-    areas = in_length(_areas(delaunay, mesh.n_points) / copies, scale, 2)
-    stiffness = (_stiffness(delaunay, mesh.n_points) / copies).tocsr()
-    return Laplacian(stiffness, sp.diags_array(areas).tocsr())
+    # The cover counts the surface twice: a half of each area, and a quarter of each sum of
+    # cotangents instead of a half. What rounding leaves of such a sum below zero is zero.
+    n, thirds = mesh.n_points, np.repeat(flip_loops.areas(delaunay.lengths) / 3, 3)
+    areas = np.bincount(delaunay.tails, weights=thirds, minlength=n) / 2
+    cotangents = flip_loops.cotangents(delaunay.lengths)
+    once = np.flatnonzero(np.arange(len(delaunay.twins)) < delaunay.twins)
+    twins = delaunay.twins[once]
+    weights = np.maximum(cotangents[once] + cotangents[twins], 0.0) / 4
+    ends = (delaunay.tails[once], delaunay.tails[twins])
+    half = sp.coo_array((weights, ends), shape=(n, n)).tocsr()
+    whole = (half + half.T).tocsr()
+    whole.eliminate_zeros()
+    # An edge from a vertex to itself cancels here.
+    stiffness = (sp.diags_array(whole.sum(axis=1)) - whole).tocsr()
+    masses = in_length(areas / copies, scale, 2)
+    return Laplacian((stiffness / copies).tocsr(), sp.diags_array(masses).tocsr())
 
 
 def delaunay_cover(mesh: MeshLike, mollify: float = MOLLIFY) -> tuple[Triangulation, float]:
     """Return the Delaunay triangles of the tufted cover, and the unit of their lengths.
 
-    Raises
-    ------
-    InvalidShapeError, InvalidParameterError
-        As in `robust_laplacian`.
+    Errors are those of `robust_laplacian`.
     """
     mesh = as_mesh(mesh)
     if not 0 <= mollify < np.inf:
@@ -129,14 +137,9 @@ def delaunay_cover(mesh: MeshLike, mollify: float = MOLLIFY) -> tuple[Triangulat
     require_simplices_everywhere(mesh)
     require_different_simplices(mesh)
     require_span(mesh.vertices, 2, "The vertices of a mesh")
-    if (
-        not mollify or len(degenerate_simplices(mesh)) == mesh.n_faces
-    ):  # no face: all area would be that of mollifying
+    # If no face has area, all area would be that of mollifying.
+    if not mollify or len(degenerate_simplices(mesh)) == mesh.n_faces:
         require_volumes(mesh)
-    return _cover(mesh, mollify)
-
-
-def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
     points, scale = size_one(mesh.vertices)
     tails, heads = side_ends(mesh.faces)
     lengths = np.linalg.norm(points[tails] - points[heads], axis=1)
@@ -149,24 +152,3 @@ def _cover(mesh: TriangleMesh, mollify: float) -> tuple[Triangulation, float]:
             f"a larger mollify than {mollify}."
         )
     return flip_to_delaunay(tufted_cover(points, mesh.faces, lengths)), scale
-
-
-def _stiffness(cover: Triangulation, n: int) -> sp.csr_array:
-    cotangents = flip_loops.cotangents(cover.lengths)
-    # What rounding leaves below zero is zero. The cover counts the surface twice: a quarter of each
-    # sum, not half.
-    once = np.flatnonzero(np.arange(len(cover.twins)) < cover.twins)
-    twins = cover.twins[once]
-    weights = np.maximum(cotangents[once] + cotangents[twins], 0.0) / 4
-    ends = (cover.tails[once], cover.tails[twins])
-    half = sp.coo_array((weights, ends), shape=(n, n)).tocsr()
-    whole = (half + half.T).tocsr()
-    whole.eliminate_zeros()
-    return (
-        sp.diags_array(whole.sum(axis=1)) - whole
-    ).tocsr()  # an edge from a vertex to itself cancels here
-
-
-def _areas(cover: Triangulation, n: int) -> Float[np.ndarray, " n"]:
-    thirds = np.repeat(flip_loops.areas(cover.lengths) / 3, 3)
-    return np.bincount(cover.tails, weights=thirds, minlength=n) / 2

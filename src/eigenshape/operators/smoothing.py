@@ -1,7 +1,6 @@
 """Noise on the vertices of surfaces: how to measure it, and how to remove it."""
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import positive_values
@@ -14,7 +13,7 @@ from eigenshape.geometry.measure import edge_lengths, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_vertices, edge_table
+from eigenshape.geometry.topology import boundary_vertices, neighbor_links
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.symmetric_factor import factor_matrix
@@ -51,9 +50,7 @@ def noise_level(mesh: MeshLike) -> float:
     mesh = as_mesh(mesh)
     points, _ = size_one(mesh.vertices)
     unit = TriangleMesh(points, mesh.faces)
-    edges = edge_table(mesh).edges
-    links = sp.coo_array((np.ones(len(edges)), edges.T), shape=(mesh.n_vertices,) * 2).tocsr()
-    links = links + links.T
+    links = neighbor_links(mesh)
     degrees = links.sum(axis=1)
     inside = degrees > 0
     inside[boundary_vertices(mesh)] = False

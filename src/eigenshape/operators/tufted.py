@@ -73,7 +73,20 @@ def tufted_cover(
 
     forward = of_front < heads
     up, down = np.where(forward, fronts, backs), np.where(forward, backs, fronts)
-    order, following = _around_edges(points, faces)
+    # Sort the sides by edge and angle around it. The order around an edge of two faces does not
+    # matter.
+    keys = edge_keys(faces, len(points))
+    order = np.argsort(keys, kind="stable")
+    starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    counts = np.diff(np.append(starts, len(order)))
+    crowded = np.repeat(counts > 2, counts)
+    if crowded.any():
+        sides = order[crowded]
+        angles, ties = _angles(points, faces, sides, np.repeat(starts, counts)[crowded])
+        order[crowded] = sides[np.lexsort((ties, angles, keys[sides]))]
+    place = np.arange(len(order)) + 1
+    place[starts + counts - 1] = starts
+    following = order[place]
     twins = np.empty(2 * n_sides, dtype=np.int64)
     twins[up[order]] = down[following]
     twins[down[following]] = up[order]
@@ -94,24 +107,6 @@ def edge_keys(faces: Int[np.ndarray, "f 3"], n: int) -> Int[np.ndarray, " h"]:
     """Return for each side, the first from corner 0 to corner 1, a number that sides with the same ends share."""
     tails, heads = side_ends(faces)
     return np.minimum(tails, heads) * n + np.maximum(tails, heads)
-
-
-def _around_edges(
-    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"]
-) -> tuple[Int[np.ndarray, " h"], Int[np.ndarray, " h"]]:
-    """Sort the sides by edge and angle around it, and return with each the next around its edge."""
-    keys = edge_keys(faces, len(points))
-    order = np.argsort(keys, kind="stable")
-    starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
-    counts = np.diff(np.append(starts, len(order)))
-    crowded = np.repeat(counts > 2, counts)  # the order around any other edge does not matter
-    if crowded.any():
-        sides = order[crowded]
-        angles, ties = _angles(points, faces, sides, np.repeat(starts, counts)[crowded])
-        order[crowded] = sides[np.lexsort((ties, angles, keys[sides]))]
-    place = np.arange(len(order)) + 1
-    place[starts + counts - 1] = starts
-    return order, order[place]
 
 
 def _angles(
@@ -145,10 +140,7 @@ def _angles(
 def flip_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Triangulation:
     """Flip edges until the two angles opposite to each sum to 180° at most (Sharp and Crane 2020).
 
-    Raises
-    ------
-    ConvergenceError
-        If flips do not end, which for lengths of triangles they do.
+    Raise ConvergenceError if flips do not end, which for lengths of triangles they do.
     """
     tails, twins, lengths = cover.tails.copy(), cover.twins.copy(), cover.lengths.copy()
     most = MOST_FLIPS * len(tails)

@@ -58,7 +58,7 @@ ALONG_UP = 1e-6
 # Length of the mean normal above which a surface counts as a scan. A closed surface has 0, a flat
 # piece 1.
 ONE_WAY = 0.3
-MARGIN = 0.04  # share of the picture that is left free on each side
+FREE_BORDER = 0.04  # share of the picture that is left free on each side
 # Points at most this share of the longest side of the box above the lowest point carry the shape.
 SOLE = 0.02
 # z is up only if the base along z is this many times larger: a smaller factor turns over many
@@ -210,10 +210,7 @@ def aim_camera(mesh: MeshLike, *, view: View = "auto", up: Up = "auto", size: in
 def upward_direction(mesh: TriangleMesh, up: Up) -> Float[np.ndarray, "3"]:
     """Return the upward direction of a shape, which "auto" guesses, as a unit vector.
 
-    Raises
-    ------
-    InvalidParameterError
-        If `up` is neither a name nor a direction.
+    Raise InvalidParameterError if `up` is neither a name nor a direction.
     """
     if isinstance(up, str) and up == "auto":
         up = _upright_axis(mesh)
@@ -225,10 +222,7 @@ def choose_camera(
 ) -> Camera:
     """Return the camera of a figure: the one that was passed, or one for the view.
 
-    Raises
-    ------
-    InvalidParameterError
-        If both a camera and a view or an upward direction were passed.
+    Raise InvalidParameterError if both a camera and a view or an upward direction were passed.
     """
     require_type(camera, Camera | None, "camera")
     if camera is None:
@@ -244,10 +238,7 @@ def choose_camera(
 def _direction(value: View, name: str, names: tuple[str, ...]) -> Float[np.ndarray, "3"]:
     """Return a unit vector for the name of an axis or for three numbers.
 
-    Raises
-    ------
-    InvalidParameterError
-        If it is not one of the names, not three finite numbers, or zero.
+    Raise InvalidParameterError if it is not one of the names, not three finite numbers, or zero.
     """
     if isinstance(value, str):
         if value not in UP_NAMES or value == "auto" or name != "up":
@@ -269,66 +260,27 @@ def _guess_front(
     mesh: TriangleMesh, upward: Float[np.ndarray, "3"]
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """Return the level direction of the front, and the direction to the viewer of the usual view."""
-    # The axis after the upward one, made level where the upward direction is oblique.
+    # An open surface that mostly faces one way is a scan, and its front is where the scanner stood.
+    points = scale_to_unit(mesh)[0]
+    vectors = area_vectors(points[mesh.faces])
+    areas, tiny = np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny
+    facing = vectors.sum(axis=0) / max(areas.sum(), tiny)
+    is_scan = np.linalg.norm(facing) > ONE_WAY
+    if is_scan and np.linalg.norm(np.cross(upward, facing)) > 0.1:
+        level = facing - (facing @ upward) * upward
+        return level / np.linalg.norm(level), facing
+
+    # Else the axis after the upward one, made level where the upward direction is oblique; or the
+    # opposite side, if a viewer sees clearly more bending there.
     front = np.eye(3)[(int(np.abs(upward).argmax()) + 1) % 3]
     front = front - (front @ upward) * upward
     front = front / np.linalg.norm(front)
-    facing = _facing(mesh)
-    if facing is not None and np.linalg.norm(np.cross(upward, facing)) > 0.1:
-        level = facing - (facing @ upward) * upward
-        return level / np.linalg.norm(level), facing
-    parts = np.array(VIEWS["front-left"])
-    towards = parts @ [front, np.cross(upward, front), upward]
-    behind = parts @ [-front, -np.cross(upward, front), upward]
-    before, after = _sum_visible_bending(mesh, np.stack([towards, behind]))
-    if before < LESS * after:
-        return -front, behind
-    return front, towards
-
-
-def _upright_axis(mesh: TriangleMesh) -> Literal["y", "z"]:
-    points = scale_to_unit(mesh)[0]
-    areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
-    weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
-    center = weights @ points[mesh.faces].mean(axis=1)
-    along_y, along_z = (_base(points - center, axis) for axis in (1, 2))
-    falls_along_y = not _surrounds_origin(along_y)
-    wider_along_z = _hull_area(along_z) > WIDER * _hull_area(along_y)
-    return "z" if falls_along_y and _surrounds_origin(along_z) and wider_along_z else "y"
-
-
-def _base(points: Float[np.ndarray, "n 3"], axis: int) -> Float[np.ndarray, "k 2"]:
-    """Return where the lowest points would touch the ground."""
-    height = points[:, axis] - points[:, axis].min()
-    return np.delete(points, axis, axis=1)[height <= SOLE * np.ptp(points, axis=0).max()]
-
-
-def _surrounds_origin(points: Float[np.ndarray, "k 2"]) -> bool:
-    """Say whether the origin lies inside the convex hull: what stands on these points does not fall over."""
-    around = np.sort(np.arctan2(points[:, 1], points[:, 0]))
-    gaps = np.diff(around, append=around[0] + 2 * np.pi)
-    return bool(gaps.max() < np.pi)
-
-
-def _hull_area(points: Float[np.ndarray, "k 2"]) -> float:
-    try:
-        return float(ConvexHull(points).volume)
-    except QhullError:  # fewer than three points, or all on a line
-        return 0.0
-
-
-def _sum_visible_bending(
-    mesh: TriangleMesh, directions: Float[np.ndarray, "d 3"]
-) -> Float[np.ndarray, " d"]:
-    """Sum the bending that a viewer sees, for each direction towards a viewer.
-
-    The bending of an edge is its angle times its length, weighted by how far it faces the viewer.
-    """
-    points = scale_to_unit(mesh)[0]
-    vectors = area_vectors(points[mesh.faces])
-    normals = (
-        vectors / np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny)[:, None]
+    left = np.cross(upward, front)
+    towards, behind = (
+        np.array(VIEWS["front-left"]) @ [side * front, side * left, upward] for side in (1, -1)
     )
+    # The bending of an edge is its angle times its length, weighted by how far it faces the viewer.
+    normals = vectors / np.maximum(areas, tiny)[:, None]
     if np.einsum("ij,ij->", vectors, points[mesh.faces].mean(axis=1)) < 0:
         normals = -normals  # the faces look inward
     table = edge_table(mesh)
@@ -336,17 +288,32 @@ def _sum_visible_bending(
     one, two = normals[pairs].transpose(1, 0, 2)
     angles = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1, 1))
     begin, end = points[table.edges[edges]].transpose(1, 0, 2)
-    lengths = np.linalg.norm(end - begin, axis=1)
-    return (angles * lengths) @ np.maximum((one + two) @ directions.T, 0)
+    bending = angles * np.linalg.norm(end - begin, axis=1)
+    viewers = np.stack([towards, behind])
+    before, after = bending @ np.maximum((one + two) @ viewers.T, 0)
+    return (-front, behind) if before < LESS * after else (front, towards)
 
 
-def _facing(mesh: TriangleMesh) -> Float[np.ndarray, "3"] | None:
-    """Return the mean normal of an open surface that mostly faces one way."""
-    vectors = area_vectors(scale_to_unit(mesh)[0][mesh.faces])
-    mean = vectors.sum(axis=0) / max(
-        np.linalg.norm(vectors, axis=1).sum(), np.finfo(np.float64).tiny
-    )
-    return mean if np.linalg.norm(mean) > ONE_WAY else None
+def _upright_axis(mesh: TriangleMesh) -> Literal["y", "z"]:
+    """Return z if a shape would fall over along y and would stand on a much larger base along z."""
+    points = scale_to_unit(mesh)[0]
+    areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
+    weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
+    points = points - weights @ points[mesh.faces].mean(axis=1)
+    stands, sizes = [], []
+    for axis in (1, 2):
+        # Where the lowest points would touch the ground
+        height = points[:, axis] - points[:, axis].min()
+        lowest = height <= SOLE * np.ptp(points, axis=0).max()
+        base = np.delete(points, axis, axis=1)[lowest]
+        # What stands on points around its center does not fall over.
+        around = np.sort(np.arctan2(base[:, 1], base[:, 0]))
+        stands.append(np.diff(around, append=around[0] + 2 * np.pi).max() < np.pi)
+        try:
+            sizes.append(float(ConvexHull(base).volume))
+        except QhullError:  # fewer than three points, or all on a line
+            sizes.append(0.0)
+    return "z" if stands[1] and not stands[0] and sizes[1] > WIDER * sizes[0] else "y"
 
 
 def in_picture(mesh: TriangleMesh, camera: Camera) -> Float[np.ndarray, "n 3"]:
@@ -354,5 +321,5 @@ def in_picture(mesh: TriangleMesh, camera: Camera) -> Float[np.ndarray, "n 3"]:
     points = scale_to_unit(mesh)[0] @ camera.rotation.T
     low, high = points.min(axis=0), points.max(axis=0)
     span = max(float((high - low)[:2].max()), np.finfo(np.float64).tiny)
-    scale = camera.size * (1 - 2 * MARGIN) / span
+    scale = camera.size * (1 - 2 * FREE_BORDER) / span
     return (points - (low + high) / 2) * scale + [camera.size / 2, camera.size / 2, 0.0]

@@ -102,15 +102,10 @@ def figure_eigenfunctions(
     for axes, index in zip(grid.flat, chosen, strict=False):
         function = spectrum.eigenvectors[:, index]
         shown = function / np.abs(function).max()
-        show(
-            axes,
-            draw(
-                mesh,
-                camera,
-                vertex_colors=colors(scale(shown))[:, :3],
-                zero_set_of=_constant_as_one(shown),
-            ),
-        )
+        # A constant function is zero nowhere, whatever its rounding.
+        zero_set_of = shown if np.ptp(shown) > 1e-6 else np.ones_like(shown)
+        shades = map_colors(shown, scale, colors)
+        show(axes, draw(mesh, camera, vertex_colors=shades, zero_set_of=zero_set_of))
         number = spectrum.certificate.first + index
         axes.set_title(f"φ$_{{{number}}}$,  λ = {spectrum.eigenvalues[index]:.4g}")
     for axes in grid.flat[len(chosen) :]:
@@ -118,10 +113,6 @@ def figure_eigenfunctions(
     bar = figure.colorbar(ScalarMappable(scale, colors), ax=grid, shrink=0.7)
     bar.set_label("eigenfunction / its largest value (dark line: 0)")
     return figure
-
-
-def _constant_as_one(function: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    return function if np.ptp(function) > 1e-6 else np.ones_like(function)
 
 
 def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each choice of how
@@ -380,16 +371,8 @@ def mark(
     for number, vertex in enumerate(vertices.tolist()):
         x, y = drawing.places[vertex]
         seen = bool(drawing.visible[vertex])
-        face = "#d62728" if seen else "none"
-        axes.scatter(
-            [x],
-            [y],
-            s=DOT,
-            c=face,
-            edgecolors="black" if seen else "#7f7f7f",
-            linewidths=1.0,
-            zorder=3,
-        )
+        face, rim = ("#d62728", "black") if seen else ("none", "#7f7f7f")
+        axes.scatter([x], [y], s=DOT, c=face, edgecolors=rim, linewidths=1.0, zorder=3)
         if numbers and seen:
             axes.annotate(
                 str(number), (x, y), (5, 5), textcoords="offset points", fontsize=8, zorder=4

@@ -1,8 +1,7 @@
 """Figures of persistence: pairs of birth and death, and how maxima merge."""
 
 import numpy as np
-from jaxtyping import Float, Int
-from matplotlib.axes import Axes
+from jaxtyping import Int
 from matplotlib.colors import to_hex
 
 from eigenshape._arguments import require_type
@@ -19,7 +18,7 @@ KINDS = {  # color, marker and text of each kind of pair
     "loops": ("#9467bd", "o", "loops that nothing fills"),
 }
 HEADROOM = 1.12  # height of stems that never merge, in units of the highest merge
-QUIET = "#b0b0b0"
+GUIDE = "#b0b0b0"
 
 
 def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> Figure:
@@ -61,21 +60,17 @@ def figure_diagram(diagram: PersistenceDiagram, *, label: str = "function") -> F
             pairs.births, pairs.deaths, s=34, marker=marker, c=color, alpha=0.85, zorder=3
         )
         points.set(edgecolor="white", linewidth=0.4, label=f"{text} ({len(pairs.births):,})")
-    low, high = _limits(diagram)
-    axes.plot([low, high], [low, high], color=QUIET, lw=1, zorder=1)
+    # The range of the function, widened: no pair leaves that of its component.
+    low, high = float(diagram.components.births.min()), float(diagram.components.deaths.max())
+    margin = 0.05 * (high - low) or 0.5 * max(abs(high), np.finfo(np.float64).tiny)
+    low, high = low - margin, high + margin
+    axes.plot([low, high], [low, high], color=GUIDE, lw=1, zorder=1)
     axes.set(xlim=(low, high), ylim=(low, high), aspect="equal")
     axes.set_xlabel(f"birth: {label}")
     axes.set_ylabel(f"death: {label}")
     axes.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     axes.spines[["top", "right"]].set_visible(False)
     return figure
-
-
-def _limits(diagram: PersistenceDiagram) -> tuple[float, float]:
-    """Return the range of the function, widened: no pair leaves that of its component."""
-    low, high = float(diagram.components.births.min()), float(diagram.components.deaths.max())
-    margin = 0.05 * (high - low) or 0.5 * max(abs(high), np.finfo(np.float64).tiny)
-    return low - margin, high + margin
 
 
 def figure_merge_tree(
@@ -123,30 +118,30 @@ def figure_merge_tree(
     figure = Figure(figsize=(max(4.5, 2.2 + 0.24 * shown), 4.6), layout="constrained")
     axes = figure.subplots()
     place = leaf_places(into)
-    _draw_stems(
-        axes,
-        place,
-        into,
-        np.minimum(tree.persistence[:shown], top),
-        _colors(tree, shown, persistence),
-    )
+    height = np.minimum(tree.persistence[:shown], top)
+    # A cut leaves regions in colors, and the others in gray.
+    left = tree.persistence[:shown] >= (persistence or 0.0)
+    colors = palette(np.where(left, np.cumsum(left) - 1, -1))
+    axes.vlines(place, 0, height, colors=[to_hex(color) for color in colors], lw=2.2, zorder=3)
+    merging = into >= 0
+    for number in np.flatnonzero(~merging):  # an arrow: upward for ever
+        x, y, color = place[number], height[number], colors[number]
+        axes.plot(x, y, "^", color=color, markersize=8, clip_on=False, zorder=5)
+    axes.hlines(height[merging], place[into[merging]], place[merging], colors=GUIDE, lw=1, zorder=2)
     axes.set_xticks(place, [str(number) for number in range(shown)], fontsize=7)
     axes.set(ylim=(0, top), xlim=(-0.8, shown - 0.2))
-    axes.set_xlabel("number of the maximum, 0 the most persistent" + _count_left_out(tree, shown))
+    more = len(tree.maxima) - shown
+    rest = f" ({more:,} more merge by {tree.persistence[shown - 1]:.3g})" if more else ""
+    axes.set_xlabel("number of the maximum, 0 the most persistent" + rest)
     axes.set_ylabel(f"persistence: {label}")
     if persistence is not None:
-        left = int(np.count_nonzero(tree.persistence >= persistence))
+        n_left = int(np.count_nonzero(tree.persistence >= persistence))
         axes.axhline(min(persistence, top), color="black", lw=1, ls="--", zorder=4)
         axes.set_title(
-            f"cut at {persistence:.4g}: {left:,} region{'s' * (left != 1)} left", fontsize=10
+            f"cut at {persistence:.4g}: {n_left:,} region{'s' * (n_left != 1)} left", fontsize=10
         )
     axes.spines[["top", "right"]].set_visible(False)
     return figure
-
-
-def _count_left_out(tree: Tree, shown: int) -> str:
-    more = len(tree.maxima) - shown
-    return f" ({more:,} more merge by {tree.persistence[shown - 1]:.3g})" if more else ""
 
 
 def leaf_places(into: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
@@ -163,31 +158,3 @@ def leaf_places(into: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
         order.append(number)
         waiting.extend(children.get(number, []))
     return np.argsort(order)
-
-
-def _colors(tree: Tree, shown: int, persistence: float | None) -> Float[np.ndarray, "m 3"]:
-    """Return the color of each region that a cut leaves, and gray for the others."""
-    left = tree.persistence[:shown] >= (persistence or 0.0)
-    return palette(np.where(left, np.cumsum(left) - 1, -1))
-
-
-def _draw_stems(
-    axes: Axes,
-    place: Int[np.ndarray, " m"],
-    into: Int[np.ndarray, " m"],
-    height: Float[np.ndarray, " m"],
-    colors: Float[np.ndarray, "m 3"],
-) -> None:
-    axes.vlines(place, 0, height, colors=[to_hex(color) for color in colors], lw=2.2, zorder=3)
-    merging = into >= 0
-    for number in np.flatnonzero(~merging):  # an arrow: upward for ever
-        axes.plot(
-            place[number],
-            height[number],
-            "^",
-            color=colors[number],
-            markersize=8,
-            clip_on=False,
-            zorder=5,
-        )
-    axes.hlines(height[merging], place[into[merging]], place[merging], colors=QUIET, lw=1, zorder=2)

@@ -13,7 +13,6 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import mean_normals
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_edges
 from eigenshape.plot.camera import Camera, in_picture
 from eigenshape.scans.raster import Raster, rasterize
@@ -108,117 +107,73 @@ def draw(
     fine = Camera(camera.rotation, camera.size * FINER)
     points = in_picture(mesh, fine)
     raster = rasterize(points, mesh.faces, fine.size, fine.size)
-    colors = _surface_colors(mesh, raster, vertex_colors, face_colors)
-    shaded = colors * _brightness(mesh, fine, raster)[..., None]
-    ink = _edge_ink(mesh, points, raster)
-    if face_colors is not None:
-        ink |= _changes(_pick(face_colors, raster).sum(axis=2), raster)
-    if zero_set_of is not None:
-        ink |= _changes(np.sign(_blend(zero_set_of[:, None], mesh, raster)[..., 0]), raster)
     seen = raster.face >= 0
-    shaded = np.where((_thicken(ink) & seen)[..., None], INK, shaded)
-    image = np.concatenate([np.clip(shaded, 0, 1), seen[..., None].astype(np.float64)], axis=2)
-    return Drawing(_shrunk(image), points[:, :2] / FINER, _visible(points, raster))
 
+    def blend(values: Float[np.ndarray, "n c"]) -> Float[np.ndarray, "h w c"]:
+        return np.einsum("hwk,hwkc->hwc", raster.weights, values[mesh.faces[raster.face]])
 
-def _surface_colors(
-    mesh: TriangleMesh,
-    raster: Raster,
-    vertex_colors: Float[np.ndarray, "n 3"] | None,
-    face_colors: Float[np.ndarray, "f 3"] | None,
-) -> Float[np.ndarray, "h w 3"]:
-    if face_colors is not None:
-        return _pick(face_colors, raster)
+    colors = np.full((*raster.face.shape, 3), 0.78)
     if vertex_colors is not None:
-        return _blend(vertex_colors, mesh, raster)
-    return np.full((*raster.face.shape, 3), 0.78)
-
-
-def _pick(values: Float[np.ndarray, "f c"], raster: Raster) -> Float[np.ndarray, "h w c"]:
-    return values[raster.face]
-
-
-def _blend(
-    values: Float[np.ndarray, "n c"], mesh: TriangleMesh, raster: Raster
-) -> Float[np.ndarray, "h w c"]:
-    return np.einsum("hwk,hwkc->hwc", raster.weights, values[mesh.faces[raster.face]])
-
-
-def _brightness(mesh: TriangleMesh, camera: Camera, raster: Raster) -> Float[np.ndarray, "h w"]:
-    normals = _blend(mean_normals(orient_consistently(mesh)) @ camera.rotation.T, mesh, raster)
+        colors = blend(vertex_colors)
+    if face_colors is not None:
+        colors = face_colors[raster.face]
+    normals = blend(mean_normals(orient_consistently(mesh)) @ fine.rotation.T)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
-    normals = np.where(
-        normals[..., 2:] < 0, -normals, normals
-    )  # both sides of an open surface are lit
-    light = LIGHT / np.linalg.norm(LIGHT)
-    return np.asarray(AMBIENT + (1.08 - AMBIENT) * np.clip(normals @ light, 0, 1))
+    # Both sides of an open surface are lit.
+    normals = np.where(normals[..., 2:] < 0, -normals, normals)
+    light = np.clip(normals @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1)
+    shaded = colors * (AMBIENT + (1.08 - AMBIENT) * light)[..., None]
 
-
-def _changes(values: Float[np.ndarray, "h w"], raster: Raster) -> Bool[np.ndarray, "h w"]:
-    """Mark pixels whose value differs from that of the neighbor to the right or below on the same surface."""
-    ink = np.zeros(values.shape, dtype=bool)
-    near = 0.01 * values.shape[0]
-    for axis in (0, 1):
-        here, there = _neighbors(values, axis)
-        with np.errstate(invalid="ignore"):
-            depth_here, depth_there = _neighbors(raster.depth, axis)
-            joined = np.abs(depth_here - depth_there) < near
-        window = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
-        ink[window] |= (here != there) & joined
-    return ink
-
-
-def _neighbors(values: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    n = values.shape[axis]
-    return values.take(np.arange(n - 1), axis), values.take(np.arange(1, n), axis)
-
-
-def _edge_ink(
-    mesh: TriangleMesh, points: Float[np.ndarray, "n 3"], raster: Raster
-) -> Bool[np.ndarray, "h w"]:
-    """Mark the pixels under boundary edges that nothing hides."""
+    # Lines: boundary edges that nothing hides, changes of color, and the zero set
     ink = np.zeros(raster.face.shape, dtype=bool)
     edges = boundary_edges(mesh)
-    if not len(edges):
-        return ink
-    begin, end = points[edges[:, 0]], points[edges[:, 1]]
-    steps = np.arange(0, 1, 1 / (2 + int(np.abs(end - begin)[:, :2].max())))
-    along = (begin[:, None] + steps[:, None] * (end - begin)[:, None]).reshape(-1, 3)
-    column, row = _pixels(along, ink.shape)
-    shown = along[:, 2] >= raster.depth[row, column] - BEHIND * len(ink)
-    ink[row[shown], column[shown]] = True
-    return ink
-
-
-def _pixels(
-    points: Float[np.ndarray, "k 3"], shape: tuple[int, ...]
-) -> tuple[np.ndarray, np.ndarray]:
-    column, row = np.clip(points[:, :2].astype(np.int64), 0, [shape[1] - 1, shape[0] - 1]).T
-    return column, row
-
-
-def _thicken(ink: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
+    if len(edges):
+        begin, end = points[edges[:, 0]], points[edges[:, 1]]
+        steps = np.arange(0, 1, 1 / (2 + int(np.abs(end - begin)[:, :2].max())))
+        along = (begin[:, None] + steps[:, None] * (end - begin)[:, None]).reshape(-1, 3)
+        column, row, shown = _locate(along, raster)
+        ink[row[shown], column[shown]] = True
+    if face_colors is not None:
+        ink |= _changes(colors.sum(axis=2), raster)
+    if zero_set_of is not None:
+        ink |= _changes(np.sign(blend(zero_set_of[:, None])[..., 0]), raster)
     radius = int(np.ceil(LINE * FINER / 2 - 0.5))
     thick = ink.copy()
     for down in range(-radius, radius + 1):
         for right in range(-radius, radius + 1):
             if down**2 + right**2 <= radius**2:
                 thick |= np.roll(ink, (down, right), axis=(0, 1))
-    return thick
+    shaded = np.clip(np.where((thick & seen)[..., None], INK, shaded), 0, 1)
 
-
-def _visible(points: Float[np.ndarray, "n 3"], raster: Raster) -> Bool[np.ndarray, " n"]:
-    column, row = _pixels(points, raster.depth.shape)
-    return points[:, 2] >= raster.depth[row, column] - BEHIND * len(raster.depth)
-
-
-def _shrunk(image: Image) -> Float[np.ndarray, "rows columns 4"]:
-    h, w = image.shape[0] // FINER, image.shape[1] // FINER
-    blocks = image.reshape(h, FINER, w, FINER, 4)
+    # Of the pixels that become one, those that show the shape give its color.
+    blocks = np.concatenate([shaded, seen[..., None].astype(np.float64)], axis=2)
+    blocks = blocks.reshape(camera.size, FINER, camera.size, FINER, 4)
     opacity = blocks[..., 3:]
     weight = np.maximum(opacity.sum(axis=(1, 3)), 1e-12)
     color = (blocks[..., :3] * opacity).sum(axis=(1, 3)) / weight
-    return np.concatenate([color, opacity.mean(axis=(1, 3))], axis=2)
+    image = np.concatenate([color, opacity.mean(axis=(1, 3))], axis=2)
+    return Drawing(image, points[:, :2] / FINER, _locate(points, raster)[2])
+
+
+def _changes(values: Float[np.ndarray, "h w"], raster: Raster) -> Bool[np.ndarray, "h w"]:
+    """Mark pixels whose value differs from that of the neighbor to the right or below on the same surface."""
+    ink = np.zeros(values.shape, dtype=bool)
+    near = 0.01 * values.shape[0]
+    # Transposed, the neighbor to the right is the one below.
+    for marks, rows, depth in ((ink, values, raster.depth), (ink.T, values.T, raster.depth.T)):
+        with np.errstate(invalid="ignore"):
+            joined = np.abs(depth[:-1] - depth[1:]) < near
+        marks[:-1] |= (rows[:-1] != rows[1:]) & joined
+    return ink
+
+
+def _locate(
+    points: Float[np.ndarray, "k 3"], raster: Raster
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"], Bool[np.ndarray, " k"]]:
+    """Return the column and the row of the pixel of each point, and whether nothing hides it."""
+    h, w = raster.depth.shape
+    column, row = np.clip(points[:, :2].astype(np.int64), 0, [w - 1, h - 1]).T
+    return column, row, points[:, 2] >= raster.depth[row, column] - BEHIND * h
 
 
 def palette(labels: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k 3"]:

@@ -1,26 +1,33 @@
-"""A contact sheet: a query and the shapes that answer it."""
+"""Several shapes in one picture: a query and what answers it, labels copied, poses side by side."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from jaxtyping import Int
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, vertex_values
+from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.plot.camera import Up, View, aim_camera
+from eigenshape.plot.camera import Camera, Up, View, aim_camera, choose_camera
 from eigenshape.plot.fields import PANEL, mark, show
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw, palette
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 from eigenshape.retrieval.labels.transfer import LabelTransfer
 
-N_COLUMNS = 3  # matches in a row at most
-QUIET = "#808080"
+POSES_IN_A_ROW = 4  # poses in a row
+MOVED = ("#c9c9c9", "#f3c27b", "#d9541e")  # colors of shares 0, 1/2 and 1
+MATCHES_IN_A_ROW = 3  # matches in a row at most
+NO_MESH = "#808080"
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +120,7 @@ def figure_contact_sheet(
     """
     require_type(query, Panel, "query")
     require_each(matches, Panel, "matches")
-    n_columns = min(max(len(matches), 1), N_COLUMNS)
+    n_columns = min(max(len(matches), 1), MATCHES_IN_A_ROW)
     n_rows = max(-(-len(matches) // n_columns), 1)
     size = PANEL * (1.0 if n_rows > 1 else 0.9)
     figure = Figure(figsize=(size * (n_columns + 1.5), size * n_rows + 0.8), layout="constrained")
@@ -139,7 +146,7 @@ def _fill(axes: Axes, panel: Panel, view: View, up: Up) -> None:
             "no mesh to draw",
             ha="center",
             va="center",
-            color=QUIET,
+            color=NO_MESH,
             transform=axes.transAxes,
         )
         axes.set_axis_off()
@@ -221,4 +228,80 @@ def figure_label_transfer(
             bbox=paper,
         )
     right.set_title("labels copied, with their confidence (hollow: on the far side)", fontsize=10)
+    return figure
+
+
+def figure_poses(
+    poses: Mapping[str, MeshLike],
+    shares: ArrayLike | None = None,
+    *,
+    camera: Camera | None = None,
+    view: View = "auto",
+    up: Up = "auto",
+) -> Figure:
+    """Draw poses of one shape side by side, in the same view and at the same scale.
+
+    Parameters
+    ----------
+    poses : mapping of titles to MeshLike
+        Poses of one mesh, or of meshes of one shape.
+    shares : (n,) float, optional
+        How much of a motion each vertex follows, from 0 to 1, such as `Binding.shares`. It sets the
+        colors of all poses, which must then have n vertices.
+    camera : Camera, optional
+        Instead of `view` and `up`.
+    view : str or (3,) float
+        The side from which the first pose is drawn, as in `aim_camera`; the others are drawn alike.
+    up : str or (3,) float
+        The upward direction, as in `aim_camera`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is no pose, or `shares` does not hold one finite number per vertex of each.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(1)
+    >>> egg = es.TriangleMesh(ball.vertices * [1, 1.5, 1], ball.faces)
+    >>> figure = es.plot.figure_poses({"ball": ball, "egg": egg})
+    >>> [axes.get_title() for axes in figure.axes]
+    ['ball', 'egg']
+    """
+    require_type(poses, Mapping, "poses")
+    if not poses:
+        raise InvalidParameterError("poses must hold at least one mesh; it is empty.")
+    meshes = {title: as_mesh(mesh, title) for title, mesh in poses.items()}
+    first = next(iter(meshes.values()))
+    camera = choose_camera(first, camera, view, up)
+    columns = min(len(poses), POSES_IN_A_ROW)
+    rows = -(-len(poses) // columns)
+    size = 1.5 * PANEL
+    figure = Figure(figsize=(size * columns + 0.8, (size + 0.3) * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False)
+    # The corners of the box that holds all poses, along the axes of the camera
+    seen = np.vstack([mesh.vertices @ camera.rotation.T for mesh in meshes.values()])
+    sides = zip(seen.min(axis=0), seen.max(axis=0), strict=True)
+    corners = np.array(list(product(*sides))) @ camera.rotation
+    # a new map for each call, because a map fills its table at first use and threads may share it
+    colormap = LinearSegmentedColormap.from_list("moved", MOVED)
+    for axes in grid.flat:
+        axes.set_axis_off()
+    for axes, (title, mesh) in zip(grid.flat, meshes.items(), strict=False):
+        n = mesh.n_vertices
+        values = np.zeros(n) if shares is None else vertex_values(shares, "shares", n)
+        colors = np.asarray(colormap(np.append(values, np.zeros(len(corners)))))[:, :3]
+        framed = TriangleMesh(np.vstack([mesh.vertices, corners]), mesh.faces)
+        show(axes, draw(framed, camera, vertex_colors=colors))
+        axes.set_title(title, fontsize=10)
+    if shares is not None:
+        scale = ScalarMappable(Normalize(0, 1), colormap)
+        figure.colorbar(scale, ax=grid.ravel().tolist(), shrink=0.6, pad=0.01).set_label(
+            "share of the motion"
+        )
     return figure

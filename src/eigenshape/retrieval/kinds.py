@@ -265,10 +265,7 @@ def recipe_to_text(recipe: AnyRecipe) -> tuple[str, bytes | None]:
 def recipe_from_text(text: str, codebook: bytes | None) -> AnyRecipe:
     """Return the recipe of `recipe_to_text`.
 
-    Raises
-    ------
-    ValueError, TypeError
-        If there is no such recipe.
+    Raise ValueError or TypeError if there is no such recipe.
     """
     fields = json.loads(text)
     name = fields.pop("kind")

@@ -104,6 +104,8 @@ def triangulate_frame(points: Float[np.ndarray, "h w 3"]) -> RepairedMesh[Triang
     Each vertex is a measured point. The width of a pixel is measured: the median angle between the
     rays of neighboring pixels.
 
+    Raise InvalidShapeError if no three neighboring pixels see one surface.
+
     Parameters
     ----------
     points : (h, w, 3) float
@@ -114,11 +116,6 @@ def triangulate_frame(points: Float[np.ndarray, "h w 3"]) -> RepairedMesh[Triang
     RepairedMesh
         The surface, which faces the camera; the pixel of each vertex, numbered row by row; and a
         report of one sentence.
-
-    Raises
-    ------
-    InvalidShapeError
-        If no three neighboring pixels see one surface.
     """
     n_rows, n_columns, _ = points.shape
     seen = np.isfinite(points).all(axis=2) & points.any(axis=2)

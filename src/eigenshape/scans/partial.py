@@ -164,10 +164,7 @@ def view_of(mesh: TriangleMesh, number: int) -> MeshPart:
 def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:
     """Scale a direction to length 1, or draw a random one.
 
-    Raises
-    ------
-    InvalidParameterError
-        If it is zero or not finite.
+    Raise InvalidParameterError if it is zero or not finite.
     """
     vector = (
         view.standard_normal(3)

@@ -52,6 +52,9 @@ def reconstruct_surface(
     reconstruction from unorganized points", 1992). Parts of the level set without points are
     dropped, so the scan of one side stays open.
 
+    Raise InvalidShapeError if there are too few points, more than a tenth of them is not near the
+    surface, as where limbs are thinner than the distance between points, or they lie on lines.
+
     Parameters
     ----------
     cloud : PointCloud
@@ -63,12 +66,6 @@ def reconstruct_surface(
     -------
     RepairedMesh
         The surface, the nearest point of each vertex, and a report of one sentence.
-
-    Raises
-    ------
-    InvalidShapeError
-        If there are too few points, more than a tenth of them is not near the surface, as where
-        limbs are thinner than the distance between points, or they lie on lines.
     """
     if cloud.n_points < FEWEST_POINTS or cloud.points.shape[1] != 3:
         raise InvalidShapeError(

@@ -40,11 +40,8 @@ def isosurface(
     sheets that are apart. So the result is checked, and if it is not a manifold, another offset of
     the grid is tried.
 
-    Raises
-    ------
-    InvalidShapeError
-        If no offset of the grid gives a closed connected manifold, because the surface has details
-        finer than the grid.
+    Raise InvalidShapeError if no offset of the grid gives a closed connected manifold, because the
+    surface has details finer than the grid.
     """
     for offset in OFFSETS % 1:
         points, quads = _nets(field, low - spacing * (1 + offset), high + 2 * spacing, spacing)

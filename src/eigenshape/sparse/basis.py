@@ -7,7 +7,7 @@ from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.sparse.basis_loops import CHUNK, add_products, subtract_combination
 from eigenshape.sparse.lane_loops import LANES
 
-ROWS = 512  # rows of a combination that are computed at once
+COMBINED_ROWS = 512  # rows of a combination that are computed at once
 # Multiplications that are worth a thread: below, starting it costs more than it saves.
 FEWEST_MULTIPLICATIONS = 1_000_000
 
@@ -48,14 +48,14 @@ def combine_columns(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np
     result = np.empty((n, weights.shape[1]))
 
     def fill_rows(share: tuple[int, int]) -> None:
-        flat = np.empty((ROWS, slots, LANES))
-        for start in range(*share, ROWS):
-            count = min(ROWS, share[1] - start)
+        flat = np.empty((COMBINED_ROWS, slots, LANES))
+        for start in range(*share, COMBINED_ROWS):
+            count = min(COMBINED_ROWS, share[1] - start)
             flat[:count] = space[:, start : start + count].transpose(1, 0, 2)
             rows = flat[:count].reshape(count, slots * LANES)
             np.matmul(rows, weights, out=result[start : start + count])
 
-    map_in_threads(fill_rows, _shares(n, ROWS, space.size * weights.shape[1]))
+    map_in_threads(fill_rows, _shares(n, COMBINED_ROWS, space.size * weights.shape[1]))
     return result
 
 

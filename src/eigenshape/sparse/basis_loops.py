@@ -1,4 +1,4 @@
-"""Compiled loops of `basis`: products of tall blocks whose columns are packed by eight."""
+"""Compiled loops of products with tall blocks whose columns are packed by eight."""
 
 from typing import no_type_check
 
@@ -10,6 +10,7 @@ from eigenshape.sparse.lane_loops import (
     fetch_row,
     subtract_four_sums,
     subtract_sum,
+    write_row_product,
 )
 
 CHUNK = 4096  # rows of a block that take a quarter of the second-level cache
@@ -68,3 +69,19 @@ def subtract_combination(space, parts, columns, begin, end):
                 for group in range(groups):
                     given, to = (group * slots + slot) * LANES, group * n + row
                     subtract_sum(space, place * LANES, 1, 0, parts, given, LANES, columns, to)
+
+
+@njit
+@no_type_check
+def multiply_lanes(matrix, given, before, factor, share, begin, end, out):
+    """Fill rows begin to end - 1 of `out` with factor A given - share before.
+
+    The matrix A is given by int64 pointers, int32 indices and entries. The columns have shape (n,
+    LANES); `out` may be `before`.
+    """
+    pointers, indices, entries = matrix
+    row = given[:1].copy()
+    for i in range(begin, end):
+        write_row_product(entries, indices, pointers[i], pointers[i + 1], given, row, 0)
+        for lane in range(LANES):
+            out[i, lane] = factor * row[0, lane] - share * before[i, lane]

@@ -77,25 +77,52 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     n = pattern.shape[0]
     indptr, indices = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
     order = dissect(indptr, indices)
-    parent = _parents(indptr, indices, order)
+    parent = _unknown(n)  # of each column of the factor; -1 at a root
+    symbolic.find_parents(indptr, indices, order, _inverse(order), parent, _unknown(n))
+
     # Renumber the columns by a postorder, so that supernodes are runs of columns.
     post = np.empty(n, dtype=np.int64)
     symbolic.postorder(parent, _unknown(n), _unknown(n), np.empty_like(post), post)
     order = order[post]
     parent = np.where(parent[post] >= 0, _inverse(post)[parent[post]], -1)
     place = _inverse(order)
-    first, heights = _supernodes(indptr, indices, order, place, parent)
-    size = len(heights)
-    begins = np.concatenate([[0], np.cumsum(heights)])
+
+    # In a supernode each column is the parent of the one before, with the same entries below. Each
+    # is a front, or several are joined to one.
+    counts = np.ones(n, dtype=np.int64)
+    symbolic.count_entries(indptr, indices, order, place, parent, _unknown(n), counts)
+    continues = (parent[:-1] == np.arange(1, n)) & (counts[:-1] == counts[1:] + 1)
+    first = np.concatenate([[0], np.flatnonzero(~continues) + 1])
+    heights, widths = counts[first], np.diff(first, append=n)
+    keep = np.ones(len(first), dtype=np.bool_)
+    symbolic.join_runs(parent, first, heights, widths, np.zeros(len(first)), keep)
+    first, heights = np.append(first[keep], n), heights[keep]
+    widths, size = np.diff(first), len(heights)
+
+    # The tree of the fronts, and their rows.
     front = np.arange(size)
-    above = np.repeat(front, np.diff(first))[parent[first[1:] - 1]]
+    above = np.repeat(front, widths)[parent[first[1:] - 1]]
     above[parent[first[1:] - 1] < 0] = -1
+    begins = np.concatenate([[0], np.cumsum(heights)])
     rows = np.empty(begins[-1], dtype=np.int64)
     scratch = _unknown(size), _unknown(size), _unknown(n)
     symbolic.find_front_rows(indptr, indices, order, place, first, begins, above, rows, *scratch)
     rows = np.sort(np.repeat(front * n, heights) + rows) % n  # ascending in each front
-    lower_ptr, lower_rows, source = _lower(indptr, indices, place)
-    places = _panel_places(np.diff(first), heights)
+
+    last_child, older = _unknown(size), _unknown(size)
+    by_parent = np.argsort(above, kind="stable")
+    parents = above[by_parent]
+    brothers = (parents[1:] == parents[:-1]) & (parents[1:] >= 0)
+    older[by_parent[1:][brothers]] = by_parent[:-1][brothers]
+    last_child[parents[parents >= 0]] = by_parent[parents >= 0]  # the last of several stays
+
+    # The lower triangle by columns, in the order of elimination.
+    columns, lower_rows = np.repeat(place, np.diff(indptr)), place[indices]
+    source = np.flatnonzero(lower_rows >= columns)
+    source = source[np.argsort(columns[source], kind="stable")]
+    lower_ptr = np.concatenate([[0], np.cumsum(np.bincount(columns[source], minlength=n))])
+
+    places = _panel_places(widths, heights)
     tasks = divide_fronts(first, begins, rows, above, places)
     return Elimination(
         order=order,
@@ -103,14 +130,15 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
         begins=begins,
         rows=rows,
         above=above,
-        **_children(above),
+        last_child=last_child,
+        older=older,
         places=places,
         tasks=tasks,
-        stacks=_stacks(heights - np.diff(first), above, tasks),
+        stacks=_stacks(heights - widths, above, tasks),
         tallest=int(heights.max()),
-        lengths=_count_roundings(np.diff(first), heights, above),
+        lengths=_count_roundings(widths, heights, above),
         lower_ptr=lower_ptr,
-        lower_rows=lower_rows,
+        lower_rows=lower_rows[source],
         source=source,
     )
 
@@ -126,29 +154,6 @@ def _inverse(order: Indices) -> Indices:
     return place
 
 
-def _parents(indptr: Indices, indices: Indices, order: Indices) -> Indices:
-    """Return the parent of each column of the factor; -1 at a root."""
-    parent = _unknown(len(order))
-    symbolic.find_parents(indptr, indices, order, _inverse(order), parent, _unknown(len(order)))
-    return parent
-
-
-def _supernodes(
-    indptr: Indices, indices: Indices, order: Indices, place: Indices, parent: Indices
-) -> tuple[Indices, Indices]:
-    """Return the first column of each supernode, with n at the end, and the rows of its front."""
-    n = len(order)
-    counts = np.ones(n, dtype=np.int64)
-    symbolic.count_entries(indptr, indices, order, place, parent, _unknown(n), counts)
-    # In a supernode each column is the parent of the one before, with the same entries below.
-    continues = (parent[:-1] == np.arange(1, n)) & (counts[:-1] == counts[1:] + 1)
-    first = np.concatenate([[0], np.flatnonzero(~continues) + 1])
-    heights, widths = counts[first], np.diff(first, append=n)
-    keep = np.ones(len(first), dtype=np.bool_)
-    symbolic.join_runs(parent, first, heights, widths, np.zeros(len(first)), keep)
-    return np.append(first[keep], n), heights[keep]
-
-
 def _panel_places(widths: Indices, heights: Indices) -> Indices:
     """Return where the panels of each front begin in the array of all entries.
 
@@ -160,17 +165,6 @@ def _panel_places(widths: Indices, heights: Indices) -> Indices:
     entries = above * heights - fronts.WIDE**2 * full * (full - 1) // 2
     entries += (heights - above) * (widths - above)
     return np.concatenate([[0], np.cumsum(entries)])
-
-
-def _children(above: Indices) -> dict[str, Indices]:
-    """Return the last child of each front, and the brother before it; -1 where there is none."""
-    last_child, older = _unknown(len(above)), _unknown(len(above))
-    by_parent = np.argsort(above, kind="stable")
-    parents = above[by_parent]
-    brothers = (parents[1:] == parents[:-1]) & (parents[1:] >= 0)
-    older[by_parent[1:][brothers]] = by_parent[:-1][brothers]
-    last_child[parents[parents >= 0]] = by_parent[parents >= 0]  # the last of several stays
-    return {"last_child": last_child, "older": older}
 
 
 def _stacks(counts: Indices, above: Indices, tasks: Tasks) -> Indices:
@@ -206,11 +200,3 @@ def _count_roundings(widths: Indices, heights: Indices, above: Indices) -> Indic
         if parent >= 0:
             longest[parent] = max(longest[parent], longest[s])
     return np.array(longest)
-
-
-def _lower(indptr: Indices, indices: Indices, place: Indices) -> tuple[Indices, Indices, Indices]:
-    columns, rows = np.repeat(place, np.diff(indptr)), place[indices]
-    kept = np.flatnonzero(rows >= columns)
-    kept = kept[np.argsort(columns[kept], kind="stable")]
-    pointers = np.concatenate([[0], np.cumsum(np.bincount(columns[kept], minlength=len(place)))])
-    return pointers, rows[kept], kept

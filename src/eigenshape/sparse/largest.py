@@ -9,7 +9,7 @@ from jaxtyping import Float
 Column = Float[np.ndarray, " n"]
 
 # Steps of Lanczos: enough for a bound that is a few per cent too high.
-STEPS = 12
+LANCZOS_STEPS = 12
 # Length of a residual, beside columns of length 1, below which the space is invariant.
 INVARIANT = 1e-10
 
@@ -23,7 +23,7 @@ def largest_ritz_value(multiply: Callable[[Column], Column], n: int) -> tuple[fl
     column = np.random.default_rng(0).standard_normal(n)
     column /= np.linalg.norm(column)
     before, rest, diagonal, beside = np.zeros_like(column), 0.0, [], []
-    for _ in range(STEPS):
+    for _ in range(LANCZOS_STEPS):
         image = multiply(column) - rest * before
         diagonal.append(float(column @ image))
         image -= diagonal[-1] * column

@@ -200,37 +200,32 @@ class _Making:
 
     def factor_task(self, task: int) -> bool:
         """Factor the fronts of a task; return whether all pivots are usable."""
-        with self.rooms.lend() as room:
-            return self._factor_in(room, task)
-
-    def _factor_in(self, room: Room, task: int) -> bool:
         e = self.elimination
         begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
-        tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
-        given = tree, self.lower, self.panels, self.pivots, self.updates, room, begin
+        # Tall fronts, if there are threads to share them.
+        shared: list[int] = []
+        if free_threads() > 1:
+            heights = np.diff(e.begins[begin : end + 1])
+            shared = (begin + np.flatnonzero(heights >= SHARED_HEIGHT)).tolist()
+        with self.rooms.lend() as room:
+            tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
+            given = tree, self.lower, self.panels, self.pivots, self.updates, room, begin
 
-        def run(low: int, high: int, top: int, stage: int = fronts.WHOLE) -> int:
-            return int(fronts.factor_fronts(*given, low, high, top, stage, addresses()))
+            def run(low: int, high: int, top: int, stage: int = fronts.WHOLE) -> int:
+                return int(fronts.factor_fronts(*given, low, high, top, stage, addresses()))
 
-        low, top = begin, int(e.stacks[task])
-        for tall in [*self._shared_fronts(begin, end), end]:
-            top = run(low, tall, top)
-            if top < 0:
-                return False
-            if tall < end:
-                top = run(tall, tall + 1, top, fronts.GATHER)
-                if not self._eliminate_together(tall, room):
+            low, top = begin, int(e.stacks[task])
+            for tall in [*shared, end]:
+                top = run(low, tall, top)
+                if top < 0:
                     return False
-                top = run(tall, tall + 1, top, fronts.KEEP)
-            low = tall + 1
+                if tall < end:
+                    top = run(tall, tall + 1, top, fronts.GATHER)
+                    if not self._eliminate_together(tall, room):
+                        return False
+                    top = run(tall, tall + 1, top, fronts.KEEP)
+                low = tall + 1
         return True
-
-    def _shared_fronts(self, begin: int, end: int) -> list[int]:
-        """Return the tall fronts of a range, if there are threads to share them."""
-        if free_threads() == 1:
-            return []
-        heights = np.diff(self.elimination.begins[begin : end + 1])
-        return (begin + np.flatnonzero(heights >= SHARED_HEIGHT)).tolist()
 
     def _eliminate_together(self, s: int, room: Room) -> bool:
         """Eliminate the columns of a front whose rows several threads update."""

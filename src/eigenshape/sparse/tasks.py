@@ -62,17 +62,28 @@ def divide_fronts(
     """Divide the fronts of an elimination into tasks; the arguments are its attributes."""
     n = int(first[-1])
     starts = _task_starts(above, np.diff(places).astype(float))
-    task = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    n_tasks = len(starts) - 1
+    task = np.repeat(np.arange(n_tasks), np.diff(starts))
+
+    # Rows of later tasks become rows of the task's own, which these fetch.
     of_entry = np.repeat(task, np.diff(begins))
     later = np.flatnonzero(rows >= first[starts[1:]][of_entry])
     keys, inverse = np.unique(of_entry[later] * n + rows[later], return_inverse=True)
     own = rows.copy()
     own[later] = n + inverse
-    own_rows = n + np.searchsorted(keys, n * np.arange(len(starts)))
+    own_rows = n + np.searchsorted(keys, n * np.arange(n_tasks + 1))
     eliminated_by = np.repeat(task, np.diff(first))[keys % n]
     order = np.argsort(eliminated_by, kind="stable")
-    fetches = np.searchsorted(eliminated_by[order], np.arange(len(starts)))
-    rounds = _rounds(task, above)
+    fetches = np.searchsorted(eliminated_by[order], np.arange(n_tasks + 1))
+
+    # All that a task needs is done in rounds before.
+    has_parent = np.flatnonzero(above >= 0)
+    needed, needing = task[has_parent], task[above[has_parent]]
+    edges = np.unique(np.stack([needed, needing])[:, needed != needing], axis=1)
+    number = np.zeros(n_tasks, dtype=np.int64)
+    for one, other in edges.T.tolist():  # sorted by the task that is needed, which comes before
+        number[other] = max(number[other], number[one] + 1)
+    rounds = tuple(np.flatnonzero(number == each) for each in range(number.max() + 1))
     return Tasks(starts, rounds, own, own_rows, fetches, n + order, keys[order] % n)
 
 
@@ -85,14 +96,21 @@ def _task_starts(above: Indices, entries: Float[np.ndarray, " s"]) -> Indices:
     size, most = len(above), LARGEST_SHARE * entries.sum()
     if entries.sum() < FEWEST_ENTRIES:
         return np.array([0, size])
-    leaf, total = _subtrees(above, entries)
-    high = total > most
+
+    # The first front of the subtree of each front, and the entries of all its fronts.
+    leaf, totals = list(range(size)), entries.tolist()
+    for s, parent in enumerate(above.tolist()):
+        if parent >= 0:
+            leaf[parent] = min(leaf[parent], leaf[s])
+            totals[parent] += totals[s]
+    high = np.array(totals) > most
     is_root = ~high & ((above < 0) | high[above])
-    root_above = dict(zip(leaf[is_root].tolist(), np.flatnonzero(is_root).tolist(), strict=True))
+    subtree = {leaf[root]: totals[root] for root in np.flatnonzero(is_root).tolist()}
+
     starts, weight = [0], 0.0
     for s in range(1, size):
         chain = high[s] and high[s - 1] and above[s - 1] == s
-        added = float(total[root_above[s]]) if s in root_above else 0.0
+        added = subtree.get(s, 0.0)
         fits = not high[s] and not high[s - 1] and weight + added <= most
         if chain or fits:
             weight += added
@@ -100,26 +118,3 @@ def _task_starts(above: Indices, entries: Float[np.ndarray, " s"]) -> Indices:
             starts.append(s)
             weight = added
     return np.array([*starts, size])
-
-
-def _subtrees(
-    above: Indices, entries: Float[np.ndarray, " s"]
-) -> tuple[Indices, Float[np.ndarray, " s"]]:
-    """Return the first front of the subtree of each front, and the entries of all its fronts."""
-    leaf, total = list(range(len(above))), entries.tolist()
-    for s, parent in enumerate(above.tolist()):
-        if parent >= 0:
-            leaf[parent] = min(leaf[parent], leaf[s])
-            total[parent] += total[s]
-    return np.array(leaf), np.array(total)
-
-
-def _rounds(task: Indices, above: Indices) -> tuple[Indices, ...]:
-    """Return the tasks of each round; all that a task needs is done in rounds before."""
-    has_parent = np.flatnonzero(above >= 0)
-    needed, needing = task[has_parent], task[above[has_parent]]
-    edges = np.unique(np.stack([needed, needing])[:, needed != needing], axis=1)
-    number = np.zeros(int(task[-1]) + 1, dtype=np.int64)
-    for one, other in edges.T.tolist():  # sorted by the task that is needed, which comes before
-        number[other] = max(number[other], number[one] + 1)
-    return tuple(np.flatnonzero(number == each) for each in range(number.max() + 1))

@@ -5,9 +5,9 @@ from .comparison.angles import EigenspaceAngles as EigenspaceAngles
 from .comparison.angles import eigenspace_angles as eigenspace_angles
 from .comparison.eigenspaces import eigenspace_errors as eigenspace_errors
 from .comparison.eigenspaces import separated_groups as separated_groups
+from .comparison.eigenvalues import SpectrumComparison as SpectrumComparison
+from .comparison.eigenvalues import compare_spectra as compare_spectra
 from .comparison.shape_dna import shape_dna as shape_dna
-from .comparison.spectra import SpectrumComparison as SpectrumComparison
-from .comparison.spectra import compare_spectra as compare_spectra
 from .diffusion.heat_flow import apply_heat as apply_heat
 from .diffusion.heat_kernel import HeatTrace as HeatTrace
 from .diffusion.heat_kernel import heat_kernel as heat_kernel
@@ -16,10 +16,10 @@ from .diffusion.small_times import RecoveredGeometry as RecoveredGeometry
 from .diffusion.small_times import recover_geometry as recover_geometry
 from .laws.laplacian_laws import check_laplacian as check_laplacian
 from .laws.operator_laws import check_operator as check_operator
-from .laws.report import DEFAULT_PROMISES as DEFAULT_PROMISES
-from .laws.report import Law as Law
-from .laws.report import OperatorReport as OperatorReport
-from .laws.report import SkippedLaw as SkippedLaw
+from .laws.outcomes import DEFAULT_PROMISES as DEFAULT_PROMISES
+from .laws.outcomes import Law as Law
+from .laws.outcomes import OperatorReport as OperatorReport
+from .laws.outcomes import SkippedLaw as SkippedLaw
 from .maps.functional_map import FunctionalMap as FunctionalMap
 from .maps.functional_map import compose_maps as compose_maps
 from .maps.functional_map import transfer_function as transfer_function

@@ -89,8 +89,8 @@ def _certificate(path: str | Path, head: dict[str, Any], key: str | None) -> Cer
             f"{path} must hold the spectrum of the key {key}; its key is {head['key']}."
         )
     facts = head["certificate"]
-    facts = {"n_deflated": 0, **facts}  # which older files do not hold
-    facts = {**facts, "gap": tuple(facts["gap"]), "clusters": tuple(facts["clusters"])}
+    facts = {"n_deflated": 0, "fallbacks": (), **facts}  # which older files do not hold
+    facts |= {name: tuple(facts[name]) for name in ("gap", "clusters", "fallbacks")}
     for name, kind in typing.get_type_hints(Certificate).items():
         if not _is_of(facts[name], kind):
             raise FileFormatError(

@@ -59,6 +59,8 @@ class Certificate:
         below it was, outside the space of this many eigenvectors.
     estimate : float or None
         Approximate method: estimated error of the eigenvalues, relative to the largest.
+    fallbacks : tuple of str
+        Methods that were tried first and failed, each with its error; empty as a rule.
 
     Examples
     --------
@@ -85,6 +87,7 @@ class Certificate:
     floor: float = -np.inf
     n_deflated: int = 0
     estimate: float | None = None
+    fallbacks: tuple[str, ...] = ()
 
     __repr__ = short_repr
     _repr_html_ = html_repr
@@ -101,6 +104,10 @@ class Certificate:
 
     def explain(self) -> str:
         """Return a text that says what is proved, and how."""
+        tried = f"Tried before, in vain: {' '.join(self.fallbacks)}" if self.fallbacks else ""
+        return " ".join(filter(None, [self._what(), tried]))
+
+    def _what(self) -> str:
         if self.count is None:
             return (
                 f"These are approximations, {self.n_pairs} of them: by what the last round of refinement changed, each "

@@ -14,15 +14,25 @@ from eigenshape._files import as_path
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
-from eigenshape.operators.boundary import dirichlet_laplacian
-from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.multilevel.approximate import approximate_pairs
-from eigenshape.spectral.multilevel.start import require_accuracy, require_lumped
+from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
+from eigenshape.spectral.certificate import Certificate
+from eigenshape.spectral.multilevel.approximate import (
+    approximate_pairs,
+    require_accuracy,
+    require_lumped,
+)
 from eigenshape.spectral.solver.cache import content_key, keep, load_kept, require_writable
 from eigenshape.spectral.solver.certified import certified_pairs
-from eigenshape.spectral.solver.kernel_values import to_pencil
-from eigenshape.spectral.solver.pencil import normalize
-from eigenshape.spectral.solver.result import spectrum_of
+from eigenshape.spectral.solver.certify import in_user_units
+from eigenshape.spectral.solver.eigenpairs import Pairs
+from eigenshape.spectral.solver.kernel_values import (
+    from_pencil,
+    require_readable,
+    to_pencil,
+    user_certificate,
+    user_residuals,
+)
+from eigenshape.spectral.solver.pencil import Pencil, normalize, to_user_vectors
 from eigenshape.spectral.spectrum import Spectrum
 
 Method = Literal["certified", "approximate"]
@@ -31,6 +41,8 @@ Method = Literal["certified", "approximate"]
 DEFAULT_ACCURACY = 1e-3
 # Smallest `accuracy` and `max_residual` that can be requested; below it rounding dominates.
 LEAST_ACCURACY = 1e-10
+# Negative eigenvalues down to minus this share of the mean eigenvalue may be rounding.
+NEGATIVE_ROUNDING = 1e-9
 
 
 def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs, how, and where kept
@@ -191,7 +203,7 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
         else:
             pairs, certificate = approximate_pairs(pencil, wanted, error, residual, report)
     report(1.0, "proved complete" if certificate.complete else "accurate enough")
-    spectrum = spectrum_of(operator, pencil, pairs, certificate)
+    spectrum = _in_user_units(operator, pencil, pairs, certificate)
     if cache is not None:
         keep(spectrum, cache, key)
     return _on_all_points(spectrum, laplacian, free)
@@ -247,6 +259,35 @@ def _requested_pairs(
             f"above must be less than below; above is {above} and below is {below}."
         )
     return 0, to_pencil(operator.kernel, np.array([low, high]))
+
+
+def _in_user_units(
+    laplacian: Laplacian, pencil: Pencil, pairs: Pairs, certificate: Certificate
+) -> Spectrum:
+    """Convert pairs of the pencil to a spectrum in the user's units, corrected if the kernel is."""
+    # A negative Rayleigh quotient proves a negative eigenvalue, however large its residual, up to
+    # rounding.
+    rounding = (
+        np.minimum(4 * pairs.residuals, NEGATIVE_ROUNDING * pencil.level) + 1e-14 * pencil.level
+    )
+    bad = np.flatnonzero(pairs.values < -rounding)
+    if bad.size:
+        value, bound = pencil.values_out(np.array([pairs.values[bad[0]], rounding[bad[0]]]))
+        raise InvalidParameterError(
+            f"stiffness must be positive semidefinite; eigenvalue {bad[0]} is {value:.6g}, with "
+            f"an error below {bound:.1e}."
+        )
+    kernel = laplacian.kernel
+    values = pencil.values_out(np.maximum(pairs.values, 0.0))
+    residuals = pencil.values_out(pairs.residuals)
+    require_readable(kernel, values, stacklevel=4)
+    return Spectrum(
+        eigenvalues=freeze(from_pencil(kernel, values)),
+        eigenvectors=to_user_vectors(pencil, pairs.vectors),
+        mass=laplacian.mass,
+        residuals=freeze(user_residuals(kernel, values, residuals)),
+        certificate=user_certificate(kernel, in_user_units(pencil, certificate), float(values[-1])),
+    )
 
 
 def _on_all_points(

@@ -128,13 +128,7 @@ def count_zero_modes(spectrum: Spectrum) -> int:
 
 
 def require_lowest(spectrum: Spectrum, name: str) -> None:
-    """Raise an error if a spectrum does not begin with the lowest eigenvalue.
-
-    Raises
-    ------
-    InvalidParameterError
-        If the spectrum is that of an interval.
-    """
+    """Raise an error if a spectrum does not begin with the lowest eigenvalue."""
     if spectrum.certificate.first:
         raise InvalidParameterError(
             f"{name} must begin with the lowest eigenvalue; it begins with number "

@@ -11,8 +11,8 @@ from eigenshape._arrays import ReadOnly, freeze, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.distances.closest import squared_distances
 from eigenshape.geometry.distances.geodesic import farthest_first, geodesic_waves
-from eigenshape.geometry.distances.simplex_distance import squared_distances
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.crouzeix_raviart import longest_edges
@@ -219,10 +219,7 @@ def preimages(
 
     Φ⁻¹ keeps the barycentric coordinates and takes the corresponding simplex.
 
-    Raises
-    ------
-    InvalidParameterError
-        If a point is in no simplex of N.
+    Raise InvalidParameterError if a point is in no simplex of N.
     """
     n = len(perturbation.regions_two)
     wrong = np.flatnonzero((points.simplices < 0) | (points.simplices >= n))

@@ -12,8 +12,8 @@ from eigenshape._arrays import ReadOnly, finite_rows, freeze, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
+from eigenshape.features.bipartite_loops import match_rows
 from eigenshape.features.least_matching import least_perfect, near_pairs
-from eigenshape.features.matching_loops import match_rows
 from eigenshape.geometry.samples.surface_points import SurfacePoints
 from eigenshape.geometry.simplices import size_one
 from eigenshape.stability.anchors import preimages, regions_met

@@ -18,7 +18,7 @@ from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.clouds.kernel import neighbor_distance
 from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
-from eigenshape.spectral.comparison.spectra import SpectrumComparison, compare_spectra
+from eigenshape.spectral.comparison.eigenvalues import SpectrumComparison, compare_spectra
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.stability.bounds import TimeRange, admissible_times
 from eigenshape.stability.closeness import Closeness, measure_closeness

@@ -199,9 +199,8 @@ def _first_workspace(
     if isinstance(mesh, str | Path):
         path, surface = Path(mesh), es.io.read_surface(mesh).mesh
         first = Workspace(surface, path.name, index=index, shared=True)
-        if path.suffix.lower() in (".glb", ".gltf", ".obj", ".ply"):
-            with suppress(es.FileFormatError):  # points have no attributes
-                attributes = es.read_mesh(path, attributes=True, drop_missing=True)[1]
-                first.attributes = es.io.carry_attributes(attributes, surface)
+        with suppress(es.FileFormatError):  # points have no attributes
+            attributes = es.read_mesh(path, attributes=True, drop_missing=True)[1]
+            first.attributes = es.io.carry_attributes(attributes, surface)
         return first
     return Workspace(mesh, index=index, shared=True)

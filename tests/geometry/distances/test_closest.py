@@ -2,8 +2,12 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.distances.closest import closest_points, signed_distance, winding_numbers
-from eigenshape.geometry.distances.simplex_distance import squared_distances
+from eigenshape.geometry.distances.closest import (
+    closest_points,
+    signed_distance,
+    squared_distances,
+    winding_numbers,
+)
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward

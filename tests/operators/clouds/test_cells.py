@@ -11,7 +11,7 @@ from eigenshape.operators.clouds.cells import (
     gaussian_differences,
     gaussian_rows,
 )
-from eigenshape.operators.clouds.csr_loops import component_labels
+from eigenshape.operators.clouds.pair_loops import component_labels
 
 
 def dense_kernel(points, weights, t, reach):

@@ -55,7 +55,7 @@ def test_bad_input_is_named():
         local_triangles(PointCloud(points, dim=1))
     with pytest.raises(InvalidShapeError, match="Triangles need at least 4 points"):
         local_triangles(PointCloud(points[:3], dim=2))
-    with pytest.raises(InvalidShapeError, match="Points must differ from each other; points 0"):
+    with pytest.raises(InvalidShapeError, match="Points must differ; points 0"):
         local_triangles(PointCloud(np.vstack([points, points[:1]]), dim=2))
     line = np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)])
     with pytest.raises(InvalidShapeError, match="Every point must have a triangle"):

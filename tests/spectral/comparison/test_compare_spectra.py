@@ -12,7 +12,7 @@ from eigenshape.geometry.union import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.comparison.spectra import compare_spectra, spectral_hausdorff_distance
+from eigenshape.spectral.comparison.eigenvalues import compare_spectra, spectral_hausdorff_distance
 from eigenshape.spectral.solve import solve_spectrum
 
 SPHERE = icosphere(2)

@@ -14,10 +14,9 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.geometry.union import disjoint_union
-from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.diffusion.heat_flow import apply_heat
 from eigenshape.spectral.solve import solve_spectrum

@@ -19,17 +19,16 @@ from eigenshape.geometry.simplices import mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, edge_table, vertex_components
 from eigenshape.geometry.union import disjoint_union
-from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere, torus
-from eigenshape.spectral.laws import comparison as sameness
+from eigenshape.spectral.laws import agreement as sameness
 from eigenshape.spectral.laws import laplacian_laws, operator_laws
 from eigenshape.spectral.laws import transformations as changes
 from eigenshape.spectral.laws.laplacian_laws import check_laplacian
 from eigenshape.spectral.laws.operator_laws import check_operator
-from eigenshape.spectral.laws.report import (
+from eigenshape.spectral.laws.outcomes import (
     DEFAULT_PROMISES,
     Law,
     OperatorReport,

@@ -1,16 +1,14 @@
-from itertools import pairwise
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from pencils import cycle, dense_eigenvalues, graph, path, wild
 
 from eigenshape.geometry.union import disjoint_union
-from eigenshape.operators.clouds.csr_loops import component_labels
+from eigenshape.operators.clouds.pair_loops import component_labels
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral.multilevel.aggregation import build_levels
+from eigenshape.spectral.multilevel.aggregation import build_levels, scaled_top
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates
 
 pytestmark = pytest.mark.long
@@ -58,33 +56,31 @@ def test_aggregates_are_connected_and_of_the_size_asked_for():
     "laplacian", [cotangent_laplacian(icosphere(4)), graph(cycle(500)), wild()]
 )
 def test_constants_stay_constant_and_symmetry_stays(laplacian, smooth):
-    levels = build_levels(laplacian.stiffness, laplacian.mass, 30, smooth=smooth)
-    assert len(levels) > 1
-    for level, below in pairwise(levels):
-        np.testing.assert_allclose(level.down.sum(axis=1), 1, atol=1e-9)
-        largest = below.stiffness.diagonal().max()
-        np.testing.assert_allclose(below.stiffness.sum(axis=1), 0, atol=1e-9 * largest)
-        assert (below.stiffness != below.stiffness.T).nnz == 0
-        np.testing.assert_allclose(below.mass.sum(), level.mass.sum(), rtol=1e-12)
-    assert levels[-1].down is None
+    levels, *coarsest = build_levels(
+        laplacian.stiffness, laplacian.mass, 30, np.float64, smooth=smooth
+    )
+    assert levels
+    assert levels[0].mass is None
+    coarser = [(level.stiffness, level.mass) for level in levels[1:]] + [coarsest]
+    for level, (stiffness, mass) in zip(levels, coarser, strict=True):
+        np.testing.assert_allclose(level.prolong.sum(axis=1), 1, atol=1e-9)
+        largest = stiffness.diagonal().max()
+        np.testing.assert_allclose(stiffness.sum(axis=1), 0, atol=1e-9 * largest)
+        assert (stiffness != stiffness.T).nnz == 0
+        np.testing.assert_allclose(mass.sum(), laplacian.mass.sum(), rtol=1e-12)
 
 
 @pytest.mark.long
 def test_coarse_eigenvalues_are_near_and_above():
     laplacian = cotangent_laplacian(icosphere(4))
-    coarse = build_levels(laplacian.stiffness, laplacian.mass, 200)[-1]
-    exact, found = (
-        dense_eigenvalues(laplacian)[:16],
-        dense_eigenvalues(Laplacian(coarse.stiffness, coarse.mass))[:16],
-    )
+    _, *coarse = build_levels(laplacian.stiffness, laplacian.mass, 200, np.float64)
+    exact, found = (dense_eigenvalues(each)[:16] for each in (laplacian, Laplacian(*coarse)))
     assert (found > exact - 1e-9).all()  # Rayleigh and Ritz
     np.testing.assert_allclose(found[1:], exact[1:], rtol=0.02)
 
 
 def test_the_top_is_a_bound():
     for laplacian in (cotangent_laplacian(icosphere(3)), graph(cycle(100)), wild(10)):
-        level = build_levels(laplacian.stiffness, laplacian.mass, 10**9)[0]
-        scaled = Laplacian(
-            laplacian.stiffness, sp.csr_array(sp.diags_array(laplacian.stiffness.diagonal()))
-        )
-        assert dense_eigenvalues(scaled)[-1] <= level.top * (1 + 1e-12)
+        diagonal = sp.csr_array(sp.diags_array(laplacian.stiffness.diagonal()))
+        largest = dense_eigenvalues(Laplacian(laplacian.stiffness, diagonal))[-1]
+        assert largest <= scaled_top(laplacian.stiffness) * (1 + 1e-12)

@@ -10,15 +10,13 @@ from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
-from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.multilevel import aggregation, approximate
 from eigenshape.spectral.multilevel import davidson as refinement
-from eigenshape.spectral.multilevel import start as climbing
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -30,8 +28,8 @@ SIX = cotangent_laplacian(disjoint_union(*[icosphere(2)] * 6))
 @pytest.fixture
 def always_coarsen(monkeypatch):
     """Take the road of large operators, also for small ones."""
-    monkeypatch.setattr(climbing, "EXACT_POINTS", 0)
-    monkeypatch.setattr(climbing, "COARSENED", 3)
+    monkeypatch.setattr(approximate, "EXACT_POINTS", 0)
+    monkeypatch.setattr(approximate, "COARSENED", 3)
 
 
 def require_near(laplacian, k, accuracy, expected=None):
@@ -115,11 +113,27 @@ def test_what_aggregates_cannot_see_is_found_by_a_last_look(always_coarsen, monk
     laplacian = graph(hypercube(10))  # bits that change within aggregates only
     require_near(laplacian, 12, 1e-3)
     monkeypatch.setattr(
-        refinement, "_look_again", lambda tower, space, values, k, bound, seed: values
+        refinement, "_look_again", lambda tower, columns, values, k, bound, seed: values
     )
     found = solve_roughly(laplacian, 12)
     assert abs(found.eigenvalues[10] - 2.0) > 0.1  # ten copies of 2, and one of them missing
     assert not found.certificate.complete
+
+
+def test_indicators_serve_where_smoothed_aggregates_do_not(always_coarsen, monkeypatch):
+    honest, calls = approximate._solve_coarsest, []
+
+    def fail_once(*arguments):
+        calls.append(arguments)
+        if len(calls) == 1:
+            raise ConvergenceError("No.")
+        return honest(*arguments)
+
+    monkeypatch.setattr(approximate, "_solve_coarsest", fail_once)
+    found = solve_roughly(ball(), 9)
+    np.testing.assert_allclose(found.eigenvalues, dense_eigenvalues(ball())[:9], atol=1e-3 * 12)
+    assert found.certificate.fallbacks == ("smoothed aggregates: No.",)
+    assert found.certificate.explain().endswith("Tried before, in vain: smoothed aggregates: No.")
 
 
 def test_kernels_are_corrected_as_by_the_exact_solver():
@@ -198,8 +212,8 @@ def test_the_order_of_points_does_not_matter():
 
 
 def test_several_levels(monkeypatch):
-    monkeypatch.setattr(climbing, "COARSEST", 100)
-    monkeypatch.setattr(climbing, "COARSEST_PER_PAIR", 1)
+    monkeypatch.setattr(approximate, "COARSEST", 100)
+    monkeypatch.setattr(approximate, "COARSEST_PER_PAIR", 1)
     monkeypatch.setattr(aggregation, "LARGEST", 64)
     laplacian = cotangent_laplacian(fibonacci_sphere(12000))
     said = []
@@ -252,7 +266,7 @@ def test_what_does_not_converge_is_not_returned(always_coarsen, monkeypatch):
         solve_roughly(
             wild(), 12, max_residual=1e-3
         )  # weights over eight decades: the way to the exact solver
-    monkeypatch.setattr(approximate, "ROUNDS", 0)
+    monkeypatch.setattr(approximate, "MOST_ROUNDS", 0)
     with pytest.raises(
         ConvergenceError,
         match=r"estimated at no more than 1\.0e-10 of the last eigenvalue, .* after 0 rounds these are .*"

@@ -6,10 +6,10 @@ from pencils import graph, hypercube
 from eigenshape._progress import silent
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import torus
-from eigenshape.spectral.multilevel import start as climbing
+from eigenshape.spectral.multilevel import approximate
+from eigenshape.spectral.multilevel.approximate import climb
 from eigenshape.spectral.multilevel.davidson import misses_pairs
 from eigenshape.spectral.multilevel.residuals import Interpolated, Stored
-from eigenshape.spectral.multilevel.start import climb
 from eigenshape.spectral.solver.pencil import normalize
 
 TORUS = cotangent_laplacian(torus(120, 50))
@@ -23,8 +23,8 @@ def interpolated_pairs(laplacian):
 def test_what_aggregates_cannot_see_is_missed(monkeypatch):
     columns, values = interpolated_pairs(TORUS)
     assert not misses_pairs(columns, values, 12, 0.02 * values[11])
-    monkeypatch.setattr(climbing, "EXACT_POINTS", 0)
-    monkeypatch.setattr(climbing, "COARSENED", 3)
+    monkeypatch.setattr(approximate, "EXACT_POINTS", 0)
+    monkeypatch.setattr(approximate, "COARSENED", 3)
     columns, values = interpolated_pairs(graph(hypercube(10)))  # bits that change within aggregates
     assert values[10] > 1.5 * values[9]  # nine copies of the second eigenvalue, of ten
     assert misses_pairs(columns, values, 12, 0.02 * values[11])

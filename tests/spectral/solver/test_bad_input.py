@@ -8,9 +8,8 @@ from pencils import cycle, dense_eigenvalues, graph, path
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union
-from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.diagnosis import require_solvable

@@ -6,9 +6,8 @@ from pencils import cycle, dense_eigenvalues, graph, hypercube, path, tetrahedra
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union
-from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy as roads
@@ -239,9 +238,13 @@ def test_lanczos_that_fails_gives_way_to_a_dense_solve(monkeypatch):
         raise ConvergenceError("no")
 
     monkeypatch.setattr(roads, "block_lanczos", fail)
-    np.testing.assert_allclose(
-        solve_spectrum(laplacian, 20).eigenvalues, expected.eigenvalues, atol=1e-11
-    )
+    found = solve_spectrum(laplacian, 20)
+    np.testing.assert_allclose(found.eigenvalues, expected.eigenvalues, atol=1e-11)
+    assert expected.certificate.fallbacks == ()
+    assert found.certificate.fallbacks == ("one shift: no",)
+    assert found.certificate.explain().endswith("Tried before, in vain: one shift: no")
+    parts = solve_spectrum(cotangent_laplacian(disjoint_union(*[icosphere(3)] * 2)), 20)
+    assert parts.certificate.fallbacks == ("one shift: no",)
     monkeypatch.setattr(roads, "DENSE_LIMIT", 0)
     with pytest.raises(ConvergenceError, match=r"no"):
         solve_spectrum(laplacian, 20)

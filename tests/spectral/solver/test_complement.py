@@ -10,8 +10,8 @@ from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import strategy
 from eigenshape.spectral.solver.complement import prove_outside, sparser_below
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.factor import factorize
-from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import normalize, rayleigh_residuals
 
 PENCIL = normalize(mesh_laplacian(torus(40, 18)))
@@ -117,3 +117,4 @@ def test_what_filters_cannot_prove_factors_do(monkeypatch):
     certificate = solve_spectrum(laplacian, 12).certificate
     assert certificate.complete
     assert certificate.n_deflated == 0
+    assert certificate.fallbacks[0].startswith("a filter: Every eigenvalue that is counted must")

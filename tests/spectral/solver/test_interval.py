@@ -206,3 +206,17 @@ def test_where_counts_and_finds_never_agree_nothing_is_returned(monkeypatch):
     monkeypatch.setattr(interval, "walk_on", lambda pencil, factor, *rest: (pairs.vectors, factor))
     with pytest.raises(ConvergenceError, match="An interval must end in a gap between eigenvalues"):
         interval.solve_interval(pencil, counted, lambda done: None)
+
+
+def test_an_interval_that_fails_alone_is_found_with_all_below_it(monkeypatch, thin):
+    laplacian = cotangent_laplacian(irregular_grid(24, 24, rng=np.random.default_rng(0)))
+    alone = solve_spectrum(laplacian, above=1000.0, below=1400.0)
+
+    def fail(*arguments):
+        raise ConvergenceError("no")
+
+    monkeypatch.setattr(certified, "solve_interval", fail)
+    found = solve_spectrum(laplacian, above=1000.0, below=1400.0)
+    np.testing.assert_allclose(found.eigenvalues, alone.eigenvalues, rtol=1e-10)
+    assert alone.certificate.fallbacks == ()
+    assert found.certificate.fallbacks == ("slices of the interval: no",)

@@ -6,9 +6,9 @@ from eigenshape._errors import ConvergenceError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solver import lanczos
+from eigenshape.spectral.solver.eigenpairs import lowest_pairs
 from eigenshape.spectral.solver.factor import factorize
 from eigenshape.spectral.solver.lanczos import MOST_LOST, Wanted, block_lanczos
-from eigenshape.spectral.solver.pairs import lowest_pairs
 from eigenshape.spectral.solver.pencil import normalize, rayleigh_residuals
 
 

@@ -1,1 +1,4 @@
-"""The verbs of `eigenshape index`, a module each."""
+"""Keep an index of shapes: add meshes, list and remove shapes, check, compact, export and merge.
+
+Each verb of `eigenshape index` is a module here.
+"""

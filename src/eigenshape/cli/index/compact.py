@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import eigenshape as es
 from eigenshape.cli.console import out, print_json
-from eigenshape.cli.inputs import IndexArgument, JsonOption
 
 
-def compact(index: IndexArgument, *, as_json: JsonOption = False) -> None:
+def compact(index: Path, *, as_json: bool = False) -> None:
     """Give back the space of removed and replaced shapes.
 
     The last pages of the file move into free ones, so it takes as long as the removal. Queries go on

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import eigenshape as es
 from eigenshape.cli.console import out, print_json, print_table, progress_bar
-from eigenshape.cli.inputs import IndexArgument, JsonOption
 
 
 def duplicates(
-    index: IndexArgument,
+    index: Path,
     *,
-    score: Annotated[
-        float,
-        typer.Option(
-            min=0,
-            help="Largest score of two shapes that count as nearly the same. Copies have a score "
-            "near 0, also if they are moved or scaled, and other poses often less than 0.1.",
-        ),
-    ] = 0.1,
-    as_json: JsonOption = False,
+    score: Annotated[float, typer.Option(min=0)] = 0.1,
+    as_json: bool = False,
 ) -> None:
-    """List pairs of shapes that are nearly the same, wherever they lie and whatever their size."""
+    """List pairs of shapes that are nearly the same, wherever they lie and whatever their size.
+
+    Parameters
+    ----------
+    score
+        Largest score of two shapes that count as nearly the same. Copies have a score near 0,
+        also if they are moved or scaled, and other poses often less than 0.1.
+    """
     shelf = es.ShapeIndex.open(index)
     with progress_bar("duplicates") as progress:
         pairs = es.retrieval.find_duplicates(shelf, most_score=score, progress=progress)

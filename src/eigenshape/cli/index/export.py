@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_written
-from eigenshape.cli.inputs import FilterOption, IndexArgument
 
 
 def export(
-    index: IndexArgument,
+    index: Path,
     *,
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", help="Folder to write to: a new one, or an empty one."),
-    ],
-    where: FilterOption = None,
+    output: Path,
+    where: list[str] | None = None,
 ) -> None:
     """Write the descriptors of shapes, and what is known of them, for other programs.
 
     records.json lists the shapes, descriptors.npz holds their arrays.
+
+    Parameters
+    ----------
+    output
+        Write to this folder, a new or an empty one.
     """
     shelf = es.ShapeIndex.open(index)
     filters = steps.parse_filters(where)

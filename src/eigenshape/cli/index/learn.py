@@ -3,37 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import err, print_written
-from eigenshape.cli.index.add import (
-    MemoryOption,
-    SchedulerOption,
-    SourcesArgument,
-    TimeoutOption,
-    WorkersOption,
-)
-from eigenshape.cli.inputs import IndexRepairOption, repair_names
+from eigenshape.cli.index.add import Memory, Timeout, Workers
+from eigenshape.cli.inputs import repair_names
 
 
 def learn(
-    sources: SourcesArgument,
+    sources: list[Path],
     *,
-    output: Annotated[Path, typer.Option("-o", "--output", help="File for the codebook (.npz).")],
-    repair: IndexRepairOption = "auto",
-    workers: WorkersOption = None,
-    timeout: TimeoutOption = 300.0,
-    memory: MemoryOption = None,
-    scheduler: SchedulerOption = None,
+    output: Path,
+    repair: str = "auto",
+    workers: Workers = None,
+    timeout: Timeout = 300.0,
+    memory: Memory = None,
+    scheduler: str | None = None,
 ) -> None:
     """Learn a codebook from meshes, for indexes that are built in parts.
 
     At most 100 meshes are read. Shapes with different codebooks do not compare, so learn one and
     pass it to every `eigenshape index add --part` with --codebook.
+
+    Parameters
+    ----------
+    output
+        Write the codebook (NPZ).
     """
     repairs = repair_names(repair)
     steps.require_output(output, (".npz",), "A codebook")

@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 import eigenshape as es
-from eigenshape.cli import steps
-from eigenshape.cli.console import err, escape_text, out, print_json
-from eigenshape.cli.index.add import NewIndexArgument
-from eigenshape.cli.inputs import JsonOption
+from eigenshape.cli.console import count_shapes, err, escape_text, out, print_json
 
 MOST_NAMED = 5  # shapes that a message names
 
 
 def merge(
-    index: NewIndexArgument,
-    others: Annotated[list[Path], typer.Argument(help="Folders of the indexes to add to it.")],
+    index: Path,
+    others: list[Path],
     *,
-    replace: Annotated[
-        bool,
-        typer.Option("--replace", help="Let a shape replace one of the same name."),
-    ] = False,
-    as_json: JsonOption = False,
+    replace: bool = False,
+    as_json: bool = False,
 ) -> None:
     """Make one index of several, by copying them.
 
     What is damaged in the others is left out with a warning. Shapes with different codebooks do not
     compare: build the others with --codebook.
+
+    Parameters
+    ----------
+    index
+        Folder of the index. It is created if it does not exist.
+    others
+        Folders of the indexes to add to it.
+    replace
+        Let a shape replace one of the same name.
     """
     parts = [es.ShapeIndex.open(other) for other in others]
     shelf = es.ShapeIndex.open_or_create(index)
@@ -40,10 +40,10 @@ def merge(
         facts = {"index": str(index), "added": n_added, "shapes": len(shelf)}
         print_json(facts | {"not_compared": apart})
     else:
-        out.print(f"{steps.count_shapes(n_added)} added; the index holds {len(shelf)}.")
+        out.print(f"{count_shapes(n_added)} added; the index holds {len(shelf)}.")
     if apart:
         err.print(
-            f"[yellow]not found by queries:[/] {steps.count_shapes(len(apart))}, which "
+            f"[yellow]not found by queries:[/] {count_shapes(len(apart))}, which "
             f"{recipe.name} does not describe: {escape_text(', '.join(apart[:MOST_NAMED]))}"
             f"{', ...' if len(apart) > MOST_NAMED else ''}. Index their files again, with "
             f"--codebook {escape_text(index)}"

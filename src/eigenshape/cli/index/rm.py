@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
+from pathlib import Path
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
-from eigenshape.cli.console import out, print_json
-from eigenshape.cli.inputs import FilterOption, IndexArgument, JsonOption
+from eigenshape.cli.console import count_shapes, out, print_json
 
 
 def rm(
-    index: IndexArgument,
-    shapes: Annotated[list[str] | None, typer.Argument(help="Names of shapes.")] = None,
+    index: Path,
+    shapes: list[str] | None = None,
     *,
-    where: FilterOption = None,
-    as_json: JsonOption = False,
+    where: list[str] | None = None,
+    as_json: bool = False,
 ) -> None:
     """Remove shapes from an index.
 
     Give names, or a filter that chooses shapes. Their space serves shapes that are added later, or
     is given back by `eigenshape index compact`. A shape whose mesh stays in its folder comes back
     with the next `eigenshape index add`.
+
+    Parameters
+    ----------
+    shapes
+        Names of shapes.
     """
     shelf = es.ShapeIndex.open(index)
     filters = steps.parse_filters(where)
@@ -38,4 +40,4 @@ def rm(
     if as_json:
         print_json({"index": str(index), "removed": chosen, "shapes": len(shelf)})
     else:
-        out.print(f"{steps.count_shapes(len(chosen))} removed; the index holds {len(shelf)}.")
+        out.print(f"{count_shapes(len(chosen))} removed; the index holds {len(shelf)}.")

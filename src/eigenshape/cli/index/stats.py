@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 import eigenshape as es
 from eigenshape.cli import steps
 from eigenshape.cli.console import escape_text, out, print_json, print_table
-from eigenshape.cli.inputs import IndexArgument, JsonOption
 
 KILOBYTE = 1000  # bytes
 
 
-def stats(index: IndexArgument, *, as_json: JsonOption = False) -> None:
+def stats(index: Path, *, as_json: bool = False) -> None:
     """Show how many shapes an index holds, how they are described, and the space they take."""
     shelf = es.ShapeIndex.open(index)
     records = shelf.records()

@@ -27,44 +27,41 @@ from eigenshape.geometry.topology import (
 )
 from eigenshape.operators.clouds.kernel import neighbor_distance
 
+KINDS = {1: "curve", 2: "surface", 3: "tetrahedral mesh"}
 MEASURES = {1: "length", 2: "area"}
 
 
 def shape_facts(shape: Shape) -> dict[str, Any]:
-    """Gather what there is to say about a shape, in its own length unit."""
+    """Return the size, topology and faults of a shape by name, in its own length unit."""
     if isinstance(shape, TriangleMesh):
-        return mesh_facts(shape)
-    return cloud_facts(shape) if isinstance(shape, PointCloud) else simplicial_facts(shape)
+        facts = _mesh_facts(shape)
+    elif isinstance(shape, PointCloud):
+        facts = _cloud_facts(shape)
+    else:
+        facts = _simplicial_facts(shape)
+    low, high = bounding_box(shape)
+    facts |= {"box_low": low.tolist(), "box_high": high.tolist()}
+    return facts | {"repairs_to_try": list(suggest_repairs(shape))}
 
 
-def cloud_facts(cloud: PointCloud) -> dict[str, Any]:
-    """Gather what there is to say about a cloud."""
-    low, high = bounding_box(cloud)
+def _cloud_facts(cloud: PointCloud) -> dict[str, Any]:
+    try:
+        near = neighbor_distance(cloud.points, cloud.dim)
+    except InvalidShapeError:  # too few points to have one; the other facts stand
+        near = None
     return {
         "kind": "point cloud",
         "points": cloud.n_points,
         "dimension": cloud.dim,
         "coordinates": cloud.points.shape[1],
         "coinciding_points": cloud.n_points - drop_duplicate_points(cloud).cloud.n_points,
-        "mean_near_distance": _near_distance(cloud),
-        "box_low": low.tolist(),
-        "box_high": high.tolist(),
-        "repairs_to_try": list(suggest_repairs(cloud)),
+        "mean_near_distance": near,
     }
 
 
-def _near_distance(cloud: PointCloud) -> float | None:
-    try:
-        return neighbor_distance(cloud.points, cloud.dim)
-    except InvalidShapeError:  # too few points to have one; the other facts stand
-        return None
-
-
-def simplicial_facts(mesh: SimplicialMesh) -> dict[str, Any]:
-    """Gather what there is to say about a mesh of any dimension."""
-    low, high = bounding_box(mesh)
+def _simplicial_facts(mesh: SimplicialMesh) -> dict[str, Any]:
     return {
-        "kind": {1: "curve", 2: "surface", 3: "tetrahedral mesh"}.get(mesh.dim, "simplicial mesh"),
+        "kind": KINDS.get(mesh.dim, "simplicial mesh"),
         "points": mesh.n_points,
         "simplices": mesh.n_simplices,
         "dimension": mesh.dim,
@@ -76,31 +73,21 @@ def simplicial_facts(mesh: SimplicialMesh) -> dict[str, Any]:
         "without_volume": len(degenerate_simplices(mesh)),
         "duplicates": len(repeated_simplices(mesh)),
         "loose_points": len(unreferenced_vertices(mesh)),
-        "box_low": low.tolist(),
-        "box_high": high.tolist(),
-        "repairs_to_try": list(suggest_repairs(mesh)),
     }
 
 
-def mesh_facts(mesh: TriangleMesh) -> dict[str, Any]:
-    """Gather what there is to say about a mesh, in the mesh's own length unit."""
-    n_components, _ = vertex_components(mesh)
-    low, high = bounding_box(mesh)
+def _mesh_facts(mesh: TriangleMesh) -> dict[str, Any]:
     closed, n_turned = is_closed(mesh), len(inconsistent_edges(mesh))
-    facts = {
+    return {
         "vertices": mesh.n_vertices,
         "faces": mesh.n_faces,
-        "components": n_components,
+        "components": vertex_components(mesh)[0],
         "boundary_loops": len(boundary_loops(mesh)),
         "closed": closed,
         "euler_characteristic": euler_characteristic(mesh),
         "area": surface_area(mesh),
         "enclosed_volume": enclosed_volume(mesh) if closed and not n_turned else None,
         "mean_edge_length": float(edge_lengths(mesh).mean()),
-        "box_low": low.tolist(),
-        "box_high": high.tolist(),
-    }
-    faults = {
         "faces_without_area": len(degenerate_simplices(mesh)),
         "duplicate_faces": len(repeated_simplices(mesh)),
         "loose_vertices": len(unreferenced_vertices(mesh)),
@@ -110,4 +97,3 @@ def mesh_facts(mesh: TriangleMesh) -> dict[str, Any]:
         "non_manifold_vertices": len(non_manifold_vertices(mesh)),
         "turned_over_edges": n_turned,
     }
-    return facts | faults | {"repairs_to_try": list(suggest_repairs(mesh))}

@@ -1,112 +1,91 @@
-"""What the verbs that cut a mesh share: the files that they write, and rows and a table of the parts."""
+"""What the verbs that cut a mesh compute and print of its parts."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int, UInt8
+from jaxtyping import Int
 
-from eigenshape.cli.console import print_table, print_written
-from eigenshape.cli.steps.outputs import require_output, save_like
-from eigenshape.features.segmentation import Segmentation
+from eigenshape._progress import Progress
+from eigenshape.cli.console import print_table
+from eigenshape.features.boundaries import smooth_boundaries
+from eigenshape.features.contrast import PART_CONTRAST
+from eigenshape.features.parts import find_parts, smooth_cut
+from eigenshape.features.segmentation import Segmentation, Tree
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.labels import write_labels
-from eigenshape.io.mesh_files import LABELED, write_mesh
-from eigenshape.plot.fields import part_colors
-from eigenshape.retrieval.labels.labeled_shape import LabeledShape
-from eigenshape.retrieval.labels.transfer import LabelTransfer
-
-LABEL_LISTS = (".seg", ".txt")  # files with one label a line
-SHOWN: dict[str, Callable[[Any], str]] = {
-    "position": lambda place: "  ".join(f"{coordinate:.4g}" for coordinate in place),
-    "heat": lambda heat: f"{heat:.4g}",
-    "area_share": lambda share: f"{100 * share:.1f} %",
-    "confidence": lambda share: f"{100 * share:.0f} %",
-    "splits_from": lambda part: "none" if part is None else str(part),
-    "persistence": lambda persistence: (
-        "never merges" if np.isinf(persistence) else f"{persistence:.4g}"
-    ),
-}
+from eigenshape.geometry.orientation import orient_closed_outward
+from eigenshape.retrieval.heat.features import HeatFeatures, find_heat_features
+from eigenshape.retrieval.heat.recipe import PRESETS, HeatRecipe
+from eigenshape.spectral.signatures.approximate_heat import LARGE, USUAL_ACCURACY
 
 
-def require_colored_path(path: Path | None) -> None:
-    """Raise an error if no mesh with colors can be written to a path, before any work is done."""
-    require_output(path, LABELED, "A mesh with colors")
+def find_features(
+    mesh: TriangleMesh, recipe: HeatRecipe, accuracy: float | None, progress: Progress
+) -> HeatFeatures:
+    """Find the features of a mesh. Without an accuracy, heat is approximate on large meshes only."""
+    if accuracy is None and mesh.n_vertices > LARGE:
+        accuracy = USUAL_ACCURACY
+    return find_heat_features(mesh, recipe, accuracy=accuracy, progress=progress)
 
 
-def require_label_path(path: Path | None) -> None:
-    """Raise an error if no labels can be written to a path, before any work is done."""
-    require_output(path, (*LABELED, *LABEL_LISTS), "A mesh with labels")
+def count_fragments(shape: HeatFeatures) -> int:
+    """Return how many parts are fragments, which have no feature point and are not counted as parts."""
+    return int(np.isin(shape.tree.maxima, shape.fragments).sum())
 
 
-def save_colors(mesh: TriangleMesh, colors: UInt8[np.ndarray, "n 3"], path: Path) -> None:
-    """Write a mesh with its colors, and print so on stderr."""
-    write_mesh(mesh, path, colors=colors)
-    print_written(path)
+def find_tree(
+    surface: TriangleMesh, method: str, progress: Progress
+) -> tuple[Tree, dict[str, Any], Callable[[Segmentation], Segmentation]]:
+    """Return the tree of a method, its default cut, and the function that smooths boundaries.
+
+    Fragments are not counted as parts. Boundaries follow creases whichever way the faces of a
+    closed mesh are turned.
+    """
+    if method == "parts":
+        found = find_parts(surface, progress=progress)
+        return found.tree, {"persistence": PART_CONTRAST}, partial(smooth_cut, found)
+    shape = find_heat_features(surface, PRESETS[method], progress=progress)
+    default = {"n_regions": PRESETS[method].n_features + count_fragments(shape)}
+    return shape.tree, default, partial(smooth_boundaries, orient_closed_outward(surface))
 
 
-def save_labels(
-    source: Path,
-    mesh: TriangleMesh,
-    labels: Int[np.ndarray, " f"],
-    colors: UInt8[np.ndarray, "n 3"],
-    path: Path,
-) -> None:
-    """Write labels of faces, with the mesh of a file or alone, and print so on stderr."""
-    if path.suffix.lower() in LABEL_LISTS:
-        write_labels(labels, path)
-        print_written(path)
-    else:
-        save_like(source, mesh, path, colors=colors, face_labels=labels)
-
-
-def label_colors(
-    mesh: TriangleMesh, labels: Int[np.ndarray, " f"], examples: Sequence[LabeledShape]
-) -> UInt8[np.ndarray, "n 3"]:
-    """Return colors of the vertices by labels of faces, the same whichever labels of the examples occur."""
-    every = np.unique(np.concatenate([shape.labels for shape in examples]))
-    return part_colors(mesh, np.searchsorted(every, labels))
-
-
-def label_rows(
-    target: TriangleMesh, found: LabelTransfer, names: Sequence[str]
-) -> list[dict[str, Any]]:
-    """Return for each labeled part its label, its name, how reliable they are, its area and a vertex."""
-    areas = np.bincount(found.parts, weights=face_areas(target))
-    return [
-        {
-            "part": number,
-            "label": int(label),
-            "name": names[label] if 0 <= label < len(names) else "",
-            "confidence": float(found.part_confidence[number]),
-            "area_share": float(areas[number] / areas.sum()),
-            "vertex": int(found.part_vertices[number]),
-            "position": target.vertices[found.part_vertices[number]].tolist(),
-        }
-        for number, label in enumerate(found.part_labels)
-    ]
+def area_shares(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> list[float]:
+    """Return the share of the area that each label has."""
+    areas = np.bincount(labels, weights=face_areas(mesh))
+    return (areas / areas.sum()).tolist()
 
 
 def part_rows(mesh: TriangleMesh, parts: Segmentation) -> list[dict[str, Any]]:
     """Return for each part its feature point, where that lies, its share of the area and its persistence."""
-    areas, points = np.bincount(parts.labels, weights=face_areas(mesh)), parts.features
+    shares = area_shares(mesh, parts.labels)
     return [
         {
             "vertex": int(vertex),
             "position": mesh.vertices[vertex].tolist(),
-            "area_share": float(areas[number] / areas.sum()),
-            "persistence": float(points.persistence[number]),
+            "area_share": shares[number],
+            "persistence": float(parts.features.persistence[number]),
         }
-        for number, vertex in enumerate(points.vertices)
+        for number, vertex in enumerate(parts.features.vertices)
     ]
 
 
 def print_rows(title: str, columns: dict[str, str], rows: list[dict[str, Any]]) -> None:
     """Print rows as a table: under each heading the entry that it names."""
-    print_table(
-        title,
-        list(columns),
-        [[SHOWN.get(key, str)(row[key]) for key in columns.values()] for row in rows],
-    )
+    texts = [[_shown(key, row[key]) for key in columns.values()] for row in rows]
+    print_table(title, list(columns), texts)
+
+
+def _shown(key: str, value: Any) -> str:
+    if key == "area_share":
+        return f"{100 * value:.1f} %"
+    if key == "confidence":
+        return f"{100 * value:.0f} %"
+    if key == "persistence" and np.isinf(value):
+        return "never merges"
+    if isinstance(value, list):
+        return "  ".join(f"{coordinate:.4g}" for coordinate in value)
+    if value is None:
+        return "none"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

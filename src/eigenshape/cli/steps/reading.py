@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from jaxtyping import Int
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import EigenshapeError, InvalidParameterError
@@ -18,40 +16,35 @@ from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io import mesh_files, shape_files
-from eigenshape.io.cell_kinds import CellKind
+from eigenshape.io.formats.registry import CellKind
 from eigenshape.io.labeled_shapes import (
     find_labeled_shapes,
-    read_label_names,
     read_labeled_shape,
+    read_map,
 )
-from eigenshape.io.labels import read_map
 from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
+
+__all__ = ["read_map"]  # for the verbs, as it is, beside what is defined here
 
 
 def load_mesh(path: Path, repairs: str) -> TriangleMesh:
     """Read a mesh, apply the requested repairs, and print on stderr what they did."""
     names = repair_names(repairs)
     mesh, left_out = mesh_files.load_mesh(path, drop_missing=drops_missing(names))
-    done = repair(mesh, names)
-    print_repairs(left_out + done.report)
-    return done.mesh
-
-
-def load_poses(before: Path, after: Path, repairs: str) -> tuple[TriangleMesh, TriangleMesh]:
-    """Read two poses of one mesh; repair the first, and do the same to the faces of the second."""
-    first, second = mesh_files.read_mesh(before), mesh_files.read_mesh(after)
-    require_poses(first, second)
-    done = repair(first, repair_names(repairs))
-    print_repairs(done.report)
-    return done.mesh, TriangleMesh(second.vertices[done.source_vertices], done.mesh.faces)
+    return _repaired(mesh, names, left_out)
 
 
 def load_surface(path: Path, repairs: str) -> TriangleMesh:
     """Read a mesh, or make a surface of points; repair it, and print on stderr what was done."""
+    names = repair_names(repairs)
     made = read_surface(path)
-    done = repair(made.mesh, repair_names(repairs))
-    print_repairs(made.report + done.report)
+    return _repaired(made.mesh, names, made.report)
+
+
+def _repaired(mesh: TriangleMesh, names: tuple[str, ...], before: tuple[str, ...]) -> TriangleMesh:
+    done = repair(mesh, names)
+    print_repairs(before + done.report)
     return done.mesh
 
 
@@ -82,10 +75,19 @@ def load_repaired(
     return mesh, replace(done, report=left_out + done.report)
 
 
+def load_poses(before: Path, after: Path, repairs: str) -> tuple[TriangleMesh, TriangleMesh]:
+    """Read two poses of one mesh; repair the first, and do the same to the faces of the second."""
+    first, second = mesh_files.read_mesh(before), mesh_files.read_mesh(after)
+    require_poses(first, second)
+    done = repair(first, repair_names(repairs))
+    print_repairs(done.report)
+    return done.mesh, TriangleMesh(second.vertices[done.source_vertices], done.mesh.faces)
+
+
 def read_examples(
     like: Sequence[Path], labels: Sequence[Path], library: Path | None, repairs: str
-) -> tuple[dict[str, LabeledShape], list[str], list[str]]:
-    """Read the labeled shapes of a verb by name, and the names of labels that a library has.
+) -> tuple[dict[str, LabeledShape], list[str]]:
+    """Read the labeled shapes of a verb by name.
 
     Last come the names of those of the library that cannot be described once they are repaired; they
     are left out, with a line on stderr.
@@ -96,18 +98,13 @@ def read_examples(
         )
     if not like and library is None:
         raise InvalidParameterError("Labels must come from --like or from --library; give one.")
-    beside: Sequence[Path | None] = labels or [None] * len(like)
-    steps = repair_names(repairs)
-    found = {
-        str(path): _read_example(path, given, steps)
-        for path, given in zip(like, beside, strict=True)
-    }
-    if library is None:
-        return found, [], []
-    left_out = []
-    for path in find_labeled_shapes(library):
+    names = repair_names(repairs)
+    found, left_out = {}, []
+    for number, path in enumerate(like):
+        found[str(path)] = _read_example(path, labels[number] if labels else None, names)
+    for path in find_labeled_shapes(library) if library else ():
         try:
-            example = _read_example(path, None, steps)
+            example = _read_example(path, None, names)
             example.points  # noqa: B018 - described here, and kept, so that a failure has a name
         except (EigenshapeError, OSError) as error:
             err.print(f"[yellow]left out:[/] {escape_text(path.name)}: {escape_text(error)}")
@@ -118,13 +115,13 @@ def read_examples(
         raise InvalidParameterError(
             f"A library must hold a labeled shape that can be described; {library} holds none."
         )
-    return found, read_label_names(library), left_out
+    return found, left_out
 
 
-def _read_example(path: Path, labels: Path | None, repairs: tuple[str, ...]) -> LabeledShape:
+def _read_example(path: Path, labels: Path | None, names: tuple[str, ...]) -> LabeledShape:
     """Read a labeled shape and repair it; faces keep their labels."""
     given = read_labeled_shape(path, labels)
-    done = repair(given.mesh, repairs)
+    done = repair(given.mesh, names)
     if not done.report:
         return given
     print_repairs(tuple(f"{path.name}: {line}" for line in done.report))
@@ -132,13 +129,3 @@ def _read_example(path: Path, labels: Path | None, repairs: tuple[str, ...]) -> 
     middles = [mesh.vertices[mesh.faces].mean(axis=1) for mesh in (given.mesh, done.mesh)]
     nearest = cKDTree(middles[0]).query(middles[1])[1]
     return LabeledShape(done.mesh, given.labels[nearest])
-
-
-def read_partners(path: Path | None) -> Int[np.ndarray, " n"] | None:
-    """Read the partner of each vertex, or return None if no file is given."""
-    return None if path is None else read_map(path)
-
-
-def read_repaired(path: Path, names: tuple[str, ...]) -> TriangleMesh:
-    """Read a surface and apply repairs without printing, as for one of many."""
-    return repair(read_surface(path).mesh, names).mesh

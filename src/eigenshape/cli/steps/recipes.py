@@ -7,29 +7,22 @@ from zipfile import BadZipFile
 
 from eigenshape._errors import FileFormatError, InvalidParameterError, StoreError
 from eigenshape.cli.console import err
-from eigenshape.cli.inputs import PATCHES, require_method
-from eigenshape.retrieval.heat.recipe import PRESETS, HeatRecipe
+from eigenshape.retrieval.heat.recipe import PRESETS
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import read_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 
 
-def heat_recipe(name: str) -> HeatRecipe:
-    """Return the recipe of a heat method."""
-    require_method(name, tuple(PRESETS))
-    return PRESETS[name]
-
-
 def index_recipe(
     shelf: ShapeIndex, name: str, codebook: Path | None, *, in_parts: bool, n_frames: int | None
 ) -> AnyRecipe | None:
     """Return the recipe by which an index describes shapes, or None if it is to learn a codebook."""
-    if name != PATCHES:
+    if name != "patches":
         for option, value in (("--codebook", codebook), ("--frames", n_frames)):
             if value is not None:
                 raise InvalidParameterError(
-                    f"{option} is for --method {PATCHES}; the method is {name}. Leave one of them out."
+                    f"{option} is for --method patches; the method is {name}. Leave one of them out."
                 )
         return PRESETS[name]
     kept = _patch_recipe(shelf)
@@ -74,7 +67,7 @@ def query_recipe(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
     """Return the recipe of a method by which an index can answer; without a name, its own."""
     if name is None:
         return shelf.default_recipe()
-    if name == PATCHES:
+    if name == "patches":
         recipe: AnyRecipe | None = _patch_recipe(shelf)
     else:
         recipe = PRESETS[name] if PRESETS[name] in shelf.recipes() else None

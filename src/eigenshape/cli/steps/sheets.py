@@ -9,16 +9,16 @@ from jaxtyping import Int
 from matplotlib.figure import Figure
 
 from eigenshape._errors import EigenshapeError, StoreError
-from eigenshape._progress import Progress
 from eigenshape._text import literal
 from eigenshape.cli.console import err, escape_text, progress_bar
-from eigenshape.cli.steps.reading import read_repaired
-from eigenshape.cli.steps.views import Side
+from eigenshape.cli.steps.writing import Side
 from eigenshape.deformation.rigidity import nearest_rotations
 from eigenshape.geometry.distances.geodesic import geodesic_distances
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.simplices import size_one
+from eigenshape.io.surfaces import read_surface
 from eigenshape.plot.camera import Up, View, aim_camera
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
 from eigenshape.retrieval.description import describe
@@ -58,12 +58,10 @@ class ColoredQuery:
     dots: Int[np.ndarray, " p"]
 
 
-def color_query(
-    mesh: TriangleMesh, recipe: AnyRecipe, progress: Progress | None = None
-) -> ColoredQuery:
+def color_query(mesh: TriangleMesh, recipe: AnyRecipe) -> ColoredQuery:
     """Describe a query, and cut it into parts: around its features, or around the first of its patches."""
     if isinstance(recipe, HeatRecipe):
-        shape = find_heat_features(mesh, recipe, progress=progress)
+        shape = find_heat_features(mesh, recipe)
         every = np.arange(len(shape.descriptor.vertices))
         return ColoredQuery(shape.mesh, shape.descriptor, shape.parts.labels, every, every)
     descriptor = describe(mesh, recipe)
@@ -186,7 +184,7 @@ def _read_match(match: Match, repairs: tuple[str, ...]) -> TriangleMesh:
         raise StoreError(
             "A match is drawn from its mesh file; it was added to the index without one."
         )
-    mesh = read_repaired(Path(match.source), repairs)
+    mesh = repair(read_surface(Path(match.source)).mesh, repairs).mesh
     last = int(match.vertices.max(initial=-1))
     if last >= mesh.n_vertices:
         raise StoreError(

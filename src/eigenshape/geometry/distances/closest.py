@@ -1,4 +1,6 @@
-"""Nearest points on a surface, winding numbers around points, and signed distance in space."""
+"""Nearest points on a surface, winding numbers around points, and distances in space."""
+
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
@@ -18,7 +20,7 @@ from eigenshape.geometry.topology import is_closed
 
 # Points may be this many sizes of the mesh away: products of three distances stay below 1e200, and
 # floats end at 1e308.
-FARTHEST = 1e50
+FARTHEST_SIZES = 1e50
 # Winding numbers above this are inside: those of a closed surface are 1 there and 0 outside, and a
 # small hole changes them by little.
 INSIDE = 0.5
@@ -146,46 +148,7 @@ def signed_distance(mesh: MeshLike, points: ArrayLike) -> Float[np.ndarray, " p"
     """
     mesh = as_mesh(mesh)
     corners, places, scale = _scale_both(mesh, points)
-    _require_outward(mesh)
-    _, distances = _search(mesh, corners, places)
-    lowest, highest = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    boxed = ((places > lowest) & (places < highest)).all(axis=1) & (distances > 0)
-    inside = np.flatnonzero(boxed)[windings(places[boxed], corners) > INSIDE]
-    distances[inside] *= -1
-    return in_length(distances, scale, 1)
-
-
-def _scale_both(
-    mesh: TriangleMesh, points: ArrayLike
-) -> tuple[Float[np.ndarray, "f 3 3"], Float[np.ndarray, "p 3"], float]:
-    """Return corners and points relative to the middle of the mesh, in units of its size, and it."""
-    places = finite_rows(points, "points", 3)
-    corners = mesh.vertices[mesh.faces]
-    middle = corners.min(axis=(0, 1)) / 2 + corners.max(axis=(0, 1)) / 2
-    corners, scale = size_one(corners - middle)
-    with np.errstate(over="ignore"):
-        scaled = (places - middle) / scale
-    far = np.flatnonzero((np.abs(scaled) > FARTHEST).any(axis=1))
-    if far.size:
-        raise InvalidParameterError(
-            f"Points must lie within {FARTHEST:.0e} sizes of the mesh; point {far[0]} is at "
-            f"{places[far[0]].tolist()} ({far.size} such). Seen from there the mesh is a point."
-        )
-    return corners, scaled, scale
-
-
-def _search(
-    mesh: TriangleMesh, corners: Float[np.ndarray, "f 3 3"], places: Float[np.ndarray, "p 3"]
-) -> tuple[SurfacePoints, Float[np.ndarray, " p"]]:
-    """Return the nearest points and the scaled distances to them."""
-    boxes = face_boxes(corners.reshape(-1, 3))
-    order = np.argsort(curve_places(boxes), kind="stable")
-    found, weights, squares = nearest_faces(places, corners[order], *box_tree(boxes[order]))
-    return place_points(mesh, order[found], weights), np.sqrt(squares)
-
-
-def _require_outward(mesh: TriangleMesh) -> None:
-    """Raise an error if a closed piece, or an open mesh as a whole, looks inward."""
+    # A closed piece, or an open mesh as a whole, must not look inward.
     require_oriented(mesh)
     turned, _, _ = faces_to_turn(mesh)
     if turned.any():
@@ -199,3 +162,61 @@ def _require_outward(mesh: TriangleMesh) -> None:
             "Faces must look outward, or inside and outside change places; those of the convex "
             "hull look inward. Try orient_outward(mesh)."
         )
+    _, distances = _search(mesh, corners, places)
+    lowest, highest = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    boxed = ((places > lowest) & (places < highest)).all(axis=1) & (distances > 0)
+    inside = np.flatnonzero(boxed)[windings(places[boxed], corners) > INSIDE]
+    distances[inside] *= -1
+    return in_length(distances, scale, 1)
+
+
+def squared_distances(
+    points: Float[np.ndarray, "p d"], corners: Float[np.ndarray, "s corners d"]
+) -> Float[np.ndarray, "p s"]:
+    """Return the squared distance of each point to each simplex, in length².
+
+    The nearest point of a simplex lies in the interior of one of its sides: the simplex itself, a
+    facet, and so on down to a corner. There it is the foot of the perpendicular to the flat of that
+    side. So the least distance over all sides that contain their foot is returned.
+    """
+    least = np.full((len(points), len(corners)), np.inf)
+    numbers = range(corners.shape[1])
+    for size in range(1, corners.shape[1] + 1):
+        for side in combinations(numbers, size):
+            origin, others = corners[:, side[0]], corners[:, side[1:]]
+            sides, ways = others - origin[:, None], points[:, None] - origin
+            weights = np.einsum("sda,psd->psa", np.linalg.pinv(sides), ways)
+            inside = (weights >= 0).all(axis=2) & (weights.sum(axis=2) <= 1)
+            left = ways - np.einsum("psa,sad->psd", weights, sides)
+            squares = np.where(inside, np.einsum("psd,psd->ps", left, left), np.inf)
+            np.minimum(least, squares, out=least)
+    return least
+
+
+def _scale_both(
+    mesh: TriangleMesh, points: ArrayLike
+) -> tuple[Float[np.ndarray, "f 3 3"], Float[np.ndarray, "p 3"], float]:
+    """Return corners and points relative to the middle of the mesh, in units of its size, and it."""
+    places = finite_rows(points, "points", 3)
+    corners = mesh.vertices[mesh.faces]
+    middle = corners.min(axis=(0, 1)) / 2 + corners.max(axis=(0, 1)) / 2
+    corners, scale = size_one(corners - middle)
+    with np.errstate(over="ignore"):
+        scaled = (places - middle) / scale
+    far = np.flatnonzero((np.abs(scaled) > FARTHEST_SIZES).any(axis=1))
+    if far.size:
+        raise InvalidParameterError(
+            f"Points must lie within {FARTHEST_SIZES:.0e} sizes of the mesh; point {far[0]} is at "
+            f"{places[far[0]].tolist()} ({far.size} such). Seen from there the mesh is a point."
+        )
+    return corners, scaled, scale
+
+
+def _search(
+    mesh: TriangleMesh, corners: Float[np.ndarray, "f 3 3"], places: Float[np.ndarray, "p 3"]
+) -> tuple[SurfacePoints, Float[np.ndarray, " p"]]:
+    """Return the nearest points and the scaled distances to them."""
+    boxes = face_boxes(corners.reshape(-1, 3))
+    order = np.argsort(curve_places(boxes), kind="stable")
+    found, weights, squares = nearest_faces(places, corners[order], *box_tree(boxes[order]))
+    return place_points(mesh, order[found], weights), np.sqrt(squares)

@@ -24,6 +24,8 @@ def fragment_vertices(mesh: TriangleMesh, n_shares: int = N_SHARES) -> Int[np.nd
     If most of the area is in such components, all but the n largest components are fragments. Of
     components with equal areas those with the lowest vertices are kept first.
 
+    Raise InvalidShapeError if a vertex has no face.
+
     Parameters
     ----------
     mesh : TriangleMesh
@@ -34,11 +36,6 @@ def fragment_vertices(mesh: TriangleMesh, n_shares: int = N_SHARES) -> Int[np.nd
     -------
     (c,) int
         Vertices, ascending; empty if the mesh is connected.
-
-    Raises
-    ------
-    InvalidShapeError
-        If a vertex has no face.
     """
     count, labels = vertex_components(mesh)
     require_simplices_everywhere(mesh)

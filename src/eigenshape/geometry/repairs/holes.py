@@ -1,7 +1,5 @@
 """The repair of holes: their triangulation between the vertices around them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Int
@@ -11,26 +9,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.hole_loops import triangulate
 from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
 from eigenshape.geometry.simplices import size_one
-from eigenshape.geometry.topology import EdgeTable, boundary_loops, edge_table, half_edges
-
-
-@dataclass(frozen=True, eq=False)
-class Fillings:
-    """Faces that close holes.
-
-    Attributes
-    ----------
-    faces : tuple of (t, 3) int
-        The new faces of each hole that can be closed.
-    n_long : int
-        Number of holes with too many edges.
-    n_open : int
-        Number of other holes that no sound faces close.
-    """
-
-    faces: tuple[Int[np.ndarray, "_ 3"], ...]
-    n_long: int
-    n_open: int
+from eigenshape.geometry.topology import boundary_loops, edge_table, half_edges, neighbor_links
 
 
 def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[TriangleMesh]:
@@ -49,23 +28,12 @@ def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[Tr
         raise InvalidParameterError(
             f"most_edges must be at least 3, the edges of a triangle; it is {most_edges}."
         )
-    found = triangulate_holes(mesh, most_edges)
-    sealed = TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *found.faces]))
-    n_faces = sealed.n_faces - mesh.n_faces
-    report = f"fill_holes closed {count_nouns(len(found.faces), 'hole')} with {count_nouns(n_faces, 'face')}"
-    if found.n_long:
-        report += f", left {found.n_long} of more than {most_edges} edges"
-    if found.n_open:
-        report += f", left {found.n_open} that good faces do not close"
-    return RepairedMesh(sealed, (report,), np.arange(mesh.n_vertices))
-
-
-def triangulate_holes(mesh: TriangleMesh, most_edges: int) -> Fillings:
-    """Triangulate each boundary loop that has at most `most_edges` edges."""
     table = edge_table(mesh)
-    edges, face_of = table.edges, _faces_on_boundary(mesh, table)
-    graph = sp.csr_array((np.ones(len(edges), dtype=bool), edges.T), shape=(mesh.n_vertices,) * 2)
-    graph, n_long, n_open = (graph + graph.T).tocsr(), 0, 0
+    graph, n_long, n_open = neighbor_links(mesh), 0, 0
+    # The face of each boundary edge, as a pair of vertices directed as in the face
+    places = np.flatnonzero(table.n_faces[table.face_edges.T.ravel()] == 1)
+    sides = map(tuple, half_edges(mesh)[places].tolist())
+    face_of = dict(zip(sides, (places % mesh.n_faces).tolist(), strict=True))
     added: list[Int[np.ndarray, "_ 3"]] = []
     for loop in boundary_loops(mesh):
         ahead = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
@@ -82,14 +50,16 @@ def triangulate_holes(mesh: TriangleMesh, most_edges: int) -> Fillings:
             good = triangulate(points, _mark_existing_edges(graph, loop, added), triangles)
             added += [loop[triangles]] if good else []
             n_open += not good
-    return Fillings(tuple(added), n_long, n_open)
-
-
-def _faces_on_boundary(mesh: TriangleMesh, table: EdgeTable) -> dict[tuple[int, int], int]:
-    """Map each boundary edge, as a pair of vertices directed as in its face, to that face."""
-    places = np.flatnonzero(table.n_faces[table.face_edges.T.ravel()] == 1)
-    sides = map(tuple, half_edges(mesh)[places].tolist())
-    return dict(zip(sides, (places % mesh.n_faces).tolist(), strict=True))
+    sealed = TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *added]))
+    n_faces = sealed.n_faces - mesh.n_faces
+    report = (
+        f"fill_holes closed {count_nouns(len(added), 'hole')} with {count_nouns(n_faces, 'face')}"
+    )
+    if n_long:
+        report += f", left {n_long} of more than {most_edges} edges"
+    if n_open:
+        report += f", left {n_open} that good faces do not close"
+    return RepairedMesh(sealed, (report,), np.arange(mesh.n_vertices))
 
 
 def _mark_existing_edges(

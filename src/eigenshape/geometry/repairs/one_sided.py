@@ -1,11 +1,11 @@
 """Pieces with one side only, such as a Möbius strip, cut open so that they have two."""
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Bool, Int
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from eigenshape.geometry.face_turns import double_cover, face_neighbors, face_turns, turn_faces
+from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
 from eigenshape.geometry.topology import edge_table
@@ -68,8 +68,7 @@ def cut_edges(
     rows = np.concatenate([ends[kept].ravel(), corners])
     columns = np.concatenate([nodes[kept].ravel(), first + vertices[corners]])
     size = first + n
-    links = sp.coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
-    group = connected_components(links, directed=False)[1][: len(vertices)]
+    group = label_components(size, rows, columns)[1][: len(vertices)]
     _, first_corner, group = np.unique(group, return_index=True, return_inverse=True)
     # Groups are numbered by their first corner; all but the first of a vertex become new ones.
     owner = vertices[first_corner]

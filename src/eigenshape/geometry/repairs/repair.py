@@ -44,10 +44,7 @@ LARGEST_HOLE = 0.05  # a hole; for comparison, the open side of half a ball has 
 def repair_as_needed(mesh: MeshT) -> RepairedMesh[MeshT]:
     """Apply the repairs of `AUTO` in turn until none of them changes the mesh.
 
-    Raises
-    ------
-    InvalidShapeError
-        If no face would remain.
+    Raise InvalidShapeError if no face would remain.
     """
     return _until_sound(mesh, AUTO)[0]
 

@@ -3,18 +3,16 @@
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-from jaxtyping import Bool, Float, Int
-from scipy.sparse.csgraph import connected_components
+from jaxtyping import Bool, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.face_turns import turn_faces
+from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import faces_to_turn
-from eigenshape.geometry.repairs.flat_faces import flip_flat_faces
 from eigenshape.geometry.repairs.repair_report import (
     MeshT,
     RepairedCloud,
@@ -22,9 +20,17 @@ from eigenshape.geometry.repairs.repair_report import (
     count_nouns,
     simplex_noun,
 )
-from eigenshape.geometry.simplices import MEASURES, degenerate_simplices, scaled_corners, size_one
+from eigenshape.geometry.simplices import (
+    MEASURES,
+    degenerate_simplices,
+    scaled_corners,
+    side_lengths,
+    size_one,
+)
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
+    edge_table,
+    number_places,
     repeated_simplices,
     seams,
     submesh,
@@ -39,7 +45,7 @@ NEEDLE = 1e-6
 # A side shorter than this share of the longest side of the whole mesh is collapsed too: the area
 # there is below 1e-18 of others, and rounding hides one beside the other. Surfaces graded by tens
 # from side to side are solved down to 1e-9, and no longer at 1e-10.
-TINY = 1e-9
+TINY_SIDE = 1e-9
 
 
 def weld(mesh: MeshT, *, tolerance: float = 0.0) -> RepairedMesh[MeshT]:
@@ -54,14 +60,13 @@ def weld(mesh: MeshT, *, tolerance: float = 0.0) -> RepairedMesh[MeshT]:
             f"tolerance must lie in 0..0.1 of the diagonal of the bounding box; it is {tolerance}."
         )
     if tolerance == 0:
-        group = _place_numbers(mesh.points)
+        group = number_places(mesh.points)
     else:
         points, _ = size_one(mesh.points)
         points, _ = size_one(points - points.mean(axis=0))
         radius = tolerance * float(np.linalg.norm(np.ptp(points, axis=0)))
-        group = _group_numbers(
-            cKDTree(points).query_pairs(radius, output_type="ndarray"), mesh.n_points
-        )
+        near = cKDTree(points).query_pairs(radius, output_type="ndarray")
+        _, group = label_components(mesh.n_points, *near.T)
     return _merge_vertices(mesh, group, "weld joined {} to others at the same place")
 
 
@@ -72,21 +77,8 @@ def weld_seams(mesh: MeshT) -> RepairedMesh[MeshT]:
     closed pieces do, stay apart. Only edges on the boundary change: they get two faces or more.
     """
     one, two = seams(mesh).transpose(1, 0, 2).reshape(2, -1)
-    group = _group_numbers(np.column_stack([one, two]), mesh.n_points)
+    _, group = label_components(mesh.n_points, one, two)
     return _merge_vertices(mesh, group, "weld_seams joined {} along seams")
-
-
-def _place_numbers(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
-    """Return for each point the number of its place; equal points have the same place."""
-    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
-    _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
-    return place.ravel().astype(np.int64)
-
-
-def _group_numbers(pairs: Int[np.ndarray, "k 2"], n: int) -> Int[np.ndarray, " n"]:
-    """Group n points that are linked by pairs; return the number of each point's group."""
-    graph = sp.coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _merge_vertices(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> RepairedMesh[MeshT]:
@@ -121,6 +113,56 @@ def drop_degenerate(mesh: Mesh) -> RepairedMesh[Any]:
     return _keep_simplices(mesh, keep, report)
 
 
+def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+    """Flip the longest edge of each face without area; return the mesh and the number of flips.
+
+    A face (a, b, m) without area has its vertex m on the edge (a, b). If the face were only
+    removed, the edges (a, m) and (m, b) would separate from (a, b): heat would not cross there, and
+    a closed surface would become open. So the face (a, b, d) on the other side of the edge is split
+    at m into (a, m, d) and (m, b, d). The surface stays the same set of points.
+
+    An edge is left alone if it does not have exactly two faces, if the edge (m, d) exists already,
+    or if the flip would create another face without area, as where m coincides with a.
+    """
+    n_flips = 0
+    while True:
+        table = edge_table(mesh)
+        is_flat = np.zeros(mesh.n_faces, dtype=bool)
+        is_flat[degenerate_simplices(mesh)] = True
+        flat = np.flatnonzero(is_flat)
+        points, _ = size_one(mesh.vertices)
+        sides = np.stack([np.roll(mesh.faces[flat], -turn, axis=1) for turn in (1, 2)], axis=2)
+        lengths = np.linalg.norm(points[sides[..., 0]] - points[sides[..., 1]], axis=2)
+        corner = lengths.argmax(axis=1)  # opposite to the longest side
+        (a, b), m = sides[np.arange(len(flat)), corner].T, mesh.faces[flat, corner]
+        edge = table.face_edges[flat, corner]
+        # The other face at the edge, or the flat one itself if it is alone
+        order = np.argsort(table.face_edges.ravel(), kind="stable")
+        ordered = table.face_edges.ravel()[order]
+        first = order[np.searchsorted(ordered, edge)] // 3
+        last = order[np.searchsorted(ordered, edge, side="right") - 1] // 3
+        neighbor = np.where(first == flat, last, first)
+        between = mesh.faces[neighbor]
+        d = between.sum(axis=1) - a - b
+        one = np.where(between == b[:, None], m[:, None], between)
+        two = np.where(between == a[:, None], m[:, None], between)
+        keys = np.minimum(m, d) * mesh.n_vertices + np.maximum(m, d)
+        known = table.edges[:, 0] * mesh.n_vertices + table.edges[:, 1]
+        good = (table.n_faces[edge] == 2) & ~is_flat[neighbor] & ~np.isin(keys, known)
+        for halves in (one, two):
+            if len(halves):
+                good[degenerate_simplices(TriangleMesh(mesh.vertices, halves))] = False
+        # No two flips share a face or create the same edge, so all can be done at once.
+        chosen = np.flatnonzero(good)
+        chosen = chosen[np.unique(neighbor[chosen], return_index=True)[1]]
+        chosen = chosen[np.unique(keys[chosen], return_index=True)[1]]
+        if not len(chosen):
+            return mesh, n_flips
+        faces = mesh.faces.copy()
+        faces[flat[chosen]], faces[neighbor[chosen]] = one[chosen], two[chosen]
+        mesh, n_flips = TriangleMesh(mesh.vertices, faces), n_flips + len(chosen)
+
+
 def collapse_needles(mesh: MeshT) -> RepairedMesh[MeshT]:
     """Collapse sides shorter than a millionth of the longest side of their face or simplex.
 
@@ -131,22 +173,17 @@ def collapse_needles(mesh: MeshT) -> RepairedMesh[MeshT]:
     needle is left as it is.
     """
     corners, _ = scaled_corners(mesh)
-    one, two = np.triu_indices(mesh.dim + 1, 1)
-    lengths = np.linalg.norm(corners[:, one] - corners[:, two], axis=2)
+    lengths = side_lengths(corners)
     # Sides of length 0 belong to faces without area, which `drop_degenerate` removes.
-    least = np.maximum(NEEDLE * lengths.max(axis=1, keepdims=True), TINY * lengths.max())
+    least = np.maximum(NEEDLE * lengths.max(axis=1, keepdims=True), TINY_SIDE * lengths.max())
     short = (lengths > 0) & (lengths < least)
     in_simplex, side = np.nonzero(short)
     if short.any(axis=1).all():
         in_simplex, side = in_simplex[:0], side[:0]
-    ends = np.column_stack(
-        [mesh.simplices[in_simplex, one[side]], mesh.simplices[in_simplex, two[side]]]
-    )
-    joined = _merge_vertices(
-        mesh,
-        _group_numbers(ends, mesh.n_points),
-        "collapse_needles joined {} to others beside them",
-    )
+    one, two = np.triu_indices(mesh.dim + 1, 1)
+    starts, ends = mesh.simplices[in_simplex, one[side]], mesh.simplices[in_simplex, two[side]]
+    _, group = label_components(mesh.n_points, starts, ends)
+    joined = _merge_vertices(mesh, group, "collapse_needles joined {} to others beside them")
     ordered = np.sort(joined.mesh.simplices, axis=1)
     collapsed = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1) & short.any(axis=1)
     report = (
@@ -228,7 +265,7 @@ def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
 
 def drop_duplicate_points(cloud: PointCloud) -> RepairedCloud:
     """Keep the first of all points of a cloud at the same place."""
-    _, source = np.unique(_place_numbers(cloud.points), return_index=True)
+    _, source = np.unique(number_places(cloud.points), return_index=True)
     source = np.sort(source)
     removed = count_nouns(cloud.n_points - len(source), "point")
     report = f"drop_duplicate_points removed {removed} at the places of others"

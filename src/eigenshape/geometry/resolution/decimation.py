@@ -155,7 +155,20 @@ def decimate(
     ('decimate kept 320 of 1,280 faces and 162 of 642 vertices',)
     """
     mesh = as_mesh(mesh)
-    wanted = _wanted_faces(mesh, n_faces, ratio)
+    if (n_faces is None) == (ratio is None):
+        raise InvalidParameterError(
+            f"Exactly one of n_faces and ratio must be given; they are {n_faces} and {ratio}."
+        )
+    if mesh.n_faces <= FEWEST_FACES:
+        raise InvalidShapeError(
+            f"A mesh must have more than {FEWEST_FACES} faces to be decimated; it has {mesh.n_faces}."
+        )
+    if n_faces is not None:
+        wanted = whole_number(n_faces, "n_faces", FEWEST_FACES, mesh.n_faces - 1)
+    elif ratio is None or not 0 < ratio < 1:
+        raise InvalidParameterError(f"ratio must lie between 0 and 1; it is {ratio}.")
+    else:
+        wanted = min(max(FEWEST_FACES, round(ratio * mesh.n_faces)), mesh.n_faces - 1)
     require_sound(mesh)
     require_oriented(mesh)
     try:
@@ -200,22 +213,6 @@ def decimate(
         source_faces=closest_points(mesh, middles).simplices,
         original=mesh,
     )
-
-
-def _wanted_faces(mesh: TriangleMesh, n_faces: Integer | None, ratio: float | None) -> int:
-    if (n_faces is None) == (ratio is None):
-        raise InvalidParameterError(
-            f"Exactly one of n_faces and ratio must be given; they are {n_faces} and {ratio}."
-        )
-    if mesh.n_faces <= FEWEST_FACES:
-        raise InvalidShapeError(
-            f"A mesh must have more than {FEWEST_FACES} faces to be decimated; it has {mesh.n_faces}."
-        )
-    if ratio is None:
-        return whole_number(n_faces or 0, "n_faces", FEWEST_FACES, mesh.n_faces - 1)
-    if not 0 < ratio < 1:
-        raise InvalidParameterError(f"ratio must lie between 0 and 1; it is {ratio}.")
-    return min(max(FEWEST_FACES, round(ratio * mesh.n_faces)), mesh.n_faces - 1)
 
 
 def _require_rows(rows: np.ndarray, count: int, name: str, noun: str) -> None:

@@ -52,26 +52,18 @@ def subdivide(mesh: MeshLike) -> Mesh:
     TriangleMesh(9 vertices, 8 faces)
     """
     mesh = as_simplicial(mesh)
-    return _split_triangles(mesh) if isinstance(mesh, TriangleMesh) else _split_simplices(mesh)
+    if isinstance(mesh, TriangleMesh):
+        table = edge_table(mesh)
+        middles = mesh.vertices[table.edges].mean(axis=1)
+        a, b, c = mesh.faces.T
+        at_a, at_b, at_c = (table.face_edges + mesh.n_vertices).T
+        quarters = [(a, at_c, at_b), (b, at_a, at_c), (c, at_b, at_a), (at_a, at_b, at_c)]
+        faces = np.stack([np.column_stack(quarter) for quarter in quarters], axis=1)
+        return TriangleMesh(np.concatenate([mesh.vertices, middles]), faces.reshape(-1, 3))
 
-
-def _split_triangles(mesh: TriangleMesh) -> TriangleMesh:
-    table = edge_table(mesh)
-    middles = mesh.vertices[table.edges].mean(axis=1)
-    a, b, c = mesh.faces.T
-    at_a, at_b, at_c = (table.face_edges + mesh.n_vertices).T
-    quarters = [(a, at_c, at_b), (b, at_a, at_c), (c, at_b, at_a), (at_a, at_b, at_c)]
-    faces = np.stack([np.column_stack(quarter) for quarter in quarters], axis=1).reshape(-1, 3)
-    return TriangleMesh(np.concatenate([mesh.vertices, middles]), faces)
-
-
-def _split_simplices(mesh: SimplicialMesh) -> SimplicialMesh:
-    """Split each simplex so that the pieces of neighbors match.
-
-    The pieces depend on the order of the corners. If all simplices with an edge have its ends in
-    the same order, that order is used, and the pieces have such an order again; otherwise corners
-    are sorted by their points.
-    """
+    # The pieces depend on the order of the corners. If all simplices with an edge have its ends in
+    # the same order, that order is used, and the pieces have such an order again; otherwise corners
+    # are sorted by their points. So the pieces of neighbors match.
     corners = mesh.simplices
     edges = corners[:, np.column_stack(np.triu_indices(corners.shape[1], 1))].reshape(-1, 2)
     n_directed, n_edges = (len(np.unique(ends, axis=0)) for ends in (edges, np.sort(edges, axis=1)))

@@ -14,10 +14,10 @@ from eigenshape.geometry.resolution.thinning_loops import (
 from eigenshape.geometry.simplices import mean_side_length, size_one
 from eigenshape.geometry.topology import submesh
 
-# Edges collapse up to this length first, in mean edge lengths, and then up to GROWTH times the last
+# Edges collapse up to this length first, in mean edge lengths, and then up to LENGTH_GROWTH times the last
 # length: by small steps the spacing stays even (in the last pass at most a fifth of it differs).
 FIRST_LENGTH = 0.7
-GROWTH = 1.2
+LENGTH_GROWTH = 1.2
 # Most neighbors of a vertex, so that fans do not become slivers; a regular vertex has 6.
 MOST_NEIGHBORS = 12
 # Least cosine between the normals of a face before and after a collapse. If the noise of a scan is
@@ -27,7 +27,7 @@ LEAST_COSINE = 0.2
 STRICT_LENGTH = 1.5
 # Passes after which the surface stays as it is, whether it has few enough vertices or not: its
 # components and holes may need more.
-PASSES = 80
+MOST_PASSES = 80
 
 
 def thin_out(mesh: TriangleMesh, n_vertices: int) -> tuple[TriangleMesh, Int[np.ndarray, " k"]]:
@@ -59,12 +59,12 @@ def thin_out(mesh: TriangleMesh, n_vertices: int) -> tuple[TriangleMesh, Int[np.
     usual = edge * (mesh.n_vertices / n_vertices) ** 0.5
     marks = np.zeros((mesh.n_vertices + 1, 2), dtype=np.int64)
     length, n_left = FIRST_LENGTH * edge, int(np.count_nonzero(heads >= 0))
-    for _ in range(PASSES):
+    for _ in range(MOST_PASSES):
         if n_left <= n_vertices:
             break
         cosine = LEAST_COSINE if length < STRICT_LENGTH * usual else -1.0
         limits = length, MOST_NEIGHBORS, cosine
         n_left -= collapse_short_edges(points, faces, alive, heads, links, kinds, marks, limits)
-        length *= GROWTH
+        length *= LENGTH_GROWTH
     thin, source = submesh(TriangleMesh(mesh.vertices, faces), alive)
     return thin, source

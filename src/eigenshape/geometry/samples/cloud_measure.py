@@ -1,7 +1,7 @@
 """Quadrature weights of a point cloud: the share of the manifold that each point represents."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
 from eigenshape._arrays import whole_number
@@ -95,7 +95,7 @@ def shape_quadrature(shape: ShapeLike, *, n_neighbors: Integer | None = None) ->
     )
     points, scale = size_one(cloud.points)
     distances, neighbors = cKDTree(points).query(points, near + 1)
-    _require_different(cloud, distances, neighbors)
+    require_different_points(cloud, distances, neighbors)
     weights = np.empty(cloud.n_points)
     for first in range(0, cloud.n_points, POINTS_AT_ONCE):
         rows = slice(first, first + POINTS_AT_ONCE)
@@ -111,7 +111,10 @@ def shape_quadrature(shape: ShapeLike, *, n_neighbors: Integer | None = None) ->
     return Quadrature(cloud.points, in_length(weights, scale, dim), dim)
 
 
-def _require_different(cloud: PointCloud, distances: np.ndarray, neighbors: np.ndarray) -> None:
+def require_different_points(
+    cloud: PointCloud, distances: Float[np.ndarray, "n k"], neighbors: Int[np.ndarray, "n k"]
+) -> None:
+    """Raise an error if two points are equal, given the nearest of each, itself among them."""
     equal = np.flatnonzero(distances[:, 1] == 0)
     if equal.size:
         other = next(int(index) for index in neighbors[equal[0]] if index != equal[0])
@@ -145,10 +148,9 @@ def _cell_volumes(neighbors: Float[np.ndarray, "r k m"]) -> Float[np.ndarray, " 
     dim = neighbors.shape[2]
     if dim == 1:
         places = neighbors[:, :, 0]
-        ahead = np.min(np.where(places > 0, places, np.inf), axis=1)
-        behind = np.min(np.where(places < 0, -places, np.inf), axis=1)
-        ahead = np.where(np.isfinite(ahead), ahead, 0)
-        behind = np.where(np.isfinite(behind), behind, 0)
+        # On a side without a neighbor, such as behind the end of a curve, the cell ends at 0.
+        gaps = [np.min(np.where(way > 0, way, np.inf), axis=1) for way in (places, -places)]
+        ahead, behind = (np.where(np.isfinite(gap), gap, 0) for gap in gaps)
         return (ahead + behind) / 2
     if dim == 2:
         places = np.concatenate([neighbors, np.zeros_like(neighbors[:, :1])], axis=1)

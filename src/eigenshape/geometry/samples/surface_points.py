@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -108,4 +108,4 @@ def place_points(
 ) -> SurfacePoints:
     """Return the points with given barycentric coordinates in given simplices."""
     points = np.einsum("pc,pcd->pd", weights, mesh.points[mesh.simplices[simplices]])
-    return SurfacePoints(freeze(points), freeze(simplices), freeze(weights))
+    return SurfacePoints(points, simplices, weights)

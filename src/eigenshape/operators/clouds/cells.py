@@ -51,37 +51,28 @@ class CellGrid:
 
 def cell_grid(points: Float[np.ndarray, "n d"], reach: float) -> CellGrid:
     """Sort points into cells of a grid on which partners are neighbors."""
-    keys, sizes = _cell_keys(points, reach)
-    order = np.argsort(keys, kind="stable")
-    keys = keys[order]
-    firsts = np.flatnonzero(np.diff(keys, prepend=-1))
-    cells = np.append(firsts, len(keys))
-    return CellGrid(
-        np.ascontiguousarray(points[order]), order, cells, _runs(keys, keys[firsts], sizes), reach
-    )
-
-
-def _cell_keys(
-    points: np.ndarray, reach: float
-) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, "3"]]:
-    """Give each point the number of its cell; neighbors along the last axis follow each other."""
     spread = np.ptp(points, axis=0)
     axes = np.sort(np.argsort(-spread, kind="stable")[:AXES])
     side = max(reach, float(spread.max()) / CELLS_PER_AXIS)
     places = np.zeros((len(points), AXES), dtype=np.int64)
-    places[:, : len(axes)] = (
-        np.floor((points[:, axes] - points[:, axes].min(axis=0)) / side).astype(np.int64) + 1
-    )  # a margin
+    offsets = points[:, axes] - points[:, axes].min(axis=0)
+    places[:, : len(axes)] = np.floor(offsets / side).astype(np.int64) + 1  # a margin
+    # The number of the cell of each point; neighbors along the last axis follow each other.
     sizes = places.max(axis=0) + 2
-    return (places[:, 0] * sizes[1] + places[:, 1]) * sizes[2] + places[:, 2], sizes
-
-
-def _runs(keys: np.ndarray, cell_keys: np.ndarray, sizes: np.ndarray) -> Int[np.ndarray, "c 9 2"]:
+    keys = (places[:, 0] * sizes[1] + places[:, 1]) * sizes[2] + places[:, 2]
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    firsts = np.flatnonzero(np.diff(keys, prepend=-1))
+    # So partners lie in nine runs of three cells each.
     steps = np.array([(a * sizes[1] + b) * sizes[2] for a in (-1, 0, 1) for b in (-1, 0, 1)])
-    middle = cell_keys[:, None] + steps
-    return np.stack(
-        [np.searchsorted(keys, middle - 1, "left"), np.searchsorted(keys, middle + 1, "right")],
-        axis=-1,
+    middle = keys[firsts][:, None] + steps
+    first, last = np.searchsorted(keys, middle - 1), np.searchsorted(keys, middle + 1, "right")
+    return CellGrid(
+        np.ascontiguousarray(points[order]),
+        order,
+        np.append(firsts, len(keys)),
+        np.stack([first, last], axis=-1),
+        reach,
     )
 
 
@@ -94,19 +85,8 @@ def count_partners(
     if chosen is not None:
         wanted[:] = False
         wanted[chosen] = True
-    _each_cell(
-        grid,
-        partial(
-            pair_loops.count,
-            grid.points,
-            grid.order,
-            grid.cells,
-            grid.runs,
-            grid.reach**2,
-            wanted,
-            counts,
-        ),
-    )
+    known = grid.points, grid.order, grid.cells, grid.runs, grid.reach**2
+    _each_cell(grid, partial(pair_loops.count, *known, wanted, counts))
     return counts
 
 
@@ -141,16 +121,8 @@ def gaussian_differences(
     """Return w_i Σ_j w_j exp(-|x_i - x_j|²/4t) (f_i - f_j) for each column f, storing nothing between pairs."""
     sorted_values = np.ascontiguousarray(values[grid.order])
     sums = np.empty_like(sorted_values)
-    walk = partial(
-        pair_loops.difference,
-        grid.points,
-        grid.cells,
-        grid.runs,
-        grid.reach**2,
-        weights[grid.order],
-        1 / (4 * t),
-    )
-    _each_cell(grid, partial(walk, sorted_values, sums))
+    known = grid.points, grid.cells, grid.runs, grid.reach**2, weights[grid.order], 1 / (4 * t)
+    _each_cell(grid, partial(pair_loops.difference, *known, sorted_values, sums))
     result = np.empty_like(sums)
     result[grid.order] = sums
     return result

@@ -3,7 +3,6 @@
 from math import gamma, pi
 
 import numpy as np
-from jaxtyping import Float
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -174,25 +173,20 @@ def _width_factor(measure: Quadrature, edge: float) -> float:
     m = measure.dim
     sphere = 2 * pi ** ((m + 1) / 2) / gamma((m + 1) / 2)  # volume of the unit m-sphere
     radius = (float(measure.weights.sum()) / sphere) ** (1 / m)
-    share = _cell_scatter(measure) / RANDOM_SCATTER
+    # The scatter of cells is the standard deviation of weights over the mean weight of the points
+    # around: where the density varies smoothly, a weight and those around it vary alike.
+    points, _ = size_one(measure.points)
+    weights = measure.weights / measure.weights.max()
+    around = min(2 * _near(m), len(points) - 1)
+    neighbors = cKDTree(points).query(points, around + 1)[1][:, 1:]
+    scatter = float(np.std(weights / weights[neighbors].mean(axis=1)))
+    share = scatter / RANDOM_SCATTER
     wide = (share * radius / edge) ** (2 / (m + 4))
     # The kernel is cut off at 4h; a ball of that radius holds its volume over the mean cell.
     cell = float(measure.weights.mean())
     ball = pi ** (m / 2) / gamma(m / 2 + 1)
     widest = (MOST_REACHED * cell / ball) ** (1 / m) / (4 * edge)
     return max(EDGE_FACTOR, min(wide, widest))
-
-
-def _cell_scatter(measure: Quadrature) -> float:
-    """Return the standard deviation of weights over the mean weight of the points around.
-
-    Where the density varies smoothly, a weight and those around it vary alike, and do not scatter.
-    """
-    points, _ = size_one(measure.points)
-    weights: Float[np.ndarray, " n"] = measure.weights / measure.weights.max()
-    around = min(2 * _near(measure.dim), len(points) - 1)
-    neighbors = cKDTree(points).query(points, around + 1)[1][:, 1:]
-    return float(np.std(weights / weights[neighbors].mean(axis=1)))
 
 
 def _near(dim: int) -> int:

@@ -1,7 +1,7 @@
 """Local Delaunay triangulations of point clouds, and their tufted cover."""
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
@@ -9,6 +9,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.samples.cloud_measure import require_different_points
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.clouds import cloud_loops
 from eigenshape.operators.tufted import (
@@ -85,7 +86,7 @@ def local_triangles(
     count = whole_number(wanted, "n_neighbors", 3, most)
     points, _ = size_one(cloud.points)
     distances, found = cKDTree(points).query(points, count + 1)
-    _require_different(cloud, distances, found)
+    require_different_points(cloud, distances, found)
     neighbors = found[:, 1:]
     offsets = points[neighbors] - points[:, None]
     # Lengths relative to the farthest neighbor: squares neither overflow nor underflow.
@@ -97,7 +98,19 @@ def local_triangles(
     coordinates = np.einsum("nkd,nad->nka", offsets, frames)
     rings = np.empty((cloud.n_points, count + 1), dtype=np.int64)
     cloud_loops.local_rings(np.ascontiguousarray(coordinates), rings)
-    triangles = _fans(neighbors, rings, coordinates)
+    # Join each two that follow each other in a ring with the middle, but across its opening.
+    n, k = neighbors.shape
+    lengths = (rings >= 0).sum(axis=1)
+    following = np.roll(rings, -1, axis=1)
+    following[np.arange(n), lengths - 1] = rings[:, 0]
+    is_side = (rings >= 0) & (rings < k) & (following < k)
+    point, place = np.nonzero(is_side)
+    second, third = rings[point, place], following[point, place]
+    one, two = coordinates[point, second], coordinates[point, third]
+    # Where all neighbors lie on a line through the point, the ring has no inside.
+    spans = one[:, 0] * two[:, 1] > one[:, 1] * two[:, 0]
+    triangles = np.column_stack([point, neighbors[point, second], neighbors[point, third]])
+    triangles = triangles[spans]
     bare = np.setdiff1d(np.arange(cloud.n_points), triangles)
     if bare.size:
         raise InvalidShapeError(
@@ -115,10 +128,7 @@ def cloud_cover(
 
     Most triangles are there three times, once for each corner.
 
-    Raises
-    ------
-    InvalidShapeError, InvalidParameterError
-        As in `local_triangles`, or if `mollify` is not positive and finite.
+    Errors are those of `local_triangles`; `mollify` must be positive and finite.
     """
     if not 0 < mollify < np.inf:
         raise InvalidParameterError(
@@ -130,36 +140,3 @@ def cloud_cover(
     lengths = np.linalg.norm(sides, axis=2).ravel()
     lengths = mollify_lengths(lengths, edge_keys(triangles, cloud.n_points), mollify)
     return flip_to_delaunay(tufted_cover(points, triangles, lengths)), scale
-
-
-def _require_different(
-    cloud: PointCloud, distances: Float[np.ndarray, "n k"], found: Int[np.ndarray, "n k"]
-) -> None:
-    bad = np.flatnonzero(distances[:, 1] == 0)
-    if bad.size:
-        other = next(int(point) for point in found[bad[0]] if point != bad[0])
-        raise InvalidShapeError(
-            f"Points must differ from each other; points {bad[0]} and {other} are both at "
-            f"{cloud.points[bad[0]].tolist()} ({bad.size} such). "
-            'Try repair(cloud, ["drop_duplicate_points"]).'
-        )
-
-
-def _fans(
-    neighbors: Int[np.ndarray, "n k"],
-    rings: Int[np.ndarray, "n k1"],
-    coordinates: Float[np.ndarray, "n k 2"],
-) -> Int[np.ndarray, "f 3"]:
-    """Join each two that follow each other in a ring with the middle, but across its opening."""
-    n, k = neighbors.shape
-    lengths = (rings >= 0).sum(axis=1)
-    following = np.roll(rings, -1, axis=1)
-    following[np.arange(n), lengths - 1] = rings[:, 0]
-    is_side = (rings >= 0) & (rings < k) & (following < k)
-    point, place = np.nonzero(is_side)
-    second, third = rings[point, place], following[point, place]
-    one, two = coordinates[point, second], coordinates[point, third]
-    # Where all neighbors lie on a line through the point, the ring has no inside.
-    spans = one[:, 0] * two[:, 1] > one[:, 1] * two[:, 0]
-    triangles = np.column_stack([point, neighbors[point, second], neighbors[point, third]])
-    return triangles[spans]

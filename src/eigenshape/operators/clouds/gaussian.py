@@ -262,17 +262,12 @@ def gaussian_laplacian(
     laplacian = quadrature_laplacian(
         Quadrature(points, None, dim), t, correct=correct, form=form, cutoff=cutoff
     )
-    return laplacian if form == "random-walk" else _over_volume(laplacian, int(dim))
-
-
-def _over_volume(laplacian: Laplacian, dim: int) -> Laplacian:
-    """Record the volume that the kernel sees: weights in length^m sum to 1 under the kernel."""
     kernel, n = laplacian.kernel, laplacian.n_points
-    if kernel is None:
+    if kernel is None or form == "random-walk":
         return laplacian
-    degrees = (
-        kernel.t * laplacian.stiffness.diagonal() * n + (4 * np.pi * kernel.t) ** (-dim / 2) / n
-    )
+    # Record the volume that the kernel sees: weights in length^m sum to 1 under the kernel.
+    itself = (4 * np.pi * kernel.t) ** (-int(dim) / 2) / n
+    degrees = kernel.t * laplacian.stiffness.diagonal() * n + itself
     return replace(laplacian, kernel=replace(kernel, volume=float(1 / degrees.mean())))
 
 

@@ -22,7 +22,7 @@ from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.clouds.cells import CellGrid, cell_grid, count_partners, gaussian_rows
-from eigenshape.operators.clouds.csr_loops import component_labels
+from eigenshape.operators.clouds.pair_loops import component_labels
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 
 # Width of a kernel by default, h / e; t = e².
@@ -63,13 +63,23 @@ class KernelOptions:
 def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
     """Return the kernel of a heat time t, a width h = 2√t, or a width in mean edge lengths e (default 2e).
 
-    Raises
-    ------
-    InvalidParameterError
-        If more than one is given, one is not positive, another option is unknown, or the kernel is
-        narrower than the points lie.
+    Raise InvalidParameterError if more than one is given, one is not positive, another option is
+    unknown, or the kernel is narrower than the points lie.
     """
-    _require_options(options)
+    scales = {"t": options.t, "h": options.h, "edge_factor": options.edge_factor}
+    given = {name: value for name, value in scales.items() if value is not None}
+    if len(given) > 1:
+        raise InvalidParameterError(
+            f"At most one of t, h and edge_factor must be given; given are {given}."
+        )
+    for name, value in {**given, "cutoff": options.cutoff}.items():
+        positive_values(value, name)
+    if options.correct not in (None, "log"):
+        raise InvalidParameterError(f"correct must be None or 'log'; it is {options.correct!r}.")
+    if options.form not in ("literal", "random-walk"):
+        raise InvalidParameterError(
+            f"form must be 'literal' or 'random-walk'; it is {options.form!r}."
+        )
     width = options.h or (options.edge_factor or EDGE_FACTOR) * edge
     t = options.t or width**2 / 4
     factor = 2 * t**0.5 / edge
@@ -83,33 +93,10 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
     )
 
 
-def _require_options(options: KernelOptions) -> None:
-    given = {
-        name: value
-        for name in ("t", "h", "edge_factor")
-        if (value := getattr(options, name)) is not None
-    }
-    if len(given) > 1:
-        raise InvalidParameterError(
-            f"At most one of t, h and edge_factor must be given; given are {given}."
-        )
-    for name, value in {**given, "cutoff": options.cutoff}.items():
-        positive_values(value, name)
-    if options.correct not in (None, "log"):
-        raise InvalidParameterError(f"correct must be None or 'log'; it is {options.correct!r}.")
-    if options.form not in ("literal", "random-walk"):
-        raise InvalidParameterError(
-            f"form must be 'literal' or 'random-walk'; it is {options.form!r}."
-        )
-
-
 def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
     """Return the mean distance to the m(m+1) nearest points: as many as touch a point of the lattice A_m.
 
-    Raises
-    ------
-    InvalidShapeError
-        If there are not so many points, or all are equal.
+    Raise InvalidShapeError if there are not so many points, or all are equal.
     """
     near = dim * (dim + 1)
     if len(points) <= near:
@@ -128,11 +115,8 @@ def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
 def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
     """Build the Laplacian of the kernel on weighted points.
 
-    Raises
-    ------
-    InvalidShapeError
-        If the matrix would not fit into memory or its entries into floats, or a point has no
-        partner.
+    Raise InvalidShapeError if the matrix would not fit into memory or its entries into floats, or a
+    point has no partner.
     """
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)
@@ -150,17 +134,13 @@ def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
 def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
     """Build the Laplacian of the kernel with distances along the surface.
 
-    Raises
-    ------
-    InvalidShapeError
-        As `kernel_laplacian`, and if the mesh is no surface.
+    Errors are those of `kernel_laplacian`; the mesh must be a surface.
     """
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)
     radius = kernel.cutoff * kernel.width
-    _require_matrix_fits(
-        cell_grid(points, radius / scale)
-    )  # no ball along the surface holds more than one through space
+    # No ball along the surface holds more than one through space.
+    _require_matrix_fits(cell_grid(points, radius / scale))
     matrix = geodesic_balls(mesh, radius)
     _require_partners(measure, np.diff(matrix.indptr), kernel)
     rows = np.repeat(np.arange(measure.n_points), np.diff(matrix.indptr))

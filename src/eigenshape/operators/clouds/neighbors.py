@@ -9,7 +9,7 @@ from eigenshape._arrays import finite_rows, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.simplices import size_one
-from eigenshape.operators.graph import adjacency_matrix
+from eigenshape.geometry.topology import adjacency_matrix, unique_edges
 
 SPARE = 8  # neighbors requested beyond those wanted, so that most ties are found in one query
 
@@ -56,10 +56,19 @@ def neighbor_graph(
     wanted = whole_number(n_neighbors, "n_neighbors", 1, len(rows) - 1)
     scaled, scale = size_one(rows)
     near = nearest_others(scaled, wanted)
-    ends = np.stack([np.repeat(np.arange(len(rows)), wanted), near.ravel()])
-    keys = np.unique(ends.min(axis=0) * len(rows) + ends.max(axis=0))
-    edges = np.column_stack(np.divmod(keys, len(rows)))
-    weights = np.ones(len(edges)) if t is None else _gaussian(scaled, edges, scale, t)
+    edges = unique_edges(np.repeat(np.arange(len(rows)), wanted), near.ravel(), len(rows))
+    weights = np.ones(len(edges))
+    if t is not None:
+        time = float(positive_values([t], "t")[0])
+        squares = ((scaled[edges[:, 0]] - scaled[edges[:, 1]]) ** 2).sum(axis=1)
+        with np.errstate(over="ignore"):  # what overflows here is a weight of 0, refused below
+            weights = np.exp(-squares / 4 * scale / time * scale)
+        bad = np.flatnonzero(weights == 0)
+        if bad.size:
+            raise InvalidParameterError(
+                f"t must let every edge have weight; at t = {time:.4g} edge {tuple(edges[bad[0]].tolist())} of length "
+                f"{squares[bad[0]] ** 0.5 * scale:.4g} has exp(-|x - y|²/4t) = 0 ({bad.size} such). Choose a larger t."
+            )
     return adjacency_matrix(edges, weights, len(rows))
 
 
@@ -78,19 +87,3 @@ def nearest_others(points: Float[np.ndarray, "n d"], wanted: int) -> Int[np.ndar
         rest = rest[cut] if requested < n else rest[:0]
         requested = min(2 * requested, n)
     return nearest
-
-
-def _gaussian(
-    points: Float[np.ndarray, "n d"], edges: Int[np.ndarray, "e 2"], scale: float, t: float
-) -> Float[np.ndarray, " e"]:
-    time = float(positive_values([t], "t")[0])
-    squares = ((points[edges[:, 0]] - points[edges[:, 1]]) ** 2).sum(axis=1)
-    with np.errstate(over="ignore"):  # what overflows here is a weight of 0, refused below
-        weights = np.exp(-squares / 4 * scale / time * scale)
-    bad = np.flatnonzero(weights == 0)
-    if bad.size:
-        raise InvalidParameterError(
-            f"t must let every edge have weight; at t = {time:.4g} edge {tuple(edges[bad[0]].tolist())} of length "
-            f"{squares[bad[0]] ** 0.5 * scale:.4g} has exp(-|x - y|²/4t) = 0 ({bad.size} such). Choose a larger t."
-        )
-    return weights

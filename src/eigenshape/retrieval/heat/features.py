@@ -22,9 +22,8 @@ from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.repairs.fragments import fragment_vertices
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import boundary_edges, vertex_components
-from eigenshape.operators.boundary import dirichlet_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.retrieval.heat.descriptor import HeatDescriptor
 from eigenshape.retrieval.heat.recipe import SCALE_FREE, HeatRecipe
 from eigenshape.scans.partial import MeshPart, view_of, views_of

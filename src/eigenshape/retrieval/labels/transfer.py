@@ -5,9 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float, Int
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_each
@@ -19,6 +17,7 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh
@@ -337,9 +336,7 @@ def _pieces(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray
     """Find the connected pieces of equal labels."""
     pairs, _ = face_pairs(edge_table(mesh))
     same = labels[pairs[:, 0]] == labels[pairs[:, 1]]
-    links = np.ones(np.count_nonzero(same), dtype=np.int8)
-    graph = sp.coo_array((links, pairs[same].T), shape=(mesh.n_faces, mesh.n_faces))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return label_components(mesh.n_faces, *pairs[same].T)[1]
 
 
 def _join_small_pieces(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, " f"]:

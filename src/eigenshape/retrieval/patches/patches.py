@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import SupportsIndex
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
@@ -12,6 +11,7 @@ from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import map_in_threads, one_blas_thread
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
@@ -88,9 +88,9 @@ class Patches(ReadOnly):
 def extract_patches(
     mesh: MeshLike,
     *,
-    n_samples: SupportsIndex = N_SAMPLES,
-    n_views: SupportsIndex = N_VIEWS,
-    n_frames: SupportsIndex = 0,
+    n_samples: Integer = N_SAMPLES,
+    n_views: Integer = N_VIEWS,
+    n_frames: Integer = 0,
     clean: bool = True,
 ) -> list[Patches]:
     """Describe geodesic discs around points of a surface, and of what single viewpoints see of it.

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._arrays import ReadOnly, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
@@ -12,7 +12,6 @@ from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.facet_lists import FacetTable
 from eigenshape.geometry.facets import facet_components, facet_table, without_pinches
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, size_one
@@ -86,20 +85,17 @@ class Brackets(ReadOnly):
             f"{self.constant / self.longest_edge:.4f} of the longest edge; rounding and residuals are counted in, "
             f"{self.rounding:.1e} at the last."
         )
-        return f"{how} {self._widths()}"
-
-    def _widths(self) -> str:
         zero = {0: "", 1: "The first is 0. "}.get(self.n_zero, f"The first {self.n_zero} are 0. ")
         if self.n_zero == len(self.upper):
-            return zero.strip()
+            return f"{how} {zero.strip()}"
         if self.lower[-1] == 0:
             return (
-                f"{zero}Rounding in slivers leaves no lower bound above 0. Repair or remesh nearly "
+                f"{how} {zero}Rounding in slivers leaves no lower bound above 0. Repair or remesh nearly "
                 f"degenerate simplices."
             )
         widths = 1 - self.lower[self.n_zero :] / self.upper[self.n_zero :]
         return (
-            f"{zero}The brackets are {np.median(widths):.2g} of their upper ends wide in the median, "
+            f"{how} {zero}The brackets are {np.median(widths):.2g} of their upper ends wide in the median, "
             f"{widths.max():.2g} at most; edges of half the length make them a quarter."
         )
 
@@ -174,7 +170,10 @@ def bracket_eigenvalues(
     True
     """
     mesh = as_simplicial(mesh)
-    _require_condition(boundary)
+    if boundary not in ("neumann", "dirichlet"):
+        raise InvalidParameterError(
+            f"boundary must be 'neumann' or 'dirichlet'; it is {boundary!r}."
+        )
     require_sound(mesh)
     points, scale = size_one(mesh.points)
     unit = SimplicialMesh(points, mesh.simplices)
@@ -182,7 +181,11 @@ def bracket_eigenvalues(
     fixed = table.boundary if boundary == "dirichlet" else NO_POINTS
     upper, rounding = _upper_bounds(unit, k, boundary, progress)
     lower = lower_bounds(unit, table, len(upper), fixed, progress)
-    n_zero = min(_n_zero(table, fixed), len(upper))
+
+    # A part without fixed facets has the constants of eigenvalue 0.
+    n_parts, labels = facet_components(table)
+    with_fixed = np.isin(table.simplex_facets, fixed).any(axis=1)
+    n_zero = min(n_parts - len(np.unique(labels[with_fixed])), len(upper))
     lower[:n_zero] = upper[:n_zero] = 0.0
     if progress:
         progress(1.0, "bracketed")
@@ -214,16 +217,3 @@ def _upper_bounds(
     found = solve_spectrum(laplacian, count, fixed=fixed, progress=partly(progress, 0.0, 0.3))
     ends = enclose(found, laplacian, LINEAR_FLOOR, relative_rounding(mesh))[1]
     return ends, float(1 - found.eigenvalues[-1] / ends[-1]) if ends[-1] else 0.0
-
-
-def _n_zero(table: FacetTable, fixed: Int[np.ndarray, " h"]) -> int:
-    count, labels = facet_components(table)
-    with_fixed = np.isin(table.simplex_facets, fixed).any(axis=1)
-    return count - len(np.unique(labels[with_fixed]))
-
-
-def _require_condition(boundary: str) -> None:
-    if boundary not in ("neumann", "dirichlet"):
-        raise InvalidParameterError(
-            f"boundary must be 'neumann' or 'dirichlet'; it is {boundary!r}."
-        )

@@ -1,7 +1,5 @@
 """Lower bounds of eigenvalues by Crouzeix-Raviart elements."""
 
-from collections.abc import Callable
-
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -43,7 +41,14 @@ def lower_bounds(
     """
     squares, measure = interpolation_constants(mesh) ** 2, simplex_volumes(mesh)
     mean, largest = float((squares * measure).sum() / measure.sum()), float(squares.max())
-    solve = _solver(mesh, table, fixed)
+    stiffness, rounding = crouzeix_raviart_laplacian(mesh).stiffness, relative_rounding(mesh)
+
+    def solve(measure: Float[np.ndarray, " s"], k: int, progress: Progress | None) -> Values:
+        """Return lower bounds of Crouzeix-Raviart eigenvalues for given measures."""
+        laplacian = Laplacian(stiffness, facet_mass(table, measure))
+        found = solve_spectrum(laplacian, k, fixed=fixed, progress=progress)
+        return enclose(found, laplacian, mass_floor(mesh.dim), rounding)[0]
+
     values = solve(measure, k, partly(progress, 0.3, 0.6))
     best = values / (1 + largest * values)
     done = 0.6
@@ -69,20 +74,6 @@ def _weights(values: Values, mean: float, largest: float) -> list[float]:
     top = min(last / (1 + mean * last), NEAREST_POLE / largest)
     n_steps = int(np.ceil(np.log(max(top / float(positive[0]), 1.0)) / np.log(WEIGHT_STEP)))
     return [top / WEIGHT_STEP**step for step in range(min(n_steps + 1, MOST_WEIGHTS))]
-
-
-def _solver(
-    mesh: Mesh, table: FacetTable, fixed: Int[np.ndarray, " h"]
-) -> Callable[[Float[np.ndarray, " s"], int, Progress | None], Values]:
-    """Return a function that computes lower bounds of Crouzeix-Raviart eigenvalues for given measures."""
-    stiffness, rounding = crouzeix_raviart_laplacian(mesh).stiffness, relative_rounding(mesh)
-
-    def solve(measure: Float[np.ndarray, " s"], k: int, progress: Progress | None) -> Values:
-        laplacian = Laplacian(stiffness, facet_mass(table, measure))
-        found = solve_spectrum(laplacian, k, fixed=fixed, progress=progress)
-        return enclose(found, laplacian, mass_floor(mesh.dim), rounding)[0]
-
-    return solve
 
 
 def partly(progress: Progress | None, start: float, end: float) -> Progress | None:

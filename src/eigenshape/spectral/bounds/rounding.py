@@ -55,14 +55,11 @@ def relative_rounding(mesh: Mesh) -> float:
     edges = mesh.simplices[:, np.column_stack(np.triu_indices(mesh.dim + 1, 1))].reshape(-1, 2)
     _, n_around = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
     terms = corners.shape[2] + int(n_around.max())
-    return float(4 * (mesh.dim + 1) ** 2 * terms * EPS * _flatness(corners).max())
-
-
-def _flatness(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:
     inner = np.linalg.inv(triangular_sides(corners)[1])
     gradients = np.linalg.norm(
         np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1), axis=2
     )
     first, second = np.triu_indices(corners.shape[1], 1)
     squares = ((corners[:, first] - corners[:, second]) ** 2).sum(axis=2)
-    return (squares * gradients[:, first] * gradients[:, second]).sum(axis=1)
+    flatness = (squares * gradients[:, first] * gradients[:, second]).sum(axis=1)
+    return float(4 * (mesh.dim + 1) ** 2 * terms * EPS * flatness.max())

@@ -19,8 +19,8 @@ from eigenshape.spectral.comparison.eigenspaces import (
     separated_groups,
 )
 from eigenshape.spectral.solver.certify import quality
+from eigenshape.spectral.solver.eigenpairs import Pairs, error_bound
 from eigenshape.spectral.solver.kernel_values import to_pencil
-from eigenshape.spectral.solver.pairs import Pairs, error_bound
 from eigenshape.spectral.solver.pencil import Pencil, normalize, residual_norms
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
@@ -165,7 +165,12 @@ def eigenspace_angles(
     for place, group in enumerate(groups):
         name = f"Eigenvectors {group.start} to {group.stop - 1} of two"
         pulled = orthonormal(two.eigenvectors[partners, group], one.mass, name)
-        angles[place] = _largest_angle(one, group, pulled)
+        # The largest principal angle: a small one by its sine, a large one by its cosine.
+        vectors = one.eigenvectors[:, group]
+        rest = outside(pulled, vectors, one.mass)
+        sine = np.sqrt(max(np.linalg.eigvalsh(rest.T @ (one.mass @ rest))[-1], 0.0))
+        cosine = np.linalg.svd(vectors.T @ (one.mass @ pulled), compute_uv=False)[-1]
+        angles[place] = np.arctan2(sine, cosine)
         bounds[place] = np.pi / 2 if exact is None else _bound(*exact, group, pulled)
     steps = np.concatenate([[np.inf], np.diff(one.eigenvalues)])
     starts, stops = (
@@ -196,15 +201,6 @@ def _partners(one: Spectrum, two: Spectrum, points: ArrayLike | None) -> Int[np.
             f"points must hold one point of two for each of {n_one} points of one; there are {len(partners)}."
         )
     return partners
-
-
-def _largest_angle(one: Spectrum, group: slice, pulled: Vectors) -> float:
-    """Return the largest principal angle, small ones by their sine and large ones by their cosine."""
-    vectors = one.eigenvectors[:, group]
-    rest = outside(pulled, vectors, one.mass)
-    sine = np.sqrt(max(np.linalg.eigvalsh(rest.T @ (one.mass @ rest))[-1], 0.0))
-    cosine = np.linalg.svd(vectors.T @ (one.mass @ pulled), compute_uv=False)[-1]
-    return float(np.arctan2(sine, cosine))
 
 
 def _unit_pairs(one: Spectrum, laplacian: Laplacian) -> tuple[Pencil, Pairs]:

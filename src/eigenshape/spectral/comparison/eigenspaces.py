@@ -191,10 +191,7 @@ def orthonormal(
     Twice by Cholesky, of columns made of one length first: as orthonormal as rounding lets it be
     for all that pass (Yamamoto and others 2015).
 
-    Raises
-    ------
-    InvalidParameterError
-        If the columns are dependent.
+    Raises an InvalidParameterError if the columns are dependent.
     """
     basis = columns / np.abs(columns).max(axis=0).clip(np.finfo(np.float64).tiny)
     basis = basis / norms(basis, mass).clip(np.finfo(np.float64).tiny)

@@ -1,11 +1,10 @@
 """ShapeDNA: the lowest eigenvalues of the Laplacian (Reuter, Wolter and Peinecke 2006)."""
 
-from typing import SupportsIndex
-
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arrays import whole_number
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -15,7 +14,7 @@ from eigenshape.spectral.solve import solve_spectrum
 N_VALUES = 20
 
 
-def shape_dna(mesh: MeshLike, n_values: SupportsIndex | None = None) -> Float[np.ndarray, " k"]:
+def shape_dna(mesh: MeshLike, n_values: Integer | None = None) -> Float[np.ndarray, " k"]:
     """Describe a shape by the lowest eigenvalues of its cotangent Laplacian, without the first.
 
     Entry i is A λ_i / i, with A the area, so that the size of the shape does not matter. Of the

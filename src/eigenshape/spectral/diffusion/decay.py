@@ -23,11 +23,8 @@ def decay_factors(
 
     `name` is what messages call the times.
 
-    Raises
-    ------
-    InvalidParameterError
-        If a time is not positive and finite, or the spectrum does not begin with the lowest
-        eigenvalue.
+    Raises an InvalidParameterError if a time is not positive and finite, or the spectrum does not
+    begin with the lowest eigenvalue.
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")

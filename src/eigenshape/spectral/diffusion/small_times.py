@@ -15,7 +15,7 @@ from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
 
 # Eigenvalues that are needed at least. With fewer, the shortest times are as long as the shape.
-FEWEST = 50
+FEWEST_EIGENVALUES = 50
 # In a list without residuals, an eigenvalue up to this share of the largest is 0: other solvers
 # than ours stop at about 1e-8.
 ZERO = 1e-7
@@ -230,9 +230,9 @@ def _require_eigenvalues(
         require_lowest(spectrum, "eigenvalues")
         eigenvalues = spectrum.eigenvalues
     values = finite_values(eigenvalues, "eigenvalues")
-    if len(values) < FEWEST:
+    if len(values) < FEWEST_EIGENVALUES:
         raise InvalidParameterError(
-            f"At least {FEWEST} eigenvalues are needed to see short times; there are {len(values)}. "
+            f"At least {FEWEST_EIGENVALUES} eigenvalues are needed to see short times; there are {len(values)}. "
             "Increase k."
         )
     bad = np.flatnonzero(np.diff(values, prepend=0.0) < 0)

@@ -15,8 +15,8 @@ from eigenshape.geometry.conversion import ShapeLike
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.laplacian import ASYMMETRY, Laplacian
-from eigenshape.spectral.laws.comparison import sizes_of
-from eigenshape.spectral.laws.report import (
+from eigenshape.spectral.laws.agreement import sizes_of
+from eigenshape.spectral.laws.outcomes import (
     DEFAULT_PROMISES,
     Law,
     OperatorReport,
@@ -162,28 +162,21 @@ def _count(pencil: Pencil, share: float) -> int | None:
 
 
 def _semidefinite(pencil: Pencil) -> Law:
-    for share in LADDER:
-        factor = _factor(pencil, -float(share))
+    name = "positive semidefinite"
+    for share in LADDER.tolist():
+        factor = _factor(pencil, -share)
         if factor and factor.count == 0:
-            return make_law(
-                "positive semidefinite",
-                float(share),
-                NEGATIVE,
-                _lower_bound_text(pencil, factor, float(share)),
+            loss = float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
+            proved = float(pencil.values_out(np.array([-factor.shift + loss]))[0])
+            explanation = f"W + {share:.0e} (trace W / trace B) B has no negative pivot"
+            if share > LADDER[0]:
+                explanation = f"{explanation}, and some with {share / 10:.0e}"
+            explanation = (
+                f"{explanation}: rounding included, no eigenvalue lies below {-proved:.1e}."
             )
+            return make_law(name, share, NEGATIVE, explanation)
     explanation = f"eigenvalues lie below -{LADDER[-1]:.0e} trace W / trace B."
-    return make_law("positive semidefinite", np.inf, NEGATIVE, explanation)
-
-
-def _lower_bound_text(pencil: Pencil, factor: Factor, share: float) -> str:
-    bound = (
-        -factor.shift + float((rounding(factor) / pencil.mass_diagonal).max()) / pencil.mass_floor
-    )
-    explanation = f"W + {share:.0e} (trace W / trace B) B has no negative pivot"
-    if share > LADDER[0]:
-        explanation = f"{explanation}, and some with {share / 10:.0e}"
-    proved = float(pencil.values_out(np.array([bound]))[0])
-    return f"{explanation}: rounding included, no eigenvalue lies below {-proved:.1e}."
+    return make_law(name, np.inf, NEGATIVE, explanation)
 
 
 def _row_sums(laplacian: Laplacian) -> Law:
@@ -215,20 +208,18 @@ def _kernel(laplacian: Laplacian, pencil: Pencil) -> Law:
         float((energies / np.maximum(np.abs(masses), np.finfo(float).tiny)).max()) / pencil.level
     )
     line = min(max(FIRST_LINE, 4 * energy), LARGEST_ZERO)
-    while (zeros := _zeros(pencil, line)) < n_parts and line < LARGEST_ZERO:
-        # what rounding makes of a zero may lie farther out; a larger interval holds no fewer
+    while True:
+        below, negative = _count(pencil, line), _count(pencil, -line)
+        zeros = 0 if below is None or negative is None else below - negative
+        if zeros >= n_parts or line >= LARGEST_ZERO:
+            break
+        # What rounding makes of a zero may lie farther out; a larger interval holds no fewer.
         line *= 10
     explanation = (
         f"within {line:.0e} trace W / trace B of zero lie {zeros} of the eigenvalues; "
         f"components of W: {n_parts}."
     )
     return make_law("kernel", abs(zeros - n_parts), 0, explanation)
-
-
-def _zeros(pencil: Pencil, line: float) -> int:
-    """Count the eigenvalues on either side of zero; none where no factor serves."""
-    below, negative = _count(pencil, line), _count(pencil, -line)
-    return 0 if below is None or negative is None else below - negative
 
 
 def _graph_parts(matrix: sp.csr_array) -> tuple[int, Int[np.ndarray, " n"]]:
@@ -245,33 +236,20 @@ def _components(laplacian: Laplacian, shape: Subject | None) -> Outcome:
         _graph_parts(shape) if isinstance(shape, sp.csr_array) else vertex_components(shape)
     )
     if len(labels) != laplacian.n_points:
-        return _number_of_parts(laplacian, n_parts)
-    worst, explanation = 0.0, "no entry of W or B joins two of them."
+        found, _ = _graph_parts(laplacian.stiffness)
+        explanation = f"the shape has {n_parts}, and W has {found}."
+        return make_law("components", abs(found - n_parts), 0, explanation)
+    largest, explanation = 0.0, "no entry of W or B joins two of them."
     for name, matrix in (("W", laplacian.stiffness), ("B", laplacian.mass)):
-        size, place = _largest_link(matrix, labels)
-        if size > worst:
-            worst = size
-            explanation = f"entry {place} of {name} joins two of them: it is {size:.1e} of √({name}_ii {name}_jj)."
-    return make_law("components", worst, LINK, f"the shape has {n_parts}; {explanation}")
-
-
-def _number_of_parts(laplacian: Laplacian, n_parts: int) -> Law:
-    found = _graph_parts(laplacian.stiffness)[0]
-    return make_law(
-        "components", abs(found - n_parts), 0, f"the shape has {n_parts}, and W has {found}."
-    )
-
-
-def _largest_link(
-    matrix: sp.csr_array, labels: Int[np.ndarray, " n"]
-) -> tuple[float, tuple[int, int]]:
-    entries, roots = matrix.tocoo(), sizes_of(matrix)
-    scaled = np.abs(entries.data) / (roots[entries.row] * roots[entries.col])
-    scaled[labels[entries.row] == labels[entries.col]] = 0.0
-    if not scaled.size:
-        return 0.0, (0, 0)
-    worst = int(scaled.argmax())
-    return float(scaled[worst]), (int(entries.row[worst]), int(entries.col[worst]))
+        entries, roots = matrix.tocoo(), sizes_of(matrix)
+        scaled = np.abs(entries.data) / (roots[entries.row] * roots[entries.col])
+        scaled[labels[entries.row] == labels[entries.col]] = 0.0
+        if scaled.max(initial=0.0) > largest:
+            worst = int(scaled.argmax())
+            largest = float(scaled[worst])
+            place = int(entries.row[worst]), int(entries.col[worst])
+            explanation = f"entry {place} of {name} joins two of them: it is {largest:.1e} of √({name}_ii {name}_jj)."
+    return make_law("components", largest, LINK, f"the shape has {n_parts}; {explanation}")
 
 
 def _definite(pencil: Pencil) -> Law:

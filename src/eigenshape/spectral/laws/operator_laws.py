@@ -1,8 +1,9 @@
 """What must hold between the operators of one shape told in different ways."""
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +14,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.laws import transformations as changes
-from eigenshape.spectral.laws.comparison import (
+from eigenshape.spectral.laws.agreement import (
     MOST_ROUNDING,
     distance,
     lowest_eigenvalues,
@@ -24,7 +25,7 @@ from eigenshape.spectral.laws.comparison import (
     spectral_distance,
 )
 from eigenshape.spectral.laws.laplacian_laws import check_laplacian
-from eigenshape.spectral.laws.report import (
+from eigenshape.spectral.laws.outcomes import (
     DEFAULT_PROMISES,
     Law,
     OperatorReport,
@@ -170,49 +171,13 @@ def check_operator(
         )
     report = check_laplacian(laplacian, subject, promises=promised)
     rows_are_points = laplacian.n_points == _n_points(subject) if by_points is None else by_points
-    spectrum = None if rows_are_points else _spectrum(laplacian)
+    spectrum = None
+    if not rows_are_points:
+        with suppress(EigenshapeError):  # laws that need it are not judged, and say so
+            spectrum = lowest_eigenvalues(laplacian)
     rounding = _rounding(build, subject, spectrum or laplacian, random)
     trial = Trial(build, subject, laplacian, random, spectrum, rows_are_points, rounding)
     return make_report([*all_outcomes(report), *_rebuilding_laws(trial, promised)])
-
-
-def _spectrum(laplacian: Laplacian) -> Spectrum | None:
-    try:
-        return lowest_eigenvalues(laplacian)
-    except EigenshapeError:  # laws that need it are not judged, and say so
-        return None
-
-
-def _rebuilding_laws(trial: Trial, promised: frozenset[Promise]) -> Iterator[Outcome]:
-    yield _attempt("repetition", _repetition, trial)
-    yield _attempt("point order", _point_order, trial)
-    yield _attempt("simplex order", _simplex_order, trial)
-    optional: dict[Promise, Callable[[Trial], Outcome]] = {
-        "rigid_motion": _rigid_motion,
-        "reflection": _reflection,
-        "orientation": _orientation,
-        "scaling": _scaling,
-        "union": _union,
-    }
-    for promise, law in optional.items():
-        name = promise.replace("_", " ")
-        yield (
-            _attempt(name, law, trial) if promise in promised else SkippedLaw(name, "not promised")
-        )
-
-
-def _attempt(name: str, law: Callable[[Trial], Outcome], trial: Trial) -> Outcome:
-    """Judge a law; an operator that refuses the shape told otherwise breaks it."""
-    try:
-        return law(trial)
-    except (EigenshapeError, ValueError, ArithmeticError) as err:
-        return Law(
-            name,
-            False,
-            np.inf,
-            trial.tolerance,
-            f"told otherwise, the shape or its spectrum is refused: {err}",
-        )
 
 
 def _rounding(
@@ -220,94 +185,108 @@ def _rounding(
 ) -> float:
     if isinstance(subject, sp.csr_array):
         return LEAST_ROUNDING
+    largest = 0.0
     try:
-        others = [build(changes.jiggle(subject, rng)) for _ in range(JIGGLES)]
-        return max(LEAST_ROUNDING, HEADROOM * max(_jiggle(expected, other) for other in others))
+        for other in [build(changes.jiggle(subject, rng)) for _ in range(JIGGLES)]:
+            change = 0.0
+            if not isinstance(expected, Laplacian):
+                found = lowest_eigenvalues(other, len(expected.eigenvalues))
+                change, _ = spectral_distance(expected.eigenvalues, found.eigenvalues)
+            elif expected.n_points == other.n_points:
+                change, _ = distance(expected, other)
+            largest = max(largest, change)
     except (EigenshapeError, ValueError, ArithmeticError):
         return LEAST_ROUNDING  # the laws that change coordinates will find the refusal
+    return max(LEAST_ROUNDING, HEADROOM * largest)
 
 
-def _jiggle(expected: Laplacian | Spectrum, other: Laplacian) -> float:
-    if isinstance(expected, Laplacian):
-        return distance(expected, other)[0] if expected.n_points == other.n_points else 0.0
-    k = len(expected.eigenvalues)
-    return spectral_distance(expected.eigenvalues, lowest_eigenvalues(other, k).eigenvalues)[0]
+def _rebuilding_laws(trial: Trial, promised: frozenset[Promise]) -> Iterator[Outcome]:
+    laws: dict[str, Callable[[str, Trial], Outcome]] = {
+        "repetition": _repetition,
+        "point order": _point_order,
+        "simplex order": _same_operator,
+        "rigid motion": _same_operator,
+        "reflection": _same_operator,
+        "orientation": _same_operator,
+        "scaling": _scaling,
+        "union": _union,
+    }
+    for name, law in laws.items():
+        promise = name.replace(" ", "_")
+        if promise in get_args(Promise) and promise not in promised:
+            yield SkippedLaw(name, "not promised")
+            continue
+        try:
+            outcome = law(name, trial)
+        except (EigenshapeError, ValueError, ArithmeticError) as err:
+            # An operator that refuses the shape told otherwise breaks the law.
+            refusal = f"told otherwise, the shape or its spectrum is refused: {err}"
+            outcome = Law(name, False, np.inf, trial.tolerance, refusal)
+        yield outcome
 
 
-def _repetition(trial: Trial) -> Outcome:
+def _repetition(name: str, trial: Trial) -> Outcome:
     again = trial.build(trial.subject)
     pairs = [(again.stiffness, trial.laplacian.stiffness), (again.mass, trial.laplacian.mass)]
     n_changed = sum(
         (one != two).nnz if one.shape == two.shape else max(one.nnz, two.nnz) for one, two in pairs
     )
-    return make_law("repetition", n_changed, 0, f"built twice, {n_changed} entries differ.")
+    return make_law(name, n_changed, 0, f"built twice, {n_changed} entries differ.")
 
 
-def _point_order(trial: Trial) -> Outcome:
+def _point_order(name: str, trial: Trial) -> Outcome:
     old_of_new = trial.rng.permutation(_n_points(trial.subject))
     other = trial.build(changes.renumber(trial.subject, old_of_new))
-    return _agree(
-        "point order",
-        trial,
-        other,
-        permute(trial.laplacian, old_of_new) if trial.by_points else None,
-    )
+    expected = permute(trial.laplacian, old_of_new) if trial.by_points else None
+    return _agree(name, trial, other, expected)
 
 
-def _simplex_order(trial: Trial) -> Outcome:
-    if isinstance(trial.subject, PointCloud | sp.csr_array):
-        return SkippedLaw("simplex order", "the shape has no simplices")
-    return _same("simplex order", trial, changes.reorder(trial.subject, trial.rng))
+def _same_operator(name: str, trial: Trial) -> Outcome:
+    """Compare with the operator of the same points; rows that are not points may have changed places, or frames."""
+    subject, rng = trial.subject, trial.rng
+    other: Subject
+    if name in ("simplex order", "orientation"):
+        if isinstance(subject, PointCloud | sp.csr_array):
+            return SkippedLaw(name, "the shape has no simplices")
+        change = changes.reorder if name == "simplex order" else changes.turn_over
+        other = change(subject, rng)
+    elif isinstance(subject, sp.csr_array):
+        return SkippedLaw(name, "a graph lies nowhere")
+    elif name == "rigid motion":
+        other = changes.move(subject, rng)
+    else:
+        other = changes.mirror(subject)
+    if trial.rounding > MOST_ROUNDING:
+        return _too_rough(name, trial.rounding)
+    return _agree(name, trial, trial.build(other), trial.laplacian)
 
 
-def _orientation(trial: Trial) -> Outcome:
-    if isinstance(trial.subject, PointCloud | sp.csr_array):
-        return SkippedLaw("orientation", "the shape has no simplices")
-    return _same("orientation", trial, changes.turn_over(trial.subject, trial.rng))
-
-
-def _rigid_motion(trial: Trial) -> Outcome:
-    if isinstance(trial.subject, sp.csr_array):
-        return SkippedLaw("rigid motion", "a graph lies nowhere")
-    return _same("rigid motion", trial, changes.move(trial.subject, trial.rng))
-
-
-def _reflection(trial: Trial) -> Outcome:
-    if isinstance(trial.subject, sp.csr_array):
-        return SkippedLaw("reflection", "a graph lies nowhere")
-    return _same("reflection", trial, changes.mirror(trial.subject))
-
-
-def _scaling(trial: Trial) -> Outcome:
-    doublings = _doublings(trial)
-    laws = [_scaling_by(trial, power) for power in (doublings, -doublings)]
-    return next((law for law in laws if not law.holds), max(laws, key=lambda law: law.measured))
-
-
-def _doublings(trial: Trial) -> int:
-    """Measure how W and B grow with the shape, and say how far it may."""
+def _scaling(name: str, trial: Trial) -> Outcome:
+    # How W and B grow with the shape says how far it may.
     few = 20
     traces = [
         _unit_traces(trial.build(changes.rescale(trial.subject, 2.0**power)))[2:]
         for power in (0, few)
     ]
     growth = max(np.abs(np.log2(traces[1]) - np.log2(traces[0]))) / few
-    return next((power for power in DOUBLINGS if growth * power <= LARGEST_EXPONENT), few)
+    doublings = next((power for power in DOUBLINGS if growth * power <= LARGEST_EXPONENT), few)
+    laws = [_scaling_by(name, trial, power) for power in (doublings, -doublings)]
+    return next((law for law in laws if not law.holds), max(laws, key=lambda law: law.measured))
 
 
-def _scaling_by(trial: Trial, power: int) -> Law:
+def _scaling_by(name: str, trial: Trial, power: int) -> Law:
     """Compare W and B after division by their traces, and the ratio of the traces with 1/length²."""
     other = trial.build(changes.rescale(trial.subject, 2.0**power))
     here, there = _unit_traces(trial.laplacian), _unit_traces(other)
     law = same_entries(
-        "scaling", Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.tolerance
+        name, Laplacian(there[0], there[1]), Laplacian(here[0], here[1]), trial.tolerance
     )
     unit = f"in a unit 2^{power} (1e{power * np.log10(2):+.0f}) times as large,"
     if not law.holds or isinstance(trial.subject, sp.csr_array):
-        return make_law("scaling", law.measured, law.allowed, f"{unit} {law.explanation}")
+        return make_law(name, law.measured, law.allowed, f"{unit} {law.explanation}")
     ratio = (there[2] / here[2]) / (there[3] / here[3]) * 2.0**power * 2.0**power
     explanation = f"{unit} W and B change by one factor each, and eigenvalues times length² by {abs(ratio - 1):.1e}."
-    return make_law("scaling", max(law.measured, abs(ratio - 1)), law.allowed, explanation)
+    return make_law(name, max(law.measured, abs(ratio - 1)), law.allowed, explanation)
 
 
 def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, float, float]:
@@ -316,23 +295,22 @@ def _unit_traces(laplacian: Laplacian) -> tuple[sp.csr_array, sp.csr_array, floa
     return stiffness / traces[0], mass / traces[1], traces[0], traces[1]
 
 
-def _union(trial: Trial) -> Outcome:
+def _union(name: str, trial: Trial) -> Outcome:
     other = trial.build(changes.double(trial.subject))
     rounding = trial.rounding
     if not isinstance(trial.subject, sp.csr_array):
-        rounding *= (
-            changes.APART
-        )  # the coordinates of a copy that far away are so many times coarser
+        # The coordinates of a copy that far away are so many times coarser.
+        rounding *= changes.APART
     if rounding > MOST_ROUNDING:
-        return _too_rough("union", rounding)
+        return _too_rough(name, rounding)
     if trial.by_points:
         twice = Laplacian(
             *(sp.csr_array(sp.block_diag([matrix, matrix])) for matrix in matrices(trial.laplacian))
         )
-        return same_entries("union", other, twice, rounding)
+        return same_entries(name, other, twice, rounding)
     if trial.spectrum is None:
-        return _no_spectrum("union")
-    return same_eigenvalues("union", other, trial.spectrum, rounding, copies=2)
+        return _no_spectrum(name)
+    return same_eigenvalues(name, other, trial.spectrum, rounding, copies=2)
 
 
 def _too_rough(name: str, rounding: float) -> SkippedLaw:
@@ -344,13 +322,6 @@ def _too_rough(name: str, rounding: float) -> SkippedLaw:
 
 def _no_spectrum(name: str) -> SkippedLaw:
     return SkippedLaw(name, "rows are no points, and the lowest eigenvalues cannot be proved")
-
-
-def _same(name: str, trial: Trial, subject: Subject) -> Outcome:
-    """Compare with the operator of the same points; rows that are not points may have changed places, or frames."""
-    if trial.rounding > MOST_ROUNDING:
-        return _too_rough(name, trial.rounding)
-    return _agree(name, trial, trial.build(subject), trial.laplacian)
 
 
 def _agree(name: str, trial: Trial, found: Laplacian, expected: Laplacian | None) -> Outcome:

@@ -29,11 +29,8 @@ def descriptor_functions(
 ) -> tuple[Float[np.ndarray, "n1 q"], Float[np.ndarray, "n2 q"]]:
     """Return functions of mean 0 and norm 1 on both shapes, without those that are constant.
 
-    Raises
-    ------
-    InvalidParameterError
-        If `descriptors` names no signature, its arrays do not fit the shapes or each other, or all
-        functions are constant.
+    Raise InvalidParameterError if `descriptors` names no signature, its arrays do not fit the
+    shapes or each other, or all functions are constant.
     """
     shapes = (source, target)
     if isinstance(descriptors, str):

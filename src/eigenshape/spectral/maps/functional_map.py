@@ -85,11 +85,8 @@ class FunctionalMap(ReadOnly):
 def require_one_constant(spectrum: Spectrum, name: str) -> None:
     """Raise an error unless the first mode of a spectrum is constant and the only one of eigenvalue 0.
 
-    Raises
-    ------
-    InvalidParameterError
-        For intervals of a spectrum, fixed boundaries, disconnected shapes, and fewer than two
-        modes.
+    This refuses intervals of a spectrum, fixed boundaries, disconnected shapes, and fewer than two
+    modes.
     """
     if len(spectrum.eigenvalues) < 2:
         raise InvalidParameterError(
@@ -114,10 +111,8 @@ def require_one_constant(spectrum: Spectrum, name: str) -> None:
 def modes_of_both(source: Spectrum, target: Spectrum, n_modes: Integer) -> int:
     """Return a number of modes that both shapes have.
 
-    Raises
-    ------
-    InvalidParameterError
-        If one has fewer, or its spectrum does not begin with one constant function.
+    Raise InvalidParameterError if one has fewer, or its spectrum does not begin with one constant
+    function.
     """
     for spectrum, name in ((source, "source"), (target, "target")):
         require_one_constant(spectrum, name)

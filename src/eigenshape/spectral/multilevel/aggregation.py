@@ -33,30 +33,21 @@ class Level:
     Attributes
     ----------
     stiffness, mass : (n, n) sparse
-        A and M.
+        A and M in double precision; no `mass` where M is diagonal.
+    weights : (n, 1) float
+        The diagonal of M.
+    rough : (n, n) sparse
+        A in single precision, for corrections.
+    rough_scales : ((n, 1) float, (n, 1) float)
+        The diagonals of M and of diag(A)⁻¹ in single precision.
+    prolong : (n, m) sparse
+        P in the precision of the vectors. Its columns are the basis functions of the next level.
+    rough_prolong, rough_restrict : (n, m) sparse, (m, n) sparse
+        P and Pᵀ in single precision.
     top : float
         Upper bound of the eigenvalues of diag(A)⁻¹ A.
     spread : float
         Smoothing damps the eigenvalues above top / spread.
-    down : (n, m) sparse or None
-        Prolongation P: its columns are the basis functions of the next coarser level.
-    up : (m, n) sparse or None
-        Pᵀ.
-    """
-
-    stiffness: sp.csr_array
-    mass: sp.csr_array
-    top: float
-    spread: float
-    down: sp.csr_array | None
-    up: sp.csr_array | None
-
-
-@dataclass(frozen=True, eq=False)
-class Loaded:
-    """A level as the solver uses it: A and M in double precision, P in that of the vectors.
-
-    Corrections take A, P and Pᵀ in single precision.
     """
 
     stiffness: sp.csr_array
@@ -77,64 +68,52 @@ class Loaded:
 
 
 def build_levels(
-    stiffness: sp.csr_array, mass: sp.csr_array, n_coarsest: int, *, smooth: bool = True
-) -> list[Level]:
-    """Coarsen a pencil to about `n_coarsest` points; the last level has no prolongation.
+    stiffness: sp.csr_array,
+    mass: sp.csr_array,
+    n_coarsest: int,
+    dtype: type,
+    *,
+    smooth: bool = True,
+) -> tuple[list[Level], sp.csr_array, sp.csr_array]:
+    """Coarsen a pencil with diagonal mass to about `n_coarsest` points; return the levels, and the coarsest A and M.
 
-    Without smoothing, the columns of P are indicators of aggregates: inaccurate, but never nearly
-    dependent.
+    `dtype` is the precision of the vectors. Without smoothing, the columns of P are indicators of
+    aggregates: inaccurate, but never nearly dependent.
     """
     levels: list[Level] = []
-    while True:
+    stiffness, mass = _by_rows(stiffness), _by_rows(mass)
+    while stiffness.shape[0] > TOO_LITTLE * n_coarsest:
         n = stiffness.shape[0]
-        top = _top(stiffness)
-        indicators = _aggregates(stiffness, n_coarsest) if n > TOO_LITTLE * n_coarsest else None
-        if indicators is None or n < TOO_LITTLE * indicators.shape[1]:
-            levels.append(Level(stiffness, mass, top, LEAST_SPREADS[0], None, None))
-            return levels
-        down = _smooth(stiffness, top, indicators) if smooth else indicators
-        spread = max(SMOOTHED * n / down.shape[1], _least_spread(stiffness))
-        up = _by_rows(down.T)
-        levels.append(Level(stiffness, mass, top, spread, down, up))
+        columns = _aggregates(stiffness, n_coarsest)
+        if n < TOO_LITTLE * columns.shape[1]:
+            break
+        top = scaled_top(stiffness)
+        if smooth:
+            columns = _smooth(stiffness, top, columns)
+        least, most = LEAST_SPREADS
+        least = max(least, min(most, most * MESH_ROW * n / stiffness.nnz))
+        up = _by_rows(columns.T)
         energies = up.power(2) @ stiffness.diagonal()
-        stiffness, mass = _project(up, stiffness, down), _project(up, mass, down)
-        _clear_rounding(stiffness, energies)
+        coarser = _project(up, stiffness, columns), _project(up, mass, columns)
+        _clear_rounding(coarser[0], energies)
 
-
-def _least_spread(stiffness: sp.csr_array) -> float:
-    least, most = LEAST_SPREADS
-    return max(least, min(most, most * MESH_ROW * stiffness.shape[0] / stiffness.nnz))
-
-
-def load(level: Level, dtype: type, *, lumped: bool) -> Loaded:
-    """Convert the matrices of a level to the precisions that the solver uses.
-
-    `lumped` means that M is diagonal; `dtype` is the precision of the vectors. The level must have
-    a prolongation.
-    """
-    rough_prolong = _in_precision(level.down, np.float32)
-    diagonal = level.mass.diagonal()[:, None]
-    inverse = 1 / _positive(level.stiffness.diagonal())[:, None]
-    return Loaded(
-        stiffness=_in_precision(level.stiffness, np.float64),
-        mass=None if lumped else _in_precision(level.mass, np.float64),
-        weights=diagonal,
-        rough=_in_precision(level.stiffness, np.float32),
-        rough_scales=(diagonal.astype(np.float32), inverse.astype(np.float32)),
-        prolong=rough_prolong if dtype is np.float32 else _in_precision(level.down, dtype),
-        rough_prolong=rough_prolong,
-        rough_restrict=_in_precision(level.up, np.float32),
-        top=level.top,
-        spread=level.spread,
-    )
-
-
-def _in_precision(matrix: sp.sparray, dtype: type) -> sp.csr_array:
-    """Return a matrix by sorted rows, with values of type `dtype` and indices of 32 bits."""
-    rows = _by_rows(matrix)
-    return sp.csr_array(
-        (rows.data.astype(dtype, copy=False), rows.indices, rows.indptr), shape=rows.shape
-    )
+        weights, inverse = mass.diagonal()[:, None], 1 / _positive(stiffness.diagonal())[:, None]
+        rough_prolong = _by_rows(columns, np.float32)
+        level = Level(
+            stiffness=stiffness,
+            mass=mass if levels else None,
+            weights=weights,
+            rough=_by_rows(stiffness, np.float32),
+            rough_scales=(weights.astype(np.float32), inverse.astype(np.float32)),
+            prolong=rough_prolong if dtype is np.float32 else _by_rows(columns),
+            rough_prolong=rough_prolong,
+            rough_restrict=_by_rows(up, np.float32),
+            top=top,
+            spread=max(SMOOTHED * n / columns.shape[1], least),
+        )
+        levels.append(level)
+        stiffness, mass = coarser
+    return levels, stiffness, mass
 
 
 def _aggregates(stiffness: sp.csr_array, n_coarsest: int) -> sp.csr_array:
@@ -156,10 +135,8 @@ def _smooth(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.cs
     row = stiffness.nnz / stiffness.shape[0]
     degree = max(round(DEGREE * np.sqrt(size * MESH_ROW / row)), 1)
     low = top / max(size / PASSED, LEAST_RATIO)
-    matrix, inverse = (
-        (stiffness.indptr, stiffness.indices, stiffness.data),
-        1 / _positive(stiffness.diagonal()),
-    )
+    matrix = stiffness.indptr, stiffness.indices, stiffness.data
+    inverse = 1 / _positive(stiffness.diagonal())
     rows = columns.indptr, columns.indices, columns.data
     for node in np.cos(np.pi * (2 * np.arange(degree) + 1) / (2 * degree)):
         step = 2 / (top + low + (top - low) * node)
@@ -184,18 +161,20 @@ def _clear_rounding(stiffness: sp.csr_array, energies: Float[np.ndarray, " m"]) 
     stiffness.data[places[rounding]] = 0.0
 
 
-def _by_rows(matrix: sp.sparray) -> sp.csr_array:
+def _by_rows(matrix: sp.sparray, dtype: type = np.float64) -> sp.csr_array:
+    """Return a matrix by rows, which are sorted, with indices of 32 bits."""
     rows = sp.csr_array(matrix)
     rows.sort_indices()
-    rows.indices, rows.indptr = rows.indices.astype(np.int32), rows.indptr.astype(np.int32)
-    return rows
+    parts = rows.data.astype(dtype, copy=False), rows.indices, rows.indptr
+    indices, pointers = (part.astype(np.int32, copy=False) for part in parts[1:])
+    return sp.csr_array((parts[0], indices, pointers), shape=rows.shape)
 
 
 def _positive(diagonal: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     return np.where(diagonal > 0, diagonal, 1.0)
 
 
-def _top(matrix: sp.csr_array) -> float:
+def scaled_top(matrix: sp.csr_array) -> float:
     """Bound the eigenvalues of diag(A)⁻¹A, by Gershgorin or by Lanczos (Zhou and others 2006).
 
     The bound by Lanczos is the largest Ritz value plus the last residual. It is not certain, but

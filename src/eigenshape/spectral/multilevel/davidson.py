@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -15,7 +16,6 @@ from eigenshape.spectral.multilevel.residuals import (
     map_groups,
     norms_of_residuals,
     pick_columns,
-    residual_block,
 )
 from eigenshape.spectral.multilevel.vcycle import Tower, correct, multiply, smooth
 
@@ -44,14 +44,6 @@ TOO_FAR = (
 UNSEEN = 3.0  # factor of the estimated error as long as columns were only smoothed
 
 
-@dataclass(frozen=True, eq=False)
-class Space:
-    """Approximate eigenvectors as columns S, and memory for as many columns to add."""
-
-    columns: np.ndarray
-    added: np.ndarray
-
-
 @dataclass(frozen=True)
 class Goal:
     """The required accuracy of the first k pairs, and the largest number of rounds.
@@ -74,66 +66,73 @@ class Goal:
         return last if last > ZERO_SHARE * self.least else self.least
 
 
-@dataclass(frozen=True)
-class Standing:
-    """The state of the refinement.
-
-    `scale` is the k-th value. `worst` is the largest residual and `left` the estimated error of the
-    values, both as shares of it.
-    """
-
-    scale: float
-    worst: float
-    left: float
-
-
 def refine(
     tower: Tower, below: tuple[np.ndarray, np.ndarray], goal: Goal, report: Callable[[float], None]
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Refine vectors until the goal is reached; return M-orthonormal Ritz vectors and values.
+    """Refine vectors of the next coarser level until the goal is reached.
 
-    Also returns the estimated error of the values. The vectors come from the next coarser level,
-    which cannot improve them further. So they are smoothed first, and replaced by the Ritz vectors
-    of their span. Each round then computes multilevel corrections (`correct`) and takes the lowest
-    Ritz vectors in the span of columns and corrections (Davidson 1975; in blocks, without older
-    columns).
+    Returns M-orthonormal Ritz vectors, Ritz values, and their estimated error. Each round computes
+    multilevel corrections (`correct`) and takes the lowest Ritz vectors in the span of columns and
+    corrections (Davidson 1975; in blocks, without older columns).
 
-    Raises
-    ------
-    ConvergenceError
-        If a strict goal is not reached in the given rounds, or columns overflow or become
-        dependent.
+    Raises a ConvergenceError if a strict goal is not reached in the given rounds, or columns
+    overflow or become dependent.
     """
-    values, m = below[1], len(below[1])
-    space = _prolong(tower, below[0])
-    standing = _standing(goal, values, _smooth_all(tower, space, values, report), np.inf, np.inf)
-    before, values = values, _ritz(tower, space, values, slice(0, m))
-    first, looked = standing.worst, not goal.strict
+    values, k, m = below[1], goal.k, len(below[1])
+    level = tower.levels[0]
+    # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
+    columns, added = (np.empty((level.n, m), dtype=level.prolong.dtype) for _ in range(2))
+    multiply(level.prolong, below[0].astype(columns.dtype), columns)
+
+    # The coarser level cannot improve its vectors further. So they are smoothed first, and replaced
+    # by the Ritz vectors of their span.
+    residuals, steps = np.empty(m), int(np.ceil(FIRST_STEPS * np.sqrt(level.spread)))
+    for some in _blocks(np.arange(m)):
+        report(FIRST_SHARE * int(some[0]) / m)
+        solve, scales = partial(smooth, tower, steps=steps), np.ones(len(some))
+        step, residuals[some] = _corrections(tower, columns, values, some, scales, solve)
+        columns[:, some[0] : some[-1] + 1] -= step
+    worst = first = float(residuals[:k].max()) / goal.scale(values)
+    before, values = values, _ritz(tower, columns, values)
+
+    looked = not goal.strict
     for done in range(goal.rounds + 1):
-        residuals = norms_of_residuals(tower, space.columns, values)
-        lowered = float(np.abs(before - values)[: goal.k].max())
-        standing = _standing(
-            goal, values, residuals, standing.worst, lowered if done else UNSEEN * lowered
-        )
-        bound, worst = min(goal.bound, np.sqrt(goal.accuracy)), standing.worst
-        reached = standing.left <= goal.accuracy and worst <= goal.bound
+        residuals = norms_of_residuals(tower, columns, values)
+        scale = goal.scale(values)
+        last, worst = worst, float(residuals[:k].max()) / scale
+        # Errors of values behave like squares of residuals. If they decrease only as fast as the
+        # residuals, by a factor q a round, q / (1 - q) times the last decrease of the values
+        # remains; at most 10 times, so that rounding in the residuals does not dominate.
+        factor = worst / last if 0 < last < np.inf else 1.0
+        decrease = float(np.abs(before - values)[:k].max()) * (1.0 if done else UNSEEN)
+        left = decrease / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT)
+
+        bound = min(goal.bound, np.sqrt(goal.accuracy))
+        reached = left <= goal.accuracy and worst <= goal.bound
         if reached and not looked:
-            least = min(goal.accuracy, goal.bound) * standing.scale
-            before, values = values, _look_again(tower, space, values, goal.k, least, done)
+            least = min(goal.accuracy, goal.bound) * scale
+            before, values = values, _look_again(tower, columns, values, k, least, done)
             looked = values is before
             if not looked:
                 continue
         if reached or (done == goal.rounds and not goal.strict):
-            return space.columns, values, standing.left
+            return columns, values, left
         way = float(np.log(first / worst) / np.log(first / bound)) if first > worst > bound else 0.0
         report(min(FIRST_SHARE + (1 - FIRST_SHARE) * way, 0.95))
+
+        # Add the corrections of the columns that have not converged.
         enough = EARLY * goal.bound if np.isfinite(goal.bound) else EXACT * goal.accuracy
-        late = np.flatnonzero(residuals > enough * standing.scale)
-        _add_corrections(tower, space, (values, residuals), late, max(worst / bound, 1.0))
-        before, values = values, _ritz(tower, space, values, slice(m, m + len(late)))
+        late = np.flatnonzero(residuals > enough * scale)
+        needed = 0.5 * np.sqrt(level.spread) * np.log(8 * max(worst / bound, 1.0))
+        steps = int(np.clip(np.ceil(needed), *SMOOTHING_STEPS))
+        for some, start in zip(_blocks(late), range(0, len(late), WIDTH), strict=True):
+            solve, scales = partial(correct, tower, steps=steps), 1 / residuals[some]
+            step, _ = _corrections(tower, columns, values, some, scales, solve)
+            added[:, start : start + len(some)] = step
+        before, values = values, _ritz(tower, columns, values, added[:, : len(late)])
     raise ConvergenceError(
         f"The error must be estimated at no more than {goal.accuracy:.1e} of the last eigenvalue, and no residual be "
-        f"above {goal.bound:.1e}; after {goal.rounds} rounds these are {standing.left:.1e} and {standing.worst:.1e}. "
+        f"above {goal.bound:.1e}; after {goal.rounds} rounds these are {left:.1e} and {worst:.1e}. "
         f"Request less accuracy, or solve with method='certified'."
     )
 
@@ -143,91 +142,37 @@ def finish_vectors(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return Ritz vectors and values of the columns in double precision."""
     columns = columns.astype(np.float64)
-    return columns, _ritz(tower, Space(columns, columns[:, :0]), values, slice(0, len(values)))
+    return columns, _ritz(tower, columns, values)
 
 
-def _standing(
-    goal: Goal, values: np.ndarray, residuals: np.ndarray, before: float, lowered: float
-) -> Standing:
-    """Estimate the error after a round, from the decrease of the values and of the residuals.
-
-    Errors of values behave like squares of residuals. If they decrease only as fast as the
-    residuals, by a factor q per round, the remaining error is q / (1 - q) times the last decrease.
-    The factor is limited to 10, so that rounding in the residuals does not dominate.
-    """
-    scale = goal.scale(values)
-    worst = float(residuals[: goal.k].max()) / scale
-    factor = worst / before if np.isfinite(before) and before > 0 else 1.0
-    return Standing(scale, worst, lowered / scale * min(factor / max(1 - factor, 0.01), MOST_LEFT))
+def _blocks(numbers: np.ndarray) -> list[np.ndarray]:
+    """Divide the numbers of columns into those that are corrected together."""
+    return [numbers[start : start + WIDTH] for start in range(0, len(numbers), WIDTH)]
 
 
-def _prolong(tower: Tower, vectors: np.ndarray) -> Space:
-    # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
-    level, shape = tower.levels[0], (tower.levels[0].n, vectors.shape[1])
-    columns, added = (np.empty(shape, dtype=level.prolong.dtype) for _ in range(2))
-    return Space(multiply(level.prolong, vectors.astype(columns.dtype), columns), added)
-
-
-def _smooth_all(
-    tower: Tower, space: Space, values: np.ndarray, report: Callable[[float], None]
-) -> Float[np.ndarray, " m"]:
-    """Smooth the columns; return the norms of their residuals before."""
-    steps, norms = (
-        int(np.ceil(FIRST_STEPS * np.sqrt(tower.levels[0].spread))),
-        np.empty(len(values)),
-    )
-    for start in range(0, len(values), WIDTH):
-        report(FIRST_SHARE * start / len(values))
-        some = np.arange(start, min(start + WIDTH, len(values)))
-        block, norms[some] = residual_block(
-            tower, pick_columns(tower, space.columns, some), values[some], np.ones(len(some))
-        )
-        corrections = smooth(tower, block, values[some].astype(np.float32), steps)
-        _require_finite(corrections, some)
-        space.columns[:, some[0] : some[-1] + 1] -= corrections
-    return norms
-
-
-def _add_corrections(
+def _corrections(
     tower: Tower,
-    space: Space,
-    state: tuple[np.ndarray, np.ndarray],
-    late: np.ndarray,
-    excess: float,
-) -> None:
-    """Add the corrections of the columns that have not converged, `late`.
-
-    Raises
-    ------
-    ConvergenceError
-        If corrections overflow.
-    """
-    steps = int(
-        np.clip(
-            np.ceil(0.5 * np.sqrt(tower.levels[0].spread) * np.log(8 * excess)), *SMOOTHING_STEPS
-        )
-    )
-    values, residuals = state
-    for start in range(0, len(late), WIDTH):
-        some = late[start : start + WIDTH]
-        block, _ = residual_block(
-            tower, pick_columns(tower, space.columns, some), values[some], 1 / residuals[some]
-        )
-        corrections = correct(tower, block, values[some].astype(np.float32), steps)
-        _require_finite(corrections, some)
-        space.added[:, start : start + len(some)] = corrections
-
-
-def _require_finite(corrections: np.ndarray, some: np.ndarray) -> None:
+    columns: np.ndarray,
+    values: np.ndarray,
+    some: np.ndarray,
+    scales: np.ndarray,
+    solve: Callable[..., np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corrections of some columns for their scaled residuals, and the norms of these unscaled."""
+    picked = pick_columns(tower, columns, some)
+    block = np.empty(picked.shape, dtype=np.float32)
+    norms = norms_of_residuals(tower, picked, values[some], block, scales)
+    found = solve(block, values[some].astype(np.float32))
     # If rows are negligible beside θM, with θ far below zero, smoothing makes columns grow.
-    if not np.isfinite(corrections.sum()):
+    if not np.isfinite(found.sum()):
         raise ConvergenceError(
             f"Corrections must be finite; those of eigenvector {some[0]} overflow. {TOO_FAR}"
         )
+    return found, norms
 
 
 def _look_again(
-    tower: Tower, space: Space, values: np.ndarray, k: int, bound: float, seed: int
+    tower: Tower, columns: np.ndarray, values: np.ndarray, k: int, bound: float, seed: int
 ) -> Float[np.ndarray, " m"]:
     """Search for eigenvectors that the coarser levels cannot represent.
 
@@ -235,13 +180,11 @@ def _look_again(
     these columns lowers one of the first k values by half the bound or more, they are included and
     the new values are returned. Otherwise nothing changes.
     """
-    m = len(values)
-    block = _inverse_iteration(Stored(tower, space.columns), seed)
-    space = Space(space.columns, block)
-    lower, weights = _combination(tower, space, values, slice(m, m + PROBES))
+    block = _inverse_iteration(Stored(tower, columns), seed)
+    lower, weights = _ritz_pairs(tower, columns, values, block)
     if (values[:k] - lower[:k] < 0.5 * bound).all():
         return values
-    _combine(tower, space, weights)
+    _combine(tower, columns, block, weights)
     return lower
 
 
@@ -253,7 +196,8 @@ def misses_pairs(columns: Interpolated, values: np.ndarray, k: int, bound: float
     """
     tower, m = columns.tower, len(values)
     block = _inverse_iteration(columns, 0)
-    image, _ = residual_block(tower, block, np.zeros(PROBES), np.ones(PROBES))
+    image = np.empty(block.shape, dtype=np.float32)
+    norms_of_residuals(tower, block, np.zeros(PROBES), image)
     beside = columns.below.T @ columns.restrict(image)
     block = block.astype(np.float64)
     gram, projected = np.eye(m + PROBES), np.diag(np.append(values, np.zeros(PROBES)))
@@ -277,40 +221,69 @@ def _inverse_iteration(columns: Stored | Interpolated, seed: int) -> np.ndarray:
     return block
 
 
-def _ritz(tower: Tower, space: Space, values: np.ndarray, fresh: slice) -> np.ndarray:
-    """Replace the columns by the lowest Ritz vectors of their span; return the Ritz values.
-
-    The span includes the added columns up to the last fresh one. The columns before the fresh ones
-    are already Ritz vectors, with the given values.
-    """
-    values, weights = _combination(tower, space, values, fresh)
-    _combine(tower, space, weights)
+def _ritz(
+    tower: Tower, columns: np.ndarray, values: np.ndarray, added: np.ndarray | None = None
+) -> np.ndarray:
+    """Replace the columns by the lowest Ritz vectors of the span of them and of those added; return the values."""
+    values, weights = _ritz_pairs(tower, columns, values, added)
+    _combine(tower, columns, added, weights)
     return values
 
 
-def _combine(tower: Tower, space: Space, weights: np.ndarray) -> None:
-    m, weights = space.columns.shape[1], weights.astype(space.columns.dtype)
-    late = len(weights) - m
+def _combine(
+    tower: Tower, columns: np.ndarray, added: np.ndarray | None, weights: np.ndarray
+) -> None:
+    m, weights = columns.shape[1], weights.astype(columns.dtype)
 
     def combine(rows: slice) -> None:
-        part = space.columns[rows] @ weights[:m]
-        if late:
-            part += space.added[rows, :late].astype(part.dtype) @ weights[m:]
-        space.columns[rows] = part
+        part = columns[rows] @ weights[:m]
+        if added is not None and added.shape[1]:
+            part += added[rows].astype(part.dtype) @ weights[m:]
+        columns[rows] = part
 
     change_rows(tower, combine)
 
 
-def _combination(
-    tower: Tower, space: Space, values: np.ndarray, fresh: slice
+def _ritz_pairs(
+    tower: Tower, columns: np.ndarray, values: np.ndarray, added: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest Ritz values of the columns, and the coefficients of the Ritz vectors."""
-    known = fresh.start
-    gram, projected = _grams(tower, space, fresh)
+    """Return the lowest Ritz values of columns S, and the coefficients of the Ritz vectors.
+
+    S are the columns and those added; where some are added, the columns are Ritz vectors already,
+    with the given values. MS and AS are computed in double precision. The products with S are in
+    the precision of the columns and are summed in double precision: single precision takes half the
+    time.
+    """
+    m, precision = columns.shape[1], columns.dtype
+    of = columns if added is None else added
+    known = 0 if added is None else m
+    size = known + of.shape[1]
+
+    def sum_rows(chunks: list[slice]) -> np.ndarray:
+        grams = np.zeros((2, size, of.shape[1]))
+        for rows, image, weighed in images(tower, of, chunks):
+            found = [part.astype(precision, copy=False) for part in (weighed, image)]
+            for gram, part in zip(grams, found, strict=True):
+                if known:
+                    gram[:m] += columns[rows].T @ part
+                    gram[m:] += of[rows].T @ part
+                    continue
+                for start in range(0, size, GRAM_COLUMNS):  # the rest follows from symmetry
+                    end = min(start + GRAM_COLUMNS, size)
+                    gram[:end, start:end] += of[rows, :end].T @ part[:, start:end]
+        return grams
+
+    squares = np.zeros((2, size, size))
+    squares[:, :, known:] = sum(map_groups(tower, sum_rows))
+    for square in squares:
+        if not known:
+            square[:] = np.triu(square) + np.triu(square, 1).T
+        square[known:, :known] = square[:known, known:].T
+        square[known:, known:] = (square[known:, known:] + square[known:, known:].T) / 2
+    gram, projected = squares
     gram[:known, :known] = np.eye(known)
     projected[:known, :known] = np.diag(values[:known])
-    dependent = DEPENDENT_COLUMNS[space.columns.dtype.itemsize]
-    return _lowest_pairs(gram, projected, len(values), dependent)
+    return _lowest_pairs(gram, projected, len(values), DEPENDENT_COLUMNS[precision.itemsize])
 
 
 def _lowest_pairs(
@@ -330,37 +303,3 @@ def _lowest_pairs(
     axes = (scales[:, None] * axes[:, kept]) / np.sqrt(sizes[kept])
     found, weights = np.linalg.eigh(axes.T @ projected @ axes)
     return np.array(found[:m]), axes @ weights[:, :m]
-
-
-def _grams(tower: Tower, space: Space, fresh: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Return SᵀMS and SᵀAS, except the block of the columns before the fresh ones.
-
-    MS and AS are computed in double precision. The products with S are in the precision of the
-    columns and are summed in double precision: single precision takes half the time.
-    """
-    size, m = fresh.stop, space.columns.shape[1]
-    whole, precision = fresh.start == 0, space.columns.dtype
-    of = space.columns if whole else space.added[:, : size - m]
-
-    def sum_rows(chunks: list[slice]) -> np.ndarray:
-        grams = np.zeros((2, size, of.shape[1]))
-        for rows, image, weighed in images(tower, of, chunks):
-            found = [part.astype(precision, copy=False) for part in (weighed, image)]
-            for gram, part in zip(grams, found, strict=True):
-                if whole:  # the rest follows from symmetry
-                    for start in range(0, size, GRAM_COLUMNS):
-                        end = min(start + GRAM_COLUMNS, size)
-                        gram[:end, start:end] += of[rows, :end].T @ part[:, start:end]
-                else:
-                    gram[:m] += space.columns[rows].T @ part
-                    gram[m:] += of[rows].T @ part
-        return grams
-
-    squares = np.zeros((2, size, size))
-    squares[:, :, fresh] = sum(map_groups(tower, sum_rows))
-    for square in squares:
-        if whole:
-            square[:] = np.triu(square) + np.triu(square, 1).T
-        square[fresh, : fresh.start] = square[: fresh.start, fresh].T
-        square[fresh, fresh] = (square[fresh, fresh] + square[fresh, fresh].T) / 2
-    return squares[0], squares[1]

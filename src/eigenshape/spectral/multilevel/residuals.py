@@ -14,7 +14,7 @@ from eigenshape.spectral.multilevel.vcycle import Tower, multiply
 R = TypeVar("R")
 
 # Rows in a chunk: two products of 32 columns then take 2 MiB, which fit into the cache.
-ROWS = 4096
+CHUNK_ROWS = 4096
 # Chunks of a group, which one thread sums up, at least; and groups at most, each of which keeps
 # sums of its own.
 CHUNKS_A_GROUP = 4
@@ -27,7 +27,7 @@ def map_groups(tower: Tower, function: Callable[[list[slice]], R]) -> list[R]:
     The groups depend on the number of rows alone, and so do sums over them.
     """
     n = tower.levels[0].n
-    chunks = [slice(start, min(start + ROWS, n)) for start in range(0, n, ROWS)]
+    chunks = [slice(start, min(start + CHUNK_ROWS, n)) for start in range(0, n, CHUNK_ROWS)]
     n_groups = min(max(len(chunks) // CHUNKS_A_GROUP, 1), MOST_GROUPS)
     ends = [len(chunks) * number // n_groups for number in range(n_groups + 1)]
     return map_in_threads(function, [chunks[low:high] for low, high in pairwise(ends)])
@@ -48,7 +48,7 @@ def images(
 ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
     """Yield A S and M S for columns S in chunks of rows, in double precision."""
     level = tower.levels[0]
-    room = [np.empty((min(ROWS, level.n), columns.shape[1])) for _ in range(2)]
+    room = [np.empty((min(CHUNK_ROWS, level.n), columns.shape[1])) for _ in range(2)]
     for rows in chunks:
         image, weighed = (part[: rows.stop - rows.start] for part in room)
         multiply(level.stiffness, columns, image, rows)
@@ -59,31 +59,32 @@ def images(
         yield rows, image, weighed
 
 
-def _residual_rows(
-    tower: Tower, columns: np.ndarray, values: np.ndarray, chunks: list[slice]
-) -> Iterator[tuple[slice, np.ndarray]]:
-    """Yield the residuals A S - M S θ in chunks of rows."""
-    for rows, image, weighed in images(tower, columns, chunks):
-        np.multiply(weighed, values, out=weighed)
-        yield rows, np.subtract(image, weighed, out=image)
-
-
 def norms_of_residuals(
-    tower: Tower, columns: np.ndarray, values: np.ndarray
+    tower: Tower,
+    columns: np.ndarray,
+    values: np.ndarray,
+    block: np.ndarray | None = None,
+    scales: np.ndarray | float = 1.0,
 ) -> Float[np.ndarray, " m"]:
-    """Return the norms of the columns' residuals for the inverse of M or of its diagonal."""
+    """Return the norms of the residuals A S - M S θ for the inverse of M or of its diagonal.
 
-    def squares(chunks: list[slice]) -> np.ndarray:
-        rests = _residual_rows(tower, columns, values, chunks)
-        return np.sum([_squares(tower, rows, rest) for rows, rest in rests], axis=0)
+    The residuals times the scales are written to `block`, if one is given.
+    """
+    weights = tower.levels[0].weights
 
-    return np.sqrt(np.sum(map_groups(tower, squares), axis=0))
+    def sum_squares(chunks: list[slice]) -> np.ndarray:
+        squares = np.zeros(len(values))
+        for rows, image, weighed in images(tower, columns, chunks):
+            np.multiply(weighed, values, out=weighed)
+            rest = np.subtract(image, weighed, out=image)
+            if block is not None:
+                block[rows] = rest * scales
+            rest *= rest
+            rest /= weights[rows]
+            squares += rest.sum(axis=0)
+        return squares
 
-
-def _squares(tower: Tower, rows: slice, rest: np.ndarray) -> np.ndarray:
-    rest *= rest
-    rest /= tower.levels[0].weights[rows]
-    return rest.sum(axis=0)
+    return np.sqrt(np.sum(map_groups(tower, sum_squares), axis=0))
 
 
 def pick_columns(tower: Tower, columns: np.ndarray, some: np.ndarray) -> np.ndarray:
@@ -95,22 +96,6 @@ def pick_columns(tower: Tower, columns: np.ndarray, some: np.ndarray) -> np.ndar
 
     change_rows(tower, fill)
     return picked
-
-
-def residual_block(
-    tower: Tower, columns: np.ndarray, values: np.ndarray, scales: np.ndarray
-) -> tuple[np.ndarray, Float[np.ndarray, " b"]]:
-    """Return residuals, scaled and in single precision, and their norms."""
-    block = np.empty(columns.shape, dtype=np.float32)
-
-    def fill(chunks: list[slice]) -> np.ndarray:
-        squares = np.zeros(len(values))
-        for rows, rest in _residual_rows(tower, columns, values, chunks):
-            block[rows] = rest * scales
-            squares += _squares(tower, rows, rest)
-        return squares
-
-    return block, np.sqrt(np.sum(map_groups(tower, fill), axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +118,20 @@ class Stored:
 
     def keep_outside(self, block: np.ndarray) -> None:
         """Project the span of the columns out of a block, in place."""
-        keep_outside(self.tower, self.columns, block)
+        columns, weights = self.columns, self.tower.levels[0].weights
+
+        def share_inside(chunks: list[slice]) -> np.ndarray:
+            inside = np.zeros((columns.shape[1], block.shape[1]))
+            for rows in chunks:
+                inside += columns[rows].T @ (weights[rows] * block[rows]).astype(columns.dtype)
+            return inside
+
+        inside = np.sum(map_groups(self.tower, share_inside), axis=0).astype(columns.dtype)
+
+        def subtract_inside(rows: slice) -> None:
+            block[rows] -= columns[rows] @ inside
+
+        change_rows(self.tower, subtract_inside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,24 +168,3 @@ class Interpolated:
     def _prolong(self, block: np.ndarray) -> np.ndarray:
         matrix = self.tower.levels[0].rough_prolong
         return multiply(matrix, block, np.empty((matrix.shape[0], block.shape[1]), np.float32))
-
-
-def keep_outside(tower: Tower, columns: np.ndarray, block: np.ndarray) -> None:
-    """Project the span of orthonormal columns out of a block, in place.
-
-    Orthonormal is meant for M or its diagonal.
-    """
-    weights = tower.levels[0].weights
-
-    def share_inside(chunks: list[slice]) -> np.ndarray:
-        inside = np.zeros((columns.shape[1], block.shape[1]))
-        for rows in chunks:
-            inside += columns[rows].T @ (weights[rows] * block[rows]).astype(columns.dtype)
-        return inside
-
-    inside = np.sum(map_groups(tower, share_inside), axis=0).astype(columns.dtype)
-
-    def subtract_inside(rows: slice) -> None:
-        block[rows] -= columns[rows] @ inside
-
-    change_rows(tower, subtract_inside)

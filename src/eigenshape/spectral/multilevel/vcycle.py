@@ -8,13 +8,13 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._threads import free_threads, map_in_threads, share_units
-from eigenshape.spectral.multilevel.aggregation import Loaded
+from eigenshape.spectral.multilevel.aggregation import Level
 from eigenshape.spectral.multilevel.multilevel_loops import multiply_rows, smoothing_step
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Rows that are worth a thread.
-ROWS = 4096
+ROWS_A_THREAD = 4096
 INNER_STEPS = 8  # smoothing steps on the levels between the finest and the coarsest
 
 
@@ -35,7 +35,7 @@ class Coarsest:
 class Tower:
     """The levels from the finest to the coarsest."""
 
-    levels: tuple[Loaded, ...]
+    levels: tuple[Level, ...]
     coarsest: Coarsest
 
 
@@ -48,51 +48,49 @@ def correct(
     the coarsest by its factor. Then Chebyshev iteration with diag(A)⁻¹ (A - θM) reduces the error
     that coarser levels cannot represent.
     """
-    if not tower.levels:
-        return _coarsest(tower, residual, shifts)
-    level = tower.levels[0]
-    restricted = np.empty((level.rough_restrict.shape[0], residual.shape[1]), dtype=residual.dtype)
-    multiply(level.rough_restrict, residual, restricted)
-    below = correct(Tower(tower.levels[1:], tower.coarsest), restricted, shifts, INNER_STEPS)
-    start = multiply(level.rough_prolong, below, np.empty(residual.shape, dtype=residual.dtype))
-    return _smooth(level, (residual, shifts), start, steps)
+    if tower.levels:
+        level, width = tower.levels[0], residual.shape[1]
+        restrict = level.rough_restrict
+        restricted = np.empty((restrict.shape[0], width), dtype=residual.dtype)
+        multiply(restrict, residual, restricted)
+        below = correct(Tower(tower.levels[1:], tower.coarsest), restricted, shifts, INNER_STEPS)
+        start = multiply(level.rough_prolong, below, np.empty(residual.shape, residual.dtype))
+        return smooth(tower, residual, shifts, steps, start)
+
+    coarsest, right = tower.coarsest, residual.astype(np.float64)
+    right -= coarsest.pencil.weigh(coarsest.vectors @ (coarsest.vectors.T @ right))
+    chosen = np.searchsorted([factor.shift for factor in coarsest.factors[1:]], shifts)
+    for place, factor in enumerate(coarsest.factors):
+        some = np.flatnonzero(chosen == place)
+        if some.size:
+            right[:, some] = factor.solve(np.ascontiguousarray(right[:, some]))
+    right -= coarsest.vectors @ (coarsest.vectors.T @ coarsest.pencil.weigh(right))
+    return right.astype(np.float32)
 
 
 def smooth(
-    tower: Tower, residual: np.ndarray, shifts: Float[np.ndarray, " b"], steps: int
+    tower: Tower,
+    residual: np.ndarray,
+    shifts: Float[np.ndarray, " b"],
+    steps: int,
+    start: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return corrections by smoothing on this level alone."""
-    return _smooth(tower.levels[0], (residual, shifts), np.zeros_like(residual), steps)
+    """Return such solutions by Chebyshev iteration on this level alone, from a start or from 0.
 
-
-def multiply(
-    matrix: sp.csr_array, block: np.ndarray, product: np.ndarray, rows: slice | None = None
-) -> np.ndarray:
-    """Write the matrix times a block, or some rows of it, to `product`, and return it."""
-    begin, end = (rows.start, rows.stop) if rows else (0, matrix.shape[0])
-
-    def fill(share: tuple[int, int]) -> None:
-        parts = matrix.indptr, matrix.indices, matrix.data
-        multiply_rows(*parts, block, product, begin + share[0], begin + share[1], share[0])
-
-    map_in_threads(fill, share_units(end - begin, ROWS, free_threads()))
-    return product
-
-
-def _smooth(
-    level: Loaded, terms: tuple[np.ndarray, np.ndarray], block: np.ndarray, steps: int
-) -> np.ndarray:
-    """Run Chebyshev iteration on [top / spread, top] (Saad 2003, algorithm 12.1)."""
+    On [top / spread, top] (Saad 2003, algorithm 12.1).
+    """
+    level = tower.levels[0]
     middle = (level.top + level.top / level.spread) / 2
     half = (level.top - level.top / level.spread) / 2
     sharpness = middle / half
     rho, old, new = 1 / sharpness, 0.0, 1 / middle
     matrix = level.rough.indptr, level.rough.indices, level.rough.data
+    block = np.zeros_like(residual) if start is None else start
     step, moved = np.zeros_like(block), np.empty_like(block)
     precision = block.dtype.type
-    shares = share_units(len(block), ROWS, free_threads())
+    shares = share_units(len(block), ROWS_A_THREAD, free_threads())
     for _ in range(steps):
-        given = matrix, level.rough_scales, terms, block, step, moved
+        given = matrix, level.rough_scales, (residual, shifts), block, step, moved
         factors = precision(old), precision(new)
 
         def smooth_rows(share: tuple[int, int], given: Any = (*given, *factors)) -> None:
@@ -105,13 +103,15 @@ def _smooth(
     return block
 
 
-def _coarsest(tower: Tower, residual: np.ndarray, shifts: Float[np.ndarray, " b"]) -> np.ndarray:
-    coarsest, right = tower.coarsest, residual.astype(np.float64)
-    right -= coarsest.pencil.weigh(coarsest.vectors @ (coarsest.vectors.T @ right))
-    chosen = np.searchsorted([factor.shift for factor in coarsest.factors[1:]], shifts)
-    for place, factor in enumerate(coarsest.factors):
-        some = np.flatnonzero(chosen == place)
-        if some.size:
-            right[:, some] = factor.solve(np.ascontiguousarray(right[:, some]))
-    right -= coarsest.vectors @ (coarsest.vectors.T @ coarsest.pencil.weigh(right))
-    return right.astype(np.float32)
+def multiply(
+    matrix: sp.csr_array, block: np.ndarray, product: np.ndarray, rows: slice | None = None
+) -> np.ndarray:
+    """Write the matrix times a block, or some rows of it, to `product`, and return it."""
+    begin, end = (rows.start, rows.stop) if rows else (0, matrix.shape[0])
+
+    def fill(share: tuple[int, int]) -> None:
+        parts = matrix.indptr, matrix.indices, matrix.data
+        multiply_rows(*parts, block, product, begin + share[0], begin + share[1], share[0])
+
+    map_in_threads(fill, share_units(end - begin, ROWS_A_THREAD, free_threads()))
+    return product

@@ -13,6 +13,15 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.diffusion.decay import exponential_decay
+from eigenshape.spectral.multilevel.approximate import (
+    MOST_ROUNDS,
+    SINGLE,
+    Start,
+    climb,
+    on_level,
+    require_accuracy,
+    require_lumped,
+)
 from eigenshape.spectral.multilevel.davidson import Goal, misses_pairs, refine
 from eigenshape.spectral.multilevel.residuals import (
     Interpolated,
@@ -20,16 +29,7 @@ from eigenshape.spectral.multilevel.residuals import (
     change_rows,
     images,
     map_groups,
-    residual_block,
-)
-from eigenshape.spectral.multilevel.start import (
-    ROUNDS,
-    SINGLE,
-    Start,
-    climb,
-    on_finest,
-    require_accuracy,
-    require_lumped,
+    norms_of_residuals,
 )
 from eigenshape.spectral.multilevel.vcycle import correct
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
@@ -160,7 +160,9 @@ def approximate_heat_signature(
         start = climb(pencil, wanted, report)
         if start is None:
             return _certified_signature(laplacian, wanted, clock, report)
-        goal = Goal(wanted, float(accuracy), np.inf, pencil.level / pencil.n, ROUNDS, strict=True)
+        goal = Goal(
+            wanted, float(accuracy), np.inf, pencil.level / pencil.n, MOST_ROUNDS, strict=True
+        )
         return _approximate_signature(pencil, start, goal, clock, report)
 
 
@@ -188,7 +190,9 @@ def _approximate_signature(
         or (estimate.errors > goal.accuracy * estimate.means).any()
         or misses_pairs(columns, ritz, goal.k, bound)
     ):
-        stored, ritz, _ = refine(start.tower, start.below, goal, on_finest(report, start))
+        stored, ritz, _ = refine(
+            start.tower, start.below, goal, on_level(report, 0, len(start.tower.levels))
+        )
         columns = Stored(start.tower, stored)
         estimate = _estimate(pencil, columns, ritz[: goal.k], times)
     report(0.95, "heat")
@@ -273,7 +277,8 @@ def _changes(
     """
     tower = columns.tower
     vectors, values, mass = columns.pick(sample), ritz[sample], tower.levels[0].weights
-    residual, _ = residual_block(tower, vectors, values, np.ones(len(sample)))
+    residual = np.empty(vectors.shape, dtype=np.float32)
+    norms_of_residuals(tower, vectors, values, residual)
     step = correct(tower, residual, values.astype(np.float32), CORRECTION_STEPS)
     columns.keep_outside(step)
     before, step = vectors.astype(np.float64), step.astype(np.float64)

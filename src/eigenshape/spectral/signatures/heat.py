@@ -21,10 +21,7 @@ N_TIMES = 100  # times by default, as in Sun, Ovsjanikov and Guibas 2009
 def positive_eigenvalues(spectrum: Spectrum) -> Float[np.ndarray, " k"]:
     """Return the eigenvalues above 0; each component of the shape has one eigenvalue 0.
 
-    Raises
-    ------
-    InvalidParameterError
-        If no eigenvalue is above 0.
+    Raise InvalidParameterError if no eigenvalue is above 0.
     """
     values = spectrum.eigenvalues
     positive = values[count_zero_modes(spectrum) :]

@@ -125,10 +125,8 @@ def wave_bands(
 ) -> Float[np.ndarray, "k_positive q"]:
     """Return the share of each eigenvalue above 0 in each band: g(e - log λ_i) / Σ_i g(e - log λ_i).
 
-    Raises
-    ------
-    InvalidParameterError
-        If an energy is not finite, sigma is not positive, or no eigenvalue is above 0.
+    Raise InvalidParameterError if an energy is not finite, sigma is not positive, or no eigenvalue
+    is above 0.
     """
     values = positive_eigenvalues(spectrum)
     levels = finite_values(energies, "energies")

@@ -72,10 +72,7 @@ def keep(spectrum: Spectrum, folder: str | Path, key: str) -> None:
 def require_writable(cache: str | Path) -> None:
     """Make a folder if there is none, and raise an error if files cannot be written to it.
 
-    Raises
-    ------
-    InvalidParameterError
-        With what the system says.
+    Raises an InvalidParameterError with what the system says.
     """
     folder = Path(cache)
     try:

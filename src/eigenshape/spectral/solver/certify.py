@@ -12,10 +12,10 @@ from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.diagnosis import remedy_for
+from eigenshape.spectral.solver.eigenpairs import Pairs, error_bound
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.kernel_values import to_pencil, user_certificate
-from eigenshape.spectral.solver.pairs import Pairs, error_bound
 from eigenshape.spectral.solver.pencil import (
     Pencil,
     column_chunks,
@@ -112,17 +112,34 @@ def prove(pencil: Pencil, pairs: Pairs, factor: Factor | None = None) -> Certifi
     A factor at any shift, which is spent, may save a trial: its rounding tells what to expect. The
     certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
 
-    Raises
-    ------
-    ConvergenceError
-        If the pairs are not B-orthonormal eigenvectors, or no factor is good enough to count by.
+    Raises a ConvergenceError if the pairs are not B-orthonormal eigenvectors, or no factor is good
+    enough to count by.
     """
     k, certificate = len(pairs.values), quality(pencil, pairs)
     if k == pencil.n:
         return certificate
     above = count_beside(pencil, pairs, k - 1, certificate.resolution, factor)
     certificate = with_count(certificate, pairs, above.shift, above.count)
-    return certificate if above.count <= k else _below_cluster(pencil, pairs, certificate, above)
+    if above.count <= k:
+        return certificate
+
+    # More copies follow. Count below the cluster: all further pairs are in it, none above it.
+    jumps = np.flatnonzero(np.diff(pairs.values) > 2 * certificate.resolution)
+    first = int(jumps[-1]) + 1 if jumps.size else 0
+    below = count_beside(pencil, pairs, first, -certificate.resolution, above)
+    if below.count > first:
+        # Slack may have moved copies of the cluster below σ that are not among the pairs: count
+        # again from farther below.
+        farther = CLUSTER_STEP * (below.shift - float(pairs.values[first]))
+        below = count_beside(pencil, pairs, first, farther, below)
+    resolution = float(pairs.values[-1]) - below.shift
+    if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
+        raise ConvergenceError(
+            f"Neighboring eigenvalues must differ by more than the rounding of the factor; the last {k - first} "
+            f"of {k} do not. Repair nearly degenerate elements."
+        )
+    certificate = with_count(certificate, pairs, below.shift, below.count)
+    return replace(certificate, resolution=resolution, n_split=above.count - k)
 
 
 def distinct_from(pencil: Pencil, pairs: Pairs) -> float:
@@ -133,12 +150,16 @@ def distinct_from(pencil: Pencil, pairs: Pairs) -> float:
 def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
     """Return the certificate of pairs without a count, in the pencil's units; complete if these are all n.
 
-    Raises
-    ------
-    ConvergenceError
-        If the pairs are not B-orthonormal eigenvectors.
+    Raises a ConvergenceError if the pairs are not B-orthonormal eigenvectors.
     """
-    resolution = distinct_from(pencil, pairs)
+    resolution, orthonormality = distinct_from(pencil, pairs), require_orthonormal(pencil, pairs)
+    relative = pairs.residuals / _scale(pencil, pairs)
+    worst = int(relative.argmax())
+    if not relative[worst] <= LARGEST_RESIDUAL:
+        raise ConvergenceError(
+            f"Every pair must satisfy Wφ = λBφ to {LARGEST_RESIDUAL:.0e} of the largest eigenvalue; pair {worst} is "
+            f"off by {relative[worst]:.2e}. Nearly degenerate elements do this. {remedy_for(pencil)}"
+        )
     return Certificate(
         n_pairs=len(pairs.values),
         shift=np.inf,
@@ -146,8 +167,8 @@ def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
         n_found=len(pairs.values),
         gap=(float(pairs.values[-1]), np.inf),
         resolution=resolution,
-        orthonormality=require_orthonormal(pencil, pairs),
-        max_residual=_require_eigenpairs(pencil, pairs),
+        orthonormality=orthonormality,
+        max_residual=float(relative[worst]),
         n_split=0,
         clusters=_clusters(pairs.values, resolution),
     )
@@ -175,30 +196,6 @@ def take_pairs(
         n_pairs=stop - start,
         n_split=equal + (certificate.n_split if equal == len(rest) else 0),
         clusters=_clusters(fewer.values, resolution),
-    )
-
-
-def _below_cluster(pencil: Pencil, pairs: Pairs, above: Certificate, beside: Factor) -> Certificate:
-    # Count the eigenvalues below the cluster. All further pairs are in the cluster, none above it.
-    jumps = np.flatnonzero(np.diff(pairs.values) > 2 * above.resolution)
-    first = int(jumps[-1]) + 1 if jumps.size else 0
-    factor = count_beside(pencil, pairs, first, -above.resolution, beside)
-    if factor.count > first:
-        # Slack may have moved copies of the cluster below σ that are not among the pairs: count
-        # again from farther below.
-        farther = CLUSTER_STEP * (factor.shift - float(pairs.values[first]))
-        factor = count_beside(pencil, pairs, first, farther, factor)
-    resolution = float(pairs.values[-1]) - factor.shift
-    if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
-        raise ConvergenceError(
-            f"Neighboring eigenvalues must differ by more than the rounding of the factor; the "
-            f"last {len(pairs.values) - first} "
-            f"of {len(pairs.values)} do not. Repair nearly degenerate elements."
-        )
-    return replace(
-        with_count(above, pairs, factor.shift, factor.count),
-        resolution=resolution,
-        n_split=beside.count - len(pairs.values),
     )
 
 
@@ -237,7 +234,15 @@ def require_orthonormal(pencil: Pencil, pairs: Pairs) -> float:
     """
 
     def largest(columns: slice) -> tuple[float, int, int]:
-        first, bound = _bounded_entries(pairs, columns)
+        # Of the rows far before these columns, the first ones whose bound is small are left out.
+        far = max(columns.start - NEAR_COLUMNS, 0)
+        gaps = pairs.values[columns].min() - pairs.values[:far]
+        sums = pairs.residuals[columns].max() + pairs.residuals[:far]
+        # The lengths of vectors are 1 up to ORTHONORMAL, which the other entries show.
+        bounds = np.divide(1.01 * sums, gaps, out=np.full(far, np.inf), where=gaps > 0)
+        first = int(np.argmax(np.append(bounds > FAR_ORTHONORMAL, True)))
+        bound = float(bounds[:first].max(initial=0.0))
+
         off = np.abs(gram_columns(pencil, pairs.vectors, columns, first))
         row, column = np.unravel_index(int(off.argmax()), off.shape)
         return max(float(off[row, column]), bound), first + int(row), columns.start + int(column)
@@ -250,28 +255,6 @@ def require_orthonormal(pencil: Pencil, pairs: Pairs) -> float:
                 f"{worst:.2e}."
             )
     return max((worst for worst, _, _ in found), default=0.0)
-
-
-def _bounded_entries(pairs: Pairs, columns: slice) -> tuple[int, float]:
-    """Return how many of the first rows of some columns of ΦᵀBΦ need not be computed, and their bound."""
-    far = max(columns.start - NEAR_COLUMNS, 0)
-    gaps = pairs.values[columns].min() - pairs.values[:far]
-    sums = pairs.residuals[columns].max() + pairs.residuals[:far]
-    # The lengths of vectors are 1 up to ORTHONORMAL, which the other entries show.
-    bounds = np.divide(1.01 * sums, gaps, out=np.full(far, np.inf), where=gaps > 0)
-    first = int(np.argmax(np.append(bounds > FAR_ORTHONORMAL, True)))
-    return first, float(bounds[:first].max(initial=0.0))
-
-
-def _require_eigenpairs(pencil: Pencil, pairs: Pairs) -> float:
-    relative = pairs.residuals / _scale(pencil, pairs)
-    worst = int(relative.argmax())
-    if not relative[worst] <= LARGEST_RESIDUAL:
-        raise ConvergenceError(
-            f"Every pair must satisfy Wφ = λBφ to {LARGEST_RESIDUAL:.0e} of the largest eigenvalue; pair {worst} is "
-            f"off by {relative[worst]:.2e}. Nearly degenerate elements do this. {remedy_for(pencil)}"
-        )
-    return float(relative[worst])
 
 
 def _as_eigenpairs(

@@ -13,17 +13,17 @@ import scipy.sparse as sp
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import distinct_from, quality, with_count
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.factor import Factor, rounding
-from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Entries below this share of the largest ones beside the diagonal, in their row and their column,
 # are left out: of a Gaussian kernel those beyond 2 widths, 75 % of them.
 SMALL_ENTRIES = 0.02
 # Rounding of a sum of entries of a row, relative.
-SUMS = 1e-12
+SUM_ROUNDING = 1e-12
 # Rounding of the form on the other pairs, relative to σ, a millionth of what they must differ by.
-ROUNDING = 1e-12
+FORM_ROUNDING = 1e-12
 
 
 def sparser_below(pencil: Pencil) -> Pencil:
@@ -38,7 +38,7 @@ def sparser_below(pencil: Pencil) -> Pencil:
     largest = np.zeros(pencil.n)
     np.maximum.at(largest, rows[beside], sizes[beside])
     small = beside & (sizes < SMALL_ENTRIES * np.sqrt(largest[rows] * largest[columns]))
-    lost = np.bincount(rows[small], sizes[small], minlength=pencil.n) * (1 + SUMS)
+    lost = np.bincount(rows[small], sizes[small], minlength=pencil.n) * (1 + SUM_ROUNDING)
     kept = sp.csc_array(
         (entries.data[~small], (rows[~small], columns[~small])), shape=entries.shape
     )
@@ -48,6 +48,9 @@ def sparser_below(pencil: Pencil) -> Pencil:
 
 def prove_outside(pencil: Pencil, pairs: Pairs, k: int, below: Factor) -> tuple[Pairs, Certificate]:
     """Return the first k pairs, with the rest of the cluster of the k-th, and a certificate, complete or not.
+
+    Raises a ConvergenceError if the pairs are not B-orthonormal eigenvectors, or not precise enough
+    for a proof, or the cluster has no end among them.
 
     Parameters
     ----------
@@ -59,12 +62,6 @@ def prove_outside(pencil: Pencil, pairs: Pairs, k: int, below: Factor) -> tuple[
     k : int
     below : Factor
         Of W₀ - γB with γ above the cluster.
-
-    Raises
-    ------
-    ConvergenceError
-        If the pairs are not B-orthonormal eigenvectors, or not precise enough for a proof, or the
-        cluster has no end among them.
     """
     width = 2 * distinct_from(pencil, pairs.select(slice(k)))
     ends = np.flatnonzero(np.diff(pairs.values[k - 1 :]) > width)
@@ -110,6 +107,6 @@ def _most_missing(
     form = others.T @ images - shift * (others.T @ of_others)
     form -= rests.T @ (rests / pencil.mass_diagonal[:, None]) / margin
     least = np.linalg.eigvalsh((form + form.T) / 2)[0]
-    if not (margin > 0 and least > ROUNDING * shift):
+    if not (margin > 0 and least > FORM_ROUNDING * shift):
         return None
     return below.count - int(np.count_nonzero(on_pairs < 0))

@@ -1,5 +1,6 @@
 """Disconnected operators: each part is solved separately, small parts of equal size together."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,14 +8,22 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape.spectral.solver.pairs import Pairs
+from eigenshape._progress import Progress, silent
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, part_pencil, residual_norms
+from eigenshape.spectral.solver.shift import expected_values, factor_below
 from eigenshape.spectral.spectrum import ZERO_RESIDUALS
 
 # Numbers in the blocks of small parts that are solved together: 32 MiB.
 BLOCK_NUMBERS = 2**22
 # Relative difference of eigenvalues of congruent parts whose coordinates are rounded.
 CONGRUENT = 1e-12
+# A large part is solved for this many times the pairs that Weyl's law expects of it,
+MORE_THAN_EXPECTED = 1.1
+# plus these: a few pairs too many are cheaper than a second solve.
+EXTRA_PAIRS = 2
+
+SolvePart = Callable[[Pencil, int, Progress], Pairs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +73,34 @@ class Parts:
         return part.value_exponent - self.pencil.value_exponent
 
 
+def solve_parts(
+    pencil: Pencil, k: int, largest_small: int, solve: SolvePart, report: Progress
+) -> Pairs:
+    """Return the k lowest pairs of a disconnected pencil, each connected part solved separately.
+
+    A Krylov space of all parts finds few copies of an eigenvalue at a time, and 0 has as many
+    copies as there are parts. Small parts are solved densely. From a large part as many pairs are
+    requested as Weyl's law expects, and more until its last eigenvalue is not below the k-th of all
+    parts: then none of its other eigenvalues is among the k lowest.
+    """
+    parts = connected_parts(pencil)
+    n_parts = len(parts.sizes)
+    report(0.02, f"solving {n_parts} parts")
+    found = dict(enumerate(solve_small(parts, largest_small, k)))
+    large = {number: parts.only(number) for number in range(len(found), n_parts)}
+    wanted = _expected_counts(parts, large, found, k)
+    while wanted:
+        for number, count in wanted.items():
+            part = large[number]
+            pairs = solve(part, count, _share(report, parts, number))
+            values, residuals = np.ldexp([pairs.values, pairs.residuals], parts.exponent(part))
+            up = part.vector_exponent - pencil.vector_exponent
+            found[number] = Pairs(values, np.ldexp(pairs.vectors, up), residuals)
+        wanted = _missing_counts(parts, large, found, k)
+        report = silent  # the fraction done has reached its end once
+    return merge_pairs(parts, [found[number] for number in range(n_parts)], k)
+
+
 def connected_parts(pencil: Pencil) -> Parts:
     """Find the connected parts of W and B together."""
     sizes = np.bincount(pencil.labels)
@@ -96,13 +133,58 @@ def solve_small(parts: Parts, largest: int, k: int) -> list[Pairs]:
     return found
 
 
+def _expected_counts(
+    parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int
+) -> dict[int, int]:
+    """Return how many of the k lowest pairs each large part is expected to have, with a margin."""
+    expected = {}
+    for number, pencil in large.items():
+        values = expected_values(pencil, np.arange(min(k, pencil.n), dtype=float))
+        expected[number] = np.ldexp(values, parts.exponent(pencil))
+    known = np.concatenate([*expected.values(), *(pairs.values for pairs in found.values())])
+    last = np.partition(known, k - 1)[k - 1]
+    counts = {number: int(np.count_nonzero(values <= last)) for number, values in expected.items()}
+    return {
+        number: min(int(MORE_THAN_EXPECTED * count) + EXTRA_PAIRS, k, large[number].n)
+        for number, count in counts.items()
+    }
+
+
+def _missing_counts(
+    parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int
+) -> dict[int, int]:
+    """Return how many pairs to request from the parts whose pairs end below the k-th eigenvalue of all parts."""
+    known = np.concatenate([pairs.values for pairs in found.values()])
+    residuals = np.concatenate([pairs.residuals for pairs in found.values()])
+    last = float(np.partition(known + widths(known, residuals), k - 1)[k - 1])
+    counts = {}
+    for number, pencil in large.items():
+        n_found = len(found[number].values)
+        if n_found < min(k, pencil.n) and found[number].values[-1] < last:
+            n_below = factor_below(pencil, float(np.ldexp(last, -parts.exponent(pencil)))).count
+            counts[number] = min(max(n_below, n_found) + EXTRA_PAIRS, k, pencil.n)
+    return counts
+
+
+def _share(report: Progress, parts: Parts, number: int) -> Progress:
+    """Return a progress function for one part, as a share of all points."""
+    begin, end = (parts.starts[number : number + 2] / parts.pencil.n).tolist()
+    label = f"part {number + 1} of {len(parts.sizes)}"
+    return lambda done, message: report(
+        0.05 + 0.85 * (begin + done * (end - begin)), f"{label}: {message}"
+    )
+
+
 def _solve_blocks(
     parts: Parts, first: int, count: int
 ) -> tuple[Float[np.ndarray, "c s"], Float[np.ndarray, "c s s"], Float[np.ndarray, "c s"]]:
     """Return all eigenpairs of consecutive parts of one size, and their residuals."""
     size = int(parts.sizes[first])
     inside = slice(int(parts.starts[first]), int(parts.starts[first]) + count * size)
-    stiffness, mass = (_blocks(matrix[inside, inside], size) for matrix in parts.block_diagonal)
+    stiffness, mass = np.zeros((2, count, size, size))
+    for blocks, matrix in zip((stiffness, mass), parts.block_diagonal, strict=True):
+        entries = matrix[inside, inside].tocoo()
+        blocks[entries.row // size, entries.row % size, entries.col % size] = entries.data
     diagonal = parts.pencil.mass_diagonal[parts.order[inside]].reshape(count, size, 1)
     if parts.pencil.mass_floor == 1.0:
         roots = np.sqrt(diagonal)
@@ -115,13 +197,6 @@ def _solve_blocks(
     rests = stiffness @ vectors - mass @ vectors * values[:, None, :]
     squares = np.square(rests) / diagonal / parts.pencil.mass_floor  # as in `residual_norms`
     return values, vectors, np.sqrt(squares.sum(axis=1))
-
-
-def _blocks(matrix: sp.csc_array, size: int) -> Float[np.ndarray, "c s s"]:
-    entries = matrix.tocoo()
-    blocks = np.zeros((matrix.shape[0] // size, size, size))
-    blocks[entries.row // size, entries.row % size, entries.col % size] = entries.data
-    return blocks
 
 
 def widths(

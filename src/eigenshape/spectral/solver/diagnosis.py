@@ -7,9 +7,9 @@ from jaxtyping import Float
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
+from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
-from eigenshape.spectral.solver.pairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Ratio of W_ii/B_ii between two points beyond which rounding at the one hides the eigenvalues of
@@ -27,13 +27,36 @@ MOST_STEPS_DOWN = 60
 def require_solvable(pencil: Pencil, error: ConvergenceError) -> None:
     """Raise a specific error if `error` was caused by an operator that no solver can solve.
 
-    Raises
-    ------
-    InvalidParameterError
-        If W has a negative eigenvalue, or W_ii/B_ii spans more digits than floats have.
+    An InvalidParameterError, if W has a negative eigenvalue, or W_ii/B_ii spans more digits than
+    floats have.
     """
-    _require_near_scales(pencil, error)
-    _require_semidefinite(pencil, error)
+    scales = _scales(pencil)
+    if not np.isnan(scales).all():
+        soft, stiff = int(np.nanargmin(scales)), int(np.nanargmax(scales))
+        if scales[stiff] > DIGITS * scales[soft]:
+            low, high = pencil.values_out(scales[[soft, stiff]])
+            raise InvalidParameterError(
+                f"W_ii/B_ii must not span more digits than floats have; it is {high:.3g} at point {stiff} and "
+                f"{low:.3g} at point {soft}, and rounding at the one hides the eigenvalues of the other. "
+                f"{remedy_for(pencil)}"
+            ) from error
+
+    # Count eigenvalues below ever lower values, to say about how low the lowest is.
+    first = last = _count_below(pencil, -BELOW_ZERO * pencil.level)
+    if first is None or last is None:
+        return
+    for _ in range(MOST_STEPS_DOWN):
+        farther = _count_below(pencil, STEP_DOWN * last.shift)
+        if farther is None:
+            break
+        last = farther
+    high, low, least = pencil.values_out(
+        np.array([first.shift, last.shift, STEP_DOWN * last.shift])
+    )
+    raise InvalidParameterError(
+        f"stiffness must be positive semidefinite; eigenvalue 0 lies between {least:.3g} and {low:.3g}, and "
+        f"{first.count} lie below {high:.1e}."
+    ) from error
 
 
 def remedy_for(pencil: Pencil) -> str:
@@ -56,37 +79,6 @@ def _scales(pencil: Pencil) -> Float[np.ndarray, " n"]:
     """Return W_ii/B_ii, and nan where it is not positive."""
     ratios = pencil.stiffness.diagonal() / pencil.mass_diagonal
     return np.where(ratios > 0, ratios, np.nan)
-
-
-def _require_near_scales(pencil: Pencil, error: ConvergenceError) -> None:
-    scales = _scales(pencil)
-    if np.isnan(scales).all():
-        return
-    soft, stiff = int(np.nanargmin(scales)), int(np.nanargmax(scales))
-    if scales[stiff] > DIGITS * scales[soft]:
-        low, high = pencil.values_out(scales[[soft, stiff]])
-        raise InvalidParameterError(
-            f"W_ii/B_ii must not span more digits than floats have; it is {high:.3g} at point {stiff} and {low:.3g} at "
-            f"point {soft}, and rounding at the one hides the eigenvalues of the other. {remedy_for(pencil)}"
-        ) from error
-
-
-def _require_semidefinite(pencil: Pencil, error: ConvergenceError) -> None:
-    first = last = _count_below(pencil, -BELOW_ZERO * pencil.level)
-    if first is None or last is None:
-        return
-    for _ in range(MOST_STEPS_DOWN):
-        farther = _count_below(pencil, STEP_DOWN * last.shift)
-        if farther is None:
-            break
-        last = farther
-    high, low, least = pencil.values_out(
-        np.array([first.shift, last.shift, STEP_DOWN * last.shift])
-    )
-    raise InvalidParameterError(
-        f"stiffness must be positive semidefinite; eigenvalue 0 lies between {least:.3g} and {low:.3g}, and "
-        f"{first.count} lie below {high:.1e}."
-    ) from error
 
 
 def _count_below(pencil: Pencil, shift: float) -> Factor | None:

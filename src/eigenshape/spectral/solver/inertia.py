@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._errors import ConvergenceError
+from eigenshape.spectral.solver.eigenpairs import Pairs, error_bound
 from eigenshape.spectral.solver.factor import Factor, factorize, rounding
-from eigenshape.spectral.solver.pairs import Pairs, error_bound
 from eigenshape.spectral.solver.pencil import Pencil
 
 # Factor by which σ moves away from the eigenvalue if rounding could move it across.
@@ -32,10 +32,8 @@ def count_beside(
     stand above rounding (`rounding`). One at another shift, which is spent, tells the first what to
     expect.
 
-    Raises
-    ------
-    ConvergenceError
-        If rounding exceeds the distance to the nearest value found at every σ that is tried.
+    Raises a ConvergenceError if rounding exceeds the distance to the nearest value found at every σ
+    that is tried.
     """
     value, shape, side = (
         float(pairs.values[index]),
@@ -52,7 +50,10 @@ def count_beside(
         return not 2 * loss < np.abs(pairs.values - shift).min()
 
     factor, none, sigma = beside, np.zeros(pencil.n), value + step
-    slack = _slack_beside(pencil, beside) if beside else none
+    slack = none
+    if beside:
+        # What was enough for this factor, or would have been.
+        slack = beside.slack if beside.slack.any() else _pad(pencil, rounding(beside))
     if too_much(uncertainty(slack), sigma):
         slack = none
     for _ in range(COUNT_TRIALS):
@@ -73,11 +74,6 @@ def count_beside(
         f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it is "
         f"{np.ldexp(uncertainty(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
     )
-
-
-def _slack_beside(pencil: Pencil, factor: Factor) -> Float[np.ndarray, " n"]:
-    """Return the slack that was enough for a factor, or would have been."""
-    return factor.slack if factor.slack.any() else _pad(pencil, rounding(factor))
 
 
 def _pad(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

@@ -8,10 +8,10 @@ from jaxtyping import Float
 from eigenshape._errors import ConvergenceError
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import quality
+from eigenshape.spectral.solver.eigenpairs import Pairs, error_bound, lowest_pairs, polish
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.inertia import count_beside
 from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.solver.pairs import Pairs, error_bound, lowest_pairs, polish
 from eigenshape.spectral.solver.pencil import Pencil
 from eigenshape.spectral.solver.shift import factorize_near
 from eigenshape.spectral.solver.slices import (
@@ -52,10 +52,7 @@ def solve_interval(pencil: Pencil, interval: Interval, report: Report) -> tuple[
     below σ, as many are to be found between σ and τ as N(τ) - N(σ) says; the certificate holds both
     shifts.
 
-    Raises
-    ------
-    ConvergenceError
-        If the counts and what was found do not agree in the end.
+    Raises a ConvergenceError if the counts and what was found do not agree in the end.
     """
     extra = OVERLAP
     while True:
@@ -89,7 +86,20 @@ def _complete(
         gaps = _clear_gaps(pairs.values, interval)
         if gaps is None:
             return None
-        inner, certificate = _restrict_to_interval(pencil, pairs, *gaps)
+        (index, step), after = gaps
+        lower = count_beside(pencil, pairs, index, step, most=False)
+        upper = count_beside(pencil, pairs, *after)
+        inner = pairs.select((pairs.values > lower.shift) & (pairs.values < upper.shift))
+        certificate = replace(
+            quality(pencil, pairs),
+            n_found=len(inner.values),
+            floor=lower.shift,
+            first=lower.count,
+            shift=upper.shift,
+            count=upper.count - lower.count,
+            gap=(float(pairs.values[after[0]]) + error_bound(pairs), upper.shift),
+            resolution=float(np.abs(pairs.values - upper.shift).min()),
+        )
         missing = certificate.n_missing
         if missing == 0:
             return inner, certificate
@@ -123,22 +133,3 @@ def _clear_gaps(
     if min(before[lower], after[upper]) < CLEAR_GAP * values[-1]:
         return None
     return (lower, before[lower] / 2), (upper, ends[upper] - after[upper] / 2 - starts[upper])
-
-
-def _restrict_to_interval(
-    pencil: Pencil, pairs: Pairs, before: tuple[int, float], after: tuple[int, float]
-) -> tuple[Pairs, Certificate]:
-    lower = count_beside(pencil, pairs, *before, most=False)
-    upper = count_beside(pencil, pairs, *after)
-    found = (pairs.values > lower.shift) & (pairs.values < upper.shift)
-    inner = pairs.select(found)
-    return inner, replace(
-        quality(pencil, pairs),
-        n_found=len(inner.values),
-        floor=lower.shift,
-        first=lower.count,
-        shift=upper.shift,
-        count=upper.count - lower.count,
-        gap=(float(pairs.values[after[0]]) + error_bound(pairs), upper.shift),
-        resolution=float(np.abs(pairs.values - upper.shift).min()),
-    )

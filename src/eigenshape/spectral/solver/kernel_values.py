@@ -39,10 +39,7 @@ def require_readable(
 ) -> None:
     """Raise an error for corrected eigenvalues of 1/t or more, and warn of inaccurate ones.
 
-    Raises
-    ------
-    InvalidParameterError
-        With the first eigenvalue that has no counterpart of Δ.
+    Raises an InvalidParameterError with the first eigenvalue that has no counterpart of Δ.
     """
     if kernel is None:
         return
@@ -63,16 +60,13 @@ def require_readable(
             else f"k eigenvalues of a surface need n > 21 k t/e² points, and 72 k t/e² for errors below 10 %, as the "
             f"first {np.count_nonzero(shares <= BIASED)} have; or pass correct='log'"
         )
+        limit_name = "1/t" if kernel.volume == 1 else "1/(t × volume)"
         warnings.warn(
-            f"Eigenvalues from number {late} on are too close to {_limit_name(kernel)} = "
+            f"Eigenvalues from number {late} on are too close to {limit_name} = "
             f"{top:.4g} to represent those of the "
             f"shape: {advice}. Choose a smaller t, or more points.",
             stacklevel=stacklevel,
         )
-
-
-def _limit_name(kernel: GaussianKernel) -> str:
-    return "1/t" if kernel.volume == 1 else "1/(t × volume)"
 
 
 def from_pencil(

@@ -2,16 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import TypeAlias
 
 import numpy as np
 import scipy.linalg as sl
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from eigenshape._errors import ConvergenceError
 from eigenshape.sparse.basis import Block, Slots, combine_columns, pack_columns, products, subtract
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.sparse.symmetric_factor import Scratch
+from eigenshape.spectral.solver.chebyshev import ChebyshevFilter
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 
@@ -39,36 +40,6 @@ CHECK_SHARE = 16
 DEPENDENT_PIVOT = 1e-4
 # and above this one none.
 INDEPENDENT_PIVOT = 0.1
-
-
-@runtime_checkable
-class Operator(Protocol):
-    """What a Krylov space is made of: an operator, symmetric in some inner product, whose largest θ are wanted."""
-
-    @property
-    def pencil(self) -> Pencil:
-        """The pencil whose eigenvectors are wanted."""
-
-    @property
-    def size(self) -> float:
-        """The size of the wanted eigenvalues of the pencil, which residuals are compared with."""
-
-    def image(self, block: Block) -> Block:
-        """Return the operator's image of each slot."""
-
-    def weigh(self, block: Float[np.ndarray, "g n b"]) -> Float[np.ndarray, "g n b"]:
-        """Return what the plain product with columns is the inner product with."""
-
-    def enter(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-        """Return the operator's vectors u for those of the pencil, φ."""
-
-    def leave(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
-        """Return φ for u, which is used up."""
-
-    def values(
-        self, thetas: Float[np.ndarray, " m"]
-    ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
-        """Return the eigenvalues λ of the pencil for θ, and |dλ/dθ| there; both infinite where θ tells none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,10 +98,9 @@ class ShiftedInverse:
         return self.factor.shift + distances, distances**2
 
 
-def shifted_inverse(pencil: Pencil, factor: Factor) -> ShiftedInverse:
-    """Choose the inner product, and allocate the memory for the solves of one run."""
-    roots = np.sqrt(pencil.mass_diagonal)[:, None] if pencil.mass_floor == 1.0 else None
-    return ShiftedInverse(pencil, factor, roots, factor.lower.scratch())
+# What a Krylov space is made of: an operator, symmetric in some inner product, whose largest |θ|
+# belong to the wanted eigenvalues of its pencil.
+Operator: TypeAlias = ShiftedInverse | ChebyshevFilter
 
 
 @dataclass(frozen=True)
@@ -144,56 +114,70 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class Krylov:
-    """A space V, the operator projected on it, and the block that continues it.
+class RitzSpace:
+    """A Krylov space V of an operator A, and the eigenpairs of A projected on it.
 
-    (W - σB)⁻¹B V = V (T + R) + fresh C Eᵀ, with T symmetric and block tridiagonal, and E the last
-    columns of the identity. R is what projections on older blocks took away, the rounding of the
-    recurrence: `projected` holds the upper triangle of T + R, and R lies above the blocks of T.
+    A V = V (T + R) + F C Eᵀ, with T symmetric and block tridiagonal, and E the last columns of the
+    identity. R is what projections on older blocks took away, the rounding of the recurrence; it
+    lies above the blocks of T.
+
+    Attributes
+    ----------
+    inner : Operator
+        A.
+    basis : (s, n, 8) float
+        V, and F, the block that continues it.
+    projected : (m, m) float
+        The upper triangle of T + R.
+    coupling : (b, b) float
+        C.
+    thetas : (m,) float
+        Eigenvalues of T + R + Rᵀ, ascending.
+    coefficients : (m, m) float
+        Their eigenvectors.
+    rests : (m,) float
+        The lengths of their residuals.
+    values : (m,) float
+        What eigenvalue of the pencil each is.
+    chosen : (j,) int
+        The numbers of those that are wanted and have converged, by ascending eigenvalues.
     """
 
-    space: Slots
+    inner: Operator
+    basis: Slots
     projected: Float[np.ndarray, "m m"]
     coupling: Float[np.ndarray, "b b"]
-
-    def rounding(self) -> Float[np.ndarray, "m m"]:
-        """Return R."""
-        rows = np.arange(len(self.projected)) // len(self.coupling)
-        return np.where(rows - rows[:, None] > 1, self.projected, 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Ritz:
-    """Eigenpairs of `Krylov.projected`, and what they are of the pencil.
-
-    θ ascending, coefficients, lengths of their residuals, eigenvalues λ, and which have converged.
-    """
-
     thetas: Float[np.ndarray, " m"]
     coefficients: Float[np.ndarray, "m m"]
     rests: Float[np.ndarray, " m"]
     values: Float[np.ndarray, " m"]
-    converged: Bool[np.ndarray, " m"]
-
-
-@dataclass(frozen=True, eq=False)
-class RitzSpace:
-    """A Krylov space, its Ritz pairs, and the numbers of those that were wanted, by ascending eigenvalues."""
-
-    inner: Operator
-    krylov: Krylov
-    ritz: Ritz
     chosen: Int[np.ndarray, " j"]
 
     def lowest(self, count: int) -> Int[np.ndarray, " j"]:
         """Return the numbers of the Ritz pairs with the lowest eigenvalues, up to one that is not precise enough."""
-        order = np.argsort(self.ritz.values, kind="stable")
-        precise = self.ritz.rests <= PRECISE * np.abs(self.ritz.thetas)
+        order = np.argsort(self.values, kind="stable")
+        precise = self.rests <= PRECISE * np.abs(self.thetas)
         return order[: min(count, int(np.argmin(np.append(precise[order], False))))]
 
     def vectors(self, numbers: Int[np.ndarray, " j"]) -> Float[np.ndarray, "n j"]:
         """Return eigenvectors for some of the Ritz pairs."""
-        return self.inner.leave(_vectors(self.krylov, self.ritz, numbers))
+        block = len(self.coupling)
+        weights, thetas = self.coefficients[:, numbers], self.thetas[numbers]
+
+        # These are eigenvectors s of T + R + Rᵀ. To first order, those of T + R are without
+        # Σ_i s_i (s_iᵀ Rᵀ s) / (θ - θ_i). Close neighbors stay skew, which `lowest_pairs` and
+        # `polish` make good, as what is of second order.
+        rows = np.arange(len(self.projected)) // block
+        rounding = np.where(rows - rows[:, None] > 1, self.projected, 0.0)
+        parts = self.coefficients.T @ (rounding.T @ weights)
+        gaps = thetas - self.thetas[:, None]
+        parts[np.abs(gaps) <= CLUSTERED * np.abs(thetas)] = 0.0
+        weights = weights - self.coefficients @ np.divide(parts, gaps, out=parts, where=parts != 0)
+
+        # One step of A takes the residual out of a Ritz vector y: A y / θ = y + F C s / θ, which
+        # is known already.
+        step = self.coupling @ weights[-block:] / thetas
+        return self.inner.leave(combine_columns(self.basis, np.concatenate([weights, step])))
 
 
 def block_lanczos(
@@ -209,14 +193,12 @@ def block_lanczos(
 
     They are B-orthonormal to more than half of the digits, and `lowest_pairs` makes them so to all.
 
-    Raises
-    ------
-    ConvergenceError
-        If the space has grown to four times what is wanted, or to all there is.
+    Raises a ConvergenceError as `grow_space` does.
     """
-    inner = shifted_inverse(pencil, factor)
+    roots = np.sqrt(pencil.mass_diagonal)[:, None] if pencil.mass_floor == 1.0 else None
+    inner = ShiftedInverse(pencil, factor, roots, factor.lower.scratch())
     found = grow_space(inner, wanted, locked=locked, groups=groups, report=report)
-    return found.ritz.values[found.chosen], found.vectors(found.chosen)
+    return found.values[found.chosen], found.vectors(found.chosen)
 
 
 def grow_space(
@@ -230,75 +212,99 @@ def grow_space(
     """Return a Krylov space, orthogonal to `locked`, in which what it has seen of `wanted` has converged.
 
     The columns of `locked` are B-orthonormal. Unrestarted block Lanczos (Grimes, Lewis and Simon
-    1994), in blocks of `groups` times eight columns. Where nothing is locked, every second block is
-    orthogonalized against all before it, the others against two (Simon 1984), and what that leaves
-    in the recurrence is taken out of the eigenvectors. Copies of an eigenvalue beyond the width of the block may be
-    missing, which an inertia count tells afterwards.
+    1994), in blocks of `groups` times eight columns. Copies of an eigenvalue beyond the width of
+    the block may be missing, which an inertia count tells afterwards.
 
-    Raises
-    ------
-    ConvergenceError
-        If the space has grown to four times what is wanted, or to all there is.
+    Raises a ConvergenceError if the space has grown to four times what is wanted, or to all there
+    is.
     """
-    pencil = inner.pencil
-    rng, first, block = np.random.default_rng(0), -(-locked.shape[1] // LANES), groups * LANES
-    capacity = _capacity(pencil, wanted, locked.shape[1], block)
-    space = np.empty(
-        (first + capacity // LANES + groups, pencil.n, LANES)
-    )  # pages are touched only as it grows
+    n, n_wanted = inner.pencil.n, wanted.below + wanted.above
+    block = groups * LANES
+    available = n - locked.shape[1] - block
+    capacity = max(min(available, 4 * n_wanted + 40 * block) // block, 1) * block
+
+    # The locked vectors, the space, and the block that continues it. Memory is touched only as the
+    # space grows.
+    first = -(-locked.shape[1] // LANES)
+    space = np.empty((first + capacity // LANES + groups, n, LANES))
     space[:first] = pack_columns(inner.enter(locked))
     projected = np.zeros((capacity, capacity))
-    _orthonormalize(
-        inner, space[: first + groups], rng.standard_normal((groups, pencil.n, LANES)), rng
-    )
-    missing = wanted.below + wanted.above
-    check = min(8 * missing // 5 + 8 * block, capacity)  # sooner they have never all converged
-    seen: list[tuple[int, int]] = []
-    skip = False
+    rng = np.random.default_rng(0)
+    start = rng.standard_normal((groups, n, LANES))
+    _orthonormalize(inner, space[: first + groups], start, rng)
+
+    skip, last_check = False, (0, n_wanted)
+    check = min(8 * n_wanted // 5 + 8 * block, capacity)  # sooner they have never all converged
     for size in range(block, capacity + 1, block):
         filled = first + size // LANES
         image = inner.image(space[filled - groups : filled])
         along, coupling = _orthonormalize(inner, space[: filled + groups], image, rng, skip=skip)
         projected[:size, size - block : size] = along[first * LANES :]
-        # What is left of locked vectors is in no recurrence, so that nothing could take it out.
-        skip = not (first or skip) and _stays_orthogonal(along, coupling)
+
+        # Every second block is orthogonalized against two blocks only, where the one before lost
+        # nearly nothing to older ones (Simon 1984). What that leaves in the recurrence is taken out
+        # of the eigenvectors; but nothing could take out what is left of locked vectors.
+        older = np.abs(along[: -2 * block])
+        orthogonal = bool((older <= MOST_LOST * np.diag(coupling).min()).all())
+        skip = orthogonal and not first and not skip
+
         if size >= check:
-            krylov = Krylov(space[first : filled + groups], projected[:size, :size], coupling)
-            ritz = _ritz(krylov, inner)
-            chosen, missing = _choose(ritz, wanted)
+            basis = space[first : filled + groups]
+            found, missing = _ritz_space(inner, basis, projected[:size, :size], coupling, wanted)
             if not missing:
-                chosen = chosen[np.argsort(ritz.values[chosen], kind="stable")]
-                return RitzSpace(inner, krylov, ritz, chosen)
-            seen.append((size, missing))
-            check = min(size + _until_next_check(seen, block), capacity)
-        report(size / (size + 0.6 * (wanted.below + wanted.above) + block))
+                return found
+            # What is missing falls nearly in proportion, and a check costs as much as a few blocks.
+            size_before, missing_before = last_check
+            pace = (missing_before - missing) / (size - size_before) if size_before else 1.0
+            ahead = max(int(missing / max(pace, 0.5)), size // CHECK_SHARE, block)
+            check = min(size + min(ahead, max(size // 4, block)), capacity)
+            last_check = size, missing
+        report(size / (size + 0.6 * n_wanted + block))
     raise ConvergenceError(
-        f"Block Lanczos must converge within {capacity} vectors; {missing} of {wanted.below + wanted.above} "
-        f"eigenvalues did not. Repair nearly degenerate elements, or request fewer pairs."
+        f"Block Lanczos must converge within {capacity} vectors; {missing} of {n_wanted} eigenvalues did not. "
+        f"Repair nearly degenerate elements, or request fewer pairs."
     )
 
 
-def _until_next_check(seen: list[tuple[int, int]], block: int) -> int:
-    """Return how far the space grows before the next check, given its sizes and what was missing at them.
+def _ritz_space(
+    inner: Operator,
+    basis: Slots,
+    projected: Float[np.ndarray, "m m"],
+    coupling: Float[np.ndarray, "b b"],
+    wanted: Wanted,
+) -> tuple[RitzSpace, int]:
+    """Return a space with its Ritz pairs, and how many of those wanted are still to converge."""
+    thetas, coefficients = sl.eigh(projected, lower=False)
+    values, slopes = inner.values(thetas)
+    rests = np.linalg.norm(coupling @ coefficients[-len(coupling) :], axis=0)
+    # Converged as an eigenvalue of the pencil, or as far as rounding lets it.
+    precise = rests <= FLOOR * np.abs(thetas).max()
+    converged = (rests <= TOLERANCE * inner.size / slopes) | (precise & np.isfinite(values))
 
-    What is missing falls nearly in proportion. A check costs as much as a few blocks.
-    """
-    size, missing = seen[-1]
-    pace = (seen[-2][1] - missing) / (size - seen[-2][0]) if len(seen) > 1 else 1.0
-    expected = int(missing / max(pace, 0.5))
-    return min(max(expected, size // CHECK_SHARE, block), max(size // 4, block))
+    # On either side of the shift, nearest first, only those count that no unconverged one is nearer
+    # than: nothing seen lies between.
+    above, below = np.flatnonzero(thetas > 0)[::-1], np.flatnonzero(thetas < 0)
+    n_above, n_below = (
+        int(np.argmin(np.append(converged[side], False))) for side in (above, below)
+    )
+    past_ceiling = n_above > 0 and values[above[n_above - 1]] > wanted.ceiling
+    past_floor = n_below > 0 and values[below[n_below - 1]] < wanted.floor
+    late_above = 0 if past_ceiling else max(wanted.above - n_above, 0)
+    # Copies that the space cannot see are left to a later run; one converged value above proves it
+    # has looked.
+    goal = min(len(below), wanted.below) if n_above else wanted.below
+    late_below = 0 if past_floor else max(goal - n_below, 0)
 
-
-def _capacity(pencil: Pencil, wanted: Wanted, n_locked: int, block: int) -> int:
-    available = pencil.n - n_locked - block
-    most = 4 * (wanted.below + wanted.above) + 40 * block
-    return max(min(available, most) // block, 1) * block
-
-
-def _stays_orthogonal(along: Float[np.ndarray, "m b"], upper: Float[np.ndarray, "b b"]) -> bool:
-    """Return whether a block came out nearly orthogonal to those before the last two."""
-    older = np.abs(along[: -2 * len(upper)])
-    return bool((older <= MOST_LOST * np.diag(upper).min()).all())
+    chosen = np.concatenate(
+        [below[: min(n_below, wanted.below)], above[: min(n_above, wanted.above)]]
+    )
+    within = (values[chosen] > wanted.floor) & (values[chosen] <= wanted.ceiling)
+    chosen = chosen[within]
+    chosen = chosen[np.argsort(values[chosen], kind="stable")]
+    space = RitzSpace(
+        inner, basis, projected, coupling, thetas, coefficients, rests, values, chosen
+    )
+    return space, late_above + late_below
 
 
 def _orthonormalize(
@@ -311,33 +317,30 @@ def _orthonormalize(
 ) -> tuple[Float[np.ndarray, "m b"], Float[np.ndarray, "b b"]]:
     """Split columns = known along + fresh upper, with [known, fresh] = space orthonormal; return along and upper.
 
-    The last slots of `space` are filled with what is fresh; the columns are used up. The recent
-    blocks, which take most of a Lanczos image away, are projected out first, then all of them, or
-    the recent ones again where the others are to be skipped and no column became short.
+    The last slots of `space` are filled with what is fresh; the columns are used up.
     """
     groups, block = len(columns), len(columns) * LANES
     known, fresh = space[:-groups], space[-groups:]
-    recent = known[-2 * groups :]
-    along = np.zeros((len(known) * LANES, block))
+    along, upper = np.zeros((len(known) * LANES, block)), np.eye(block)
     lengths = np.sqrt(np.einsum("gij,gij->gj", columns, inner.weigh(columns))).ravel()
-    for near in (recent, recent if skip else known):
-        along[(len(known) - len(near)) * LANES :] += _project(inner, near, columns)
-    upper, short = _gram_schmidt(inner, columns, fresh, lengths, rng)
-    for _ in range(REPEATS):
+
+    # The recent blocks take most of a Lanczos image away. Then all are projected out, or the recent
+    # ones again where the others are to be skipped.
+    recent = known[-2 * groups :]
+    passes: tuple[Slots, ...] = (recent, recent if skip else known)
+    for _ in range(1 + REPEATS):
+        for near in passes:
+            part = products(near, inner.weigh(columns))
+            subtract(near, part, columns)
+            along[len(along) - len(part) :] += part @ upper
+        triangle, short = _gram_schmidt(inner, columns, fresh, lengths, rng)
+        upper = triangle @ upper
         if not short:
             break
+        # A column that became short has lost digits: once more, against all.
         columns[:] = fresh
-        again = _project(inner, known, columns)
-        second, short = _gram_schmidt(inner, columns, fresh, np.ones(block), rng)
-        along += again @ upper
-        upper = second @ upper
+        lengths, passes = np.ones(block), (known,)
     return along, upper
-
-
-def _project(inner: Operator, space: Slots, columns: Block) -> Float[np.ndarray, "m b"]:
-    part = products(space, inner.weigh(columns))
-    subtract(space, part, columns)
-    return part
 
 
 def _gram_schmidt(
@@ -352,24 +355,21 @@ def _gram_schmidt(
     By the Cholesky factor of the Gram matrix, twice where the first leaves digits to be gained
     (Yamamoto and others 2015), and column by column where it fails. The columns are used up.
     """
-    upper = _by_cholesky(inner, columns, fresh)
-    if upper is None:
-        return _one_by_one(inner, columns, fresh, lengths, rng)
-    if np.diag(upper).min() <= INDEPENDENT_PIVOT * np.linalg.norm(upper, axis=0).max():
-        columns[:] = fresh
-        second = _by_cholesky(inner, columns, fresh)
-        if second is None:
-            second, _ = _one_by_one(inner, columns, fresh, np.ones(len(lengths)), rng)
-        upper = second @ upper
-    return upper, bool((np.diag(upper) < SHRUNK * lengths).any())
-
-
-def _by_cholesky(inner: Operator, columns: Block, fresh: Block) -> Float[np.ndarray, "b b"] | None:
-    triangle = _cholesky(products(columns, inner.weigh(columns)))
-    if triangle is not None:
+    width = len(lengths)
+    upper, before = np.eye(width), lengths
+    for _ in range(2):
+        triangle = _cholesky(products(columns, inner.weigh(columns)))
+        if triangle is None:
+            upper = _one_by_one(inner, columns, fresh, before, rng) @ upper
+            break
         fresh[:] = 0.0
-        subtract(columns, -sl.solve_triangular(triangle, np.eye(len(triangle))), fresh)
-    return triangle
+        subtract(columns, -sl.solve_triangular(triangle, np.eye(width)), fresh)
+        upper = triangle @ upper
+        if np.diag(upper).min() > INDEPENDENT_PIVOT * np.linalg.norm(upper, axis=0).max():
+            break
+        columns[:] = fresh
+        before = np.ones(width)
+    return upper, bool((np.diag(upper) < SHRUNK * lengths).any())
 
 
 def _cholesky(gram: Float[np.ndarray, "b b"]) -> Float[np.ndarray, "b b"] | None:
@@ -390,91 +390,31 @@ def _one_by_one(
     fresh: Block,
     lengths: Float[np.ndarray, " b"],
     rng: np.random.Generator,
-) -> tuple[Float[np.ndarray, "b b"], bool]:
-    """Orthonormalize a block; a negligible column is replaced by a random one that the triangle R leaves out."""
+) -> Float[np.ndarray, "b b"]:
+    """Orthonormalize a block column by column, each twice; return the triangle R.
+
+    A negligible column is replaced by a random one that R leaves out.
+    """
+
+    def weigh(column: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        return inner.weigh(column[None, :, None])[0, :, 0]
+
     columns, width = np.concatenate(list(block), axis=1), len(lengths)
-    upper, short = np.zeros((width, width)), False
+    upper = np.zeros((width, width))
     for i in range(width):
+        known = columns[:, :i]
         for _ in range(2):
-            part = columns[:, :i].T @ _weigh(inner, columns[:, i])
-            columns[:, i] -= columns[:, :i] @ part
+            part = known.T @ weigh(columns[:, i])
+            columns[:, i] -= known @ part
             upper[:i, i] += part
-        length = float(np.sqrt(columns[:, i] @ _weigh(inner, columns[:, i])))
-        short |= bool(length < SHRUNK * lengths[i])
-        if length <= NEGLIGIBLE * lengths[i]:
-            columns[:, i] = _random_unit(inner, columns[:, :i], rng)
-        else:
+        length = float(np.sqrt(columns[:, i] @ weigh(columns[:, i])))
+        if length > NEGLIGIBLE * lengths[i]:
             columns[:, i] /= length
             upper[i, i] = length
+            continue
+        other = rng.standard_normal(len(columns))
+        for _ in range(2):
+            other -= known @ (known.T @ weigh(other))
+        columns[:, i] = other / np.sqrt(other @ weigh(other))
     fresh[:] = pack_columns(columns)
-    return upper, short
-
-
-def _random_unit(
-    inner: Operator, against: Float[np.ndarray, "n b"], rng: np.random.Generator
-) -> Float[np.ndarray, " n"]:
-    column = rng.standard_normal(len(against))
-    for _ in range(2):
-        column -= against @ (against.T @ _weigh(inner, column))
-    return np.asarray(column / np.sqrt(column @ _weigh(inner, column)))
-
-
-def _weigh(inner: Operator, column: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    return inner.weigh(column[None, :, None])[0, :, 0]
-
-
-def _ritz(krylov: Krylov, inner: Operator) -> Ritz:
-    thetas, coefficients = sl.eigh(krylov.projected, lower=False)
-    block = len(krylov.coupling)
-    values, slopes = inner.values(thetas)
-    rests = np.linalg.norm(krylov.coupling @ coefficients[-block:], axis=0)
-    precise = rests <= FLOOR * np.abs(thetas).max()
-    converged = (rests <= TOLERANCE * inner.size / slopes) | (precise & np.isfinite(values))
-    return Ritz(thetas, coefficients, rests, values, converged)
-
-
-def _choose(ritz: Ritz, wanted: Wanted) -> tuple[Int[np.ndarray, " j"], int]:
-    """Return the converged pairs of the window, and how many are still to converge.
-
-    On either side only those count that no unconverged one is nearer than: nothing seen lies
-    between.
-    """
-    above, below = np.flatnonzero(ritz.thetas > 0)[::-1], np.flatnonzero(ritz.thetas < 0)
-    n_above, n_below = (
-        int(np.argmin(np.append(ritz.converged[side], False))) for side in (above, below)
-    )
-    past_ceiling = n_above > 0 and ritz.values[above[n_above - 1]] > wanted.ceiling
-    past_floor = n_below > 0 and ritz.values[below[n_below - 1]] < wanted.floor
-    late_above = 0 if past_ceiling else max(wanted.above - n_above, 0)
-    # Copies that the space cannot see are left to a later run; one converged value above proves it
-    # has looked.
-    goal = min(len(below), wanted.below) if n_above else wanted.below
-    late_below = 0 if past_floor else max(goal - n_below, 0)
-    above, below = above[: min(n_above, wanted.above)], below[: min(n_below, wanted.below)]
-    chosen = np.concatenate([below, above])
-    return chosen[
-        (ritz.values[chosen] > wanted.floor) & (ritz.values[chosen] <= wanted.ceiling)
-    ], late_above + late_below
-
-
-def _vectors(krylov: Krylov, ritz: Ritz, chosen: Int[np.ndarray, " j"]) -> Float[np.ndarray, "n j"]:
-    # One step of the operator takes the residual out of a Ritz vector y: A y / θ = y + fresh C s /
-    # θ, known already.
-    weights = _corrected(krylov, ritz, chosen)
-    step = krylov.coupling @ weights[-len(krylov.coupling) :] / ritz.thetas[chosen]
-    return combine_columns(krylov.space, np.concatenate([weights, step]))
-
-
-def _corrected(
-    krylov: Krylov, ritz: Ritz, chosen: Int[np.ndarray, " j"]
-) -> Float[np.ndarray, "m j"]:
-    """Return coefficients of eigenvectors of T + R, to first order in R.
-
-    Those of `ritz` are of T + R + Rᵀ, so s loses Σ_i s_i (s_iᵀ Rᵀ s) / (θ - θ_i). Close neighbors
-    stay skew to second order, which `lowest_pairs` and `polish` make good.
-    """
-    weights, thetas = ritz.coefficients[:, chosen], ritz.thetas[chosen]
-    parts = ritz.coefficients.T @ (krylov.rounding().T @ weights)
-    gaps = thetas - ritz.thetas[:, None]
-    parts[np.abs(gaps) <= CLUSTERED * np.abs(thetas)] = 0.0
-    return weights - ritz.coefficients @ np.divide(parts, gaps, out=parts, where=parts != 0)
+    return upper

@@ -1,6 +1,6 @@
 """The operator scaled to its own units, so that solvers are independent of the user's."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -111,52 +111,38 @@ class Pencil:
 def normalize(laplacian: Laplacian) -> Pencil:
     """Scale W and B by powers of two, and find a lower bound of B.
 
-    Raises
-    ------
-    InvalidParameterError
-        If B is not positive definite, or entries on a diagonal lie too far apart for floats.
+    Raises an InvalidParameterError if B is not positive definite, or entries on a diagonal lie too
+    far apart for floats.
     """
     _require_range("stiffness", laplacian.stiffness.diagonal())
     _require_range("mass", laplacian.mass.diagonal())
-    return _normalize_matrices(laplacian.stiffness, laplacian.mass, (0, 0), laplacian.kernel)
+    return _pencil(laplacian.stiffness, laplacian.mass, laplacian.kernel)
 
 
 def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
     """Return the pencil of one part, given by its W and B, scaled to its own units."""
-    exponents = whole.value_exponent, whole.vector_exponent
-    return _normalize_matrices(stiffness, mass, exponents, whole.kernel)
+    part = _pencil(stiffness, mass, whole.kernel)
+    return replace(
+        part,
+        value_exponent=whole.value_exponent + part.value_exponent,
+        vector_exponent=whole.vector_exponent + part.vector_exponent,
+    )
 
 
 def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
     """Make a pencil without scaling, for entries that are already of moderate size.
 
-    Raises
-    ------
-    InvalidParameterError
-        If B is not positive definite.
+    Raises an InvalidParameterError if B is not positive definite.
     """
-    return _pencil(_scale(stiffness, 0), _scale(mass, 0), (0, 0), None)
-
-
-def _normalize_matrices(
-    stiffness: sp.sparray,
-    mass: sp.sparray,
-    exponents: tuple[int, int],
-    kernel: GaussianKernel | None,
-) -> Pencil:
-    """Scale W and B; the exponents add to those of a pencil that was scaled before."""
-    up_w, up_b = _exponent(stiffness), _exponent(mass)
-    up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
-    exponents = exponents[0] + up_w - up_b, exponents[1] - up_b // 2
-    return _pencil(_scale(stiffness, -up_w), _scale(mass, -up_b), exponents, kernel)
+    return _pencil(stiffness, mass, None, scaled=False)
 
 
 def _pencil(
-    stiffness: sp.csc_array,
-    mass: sp.csc_array,
-    exponents: tuple[int, int],
-    kernel: GaussianKernel | None,
+    stiffness: sp.sparray, mass: sp.sparray, kernel: GaussianKernel | None, *, scaled: bool = True
 ) -> Pencil:
+    up_w, up_b = (_exponent(stiffness), _exponent(mass)) if scaled else (0, 0)
+    up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
+    stiffness, mass = _scale(stiffness, -up_w), _scale(mass, -up_b)
     diagonal = mass.diagonal()
     mass_floor = _mass_floor(mass, diagonal)
     pattern = abs(stiffness) if mass_floor == 1.0 else abs(stiffness) + abs(mass)
@@ -168,8 +154,8 @@ def _pencil(
         mass_floor=mass_floor,
         labels=labels,
         level=_level(stiffness.diagonal(), diagonal, labels),
-        value_exponent=exponents[0],
-        vector_exponent=exponents[1],
+        value_exponent=up_w - up_b,
+        vector_exponent=-(up_b // 2),
         kernel=kernel,
     )
 
@@ -191,21 +177,15 @@ def _level(
 ) -> float:
     mean = float(stiffness.sum() / mass.sum())
     if labels.any() and mean > 0:
-        mean = _harmonic_mean(stiffness, mass, labels)
+        # The level that predicts the number of low eigenvalues of all parts (Weyl's law).
+        levels = np.bincount(labels, stiffness) / np.bincount(labels, mass)
+        counts, stiff = np.bincount(labels), levels > 0
+        mean = float(counts[stiff].sum() / (counts[stiff] / levels[stiff]).sum())
     ratios = (stiffness / mass)[stiffness > 0]
     if mean <= 0 or not ratios.size:
         return 1.0
     median = float(np.median(ratios))
     return mean if mean < median * LARGEST_LEVEL_RATIO else median
-
-
-def _harmonic_mean(
-    stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"], labels: Int[np.ndarray, " n"]
-) -> float:
-    """Return the level that predicts the number of low eigenvalues of all parts (Weyl's law)."""
-    levels = np.bincount(labels, stiffness) / np.bincount(labels, mass)
-    counts, stiff = np.bincount(labels), levels > 0
-    return float(counts[stiff].sum() / (counts[stiff] / levels[stiff]).sum())
 
 
 def _exponent(matrix: sp.sparray) -> int:
@@ -221,8 +201,11 @@ def _scale(matrix: sp.sparray, exponent: int) -> sp.csc_array:
 
 
 def _shift_pattern(stiffness: sp.csc_array, mass: sp.csc_array) -> ShiftPattern:
-    parts = [_ones(stiffness), _ones(mass), sp.eye_array(stiffness.shape[0], format="csc")]
-    union = sp.csc_array(parts[0] + parts[1] + parts[2])
+    # The sum of ones has an entry wherever W, B or the diagonal has one.
+    union = sp.eye_array(stiffness.shape[0], format="csc")
+    for matrix in (stiffness, mass):
+        ones = np.ones(matrix.nnz), matrix.indices, matrix.indptr
+        union = union + sp.csc_array(ones, shape=matrix.shape)
     union.sort_indices()
     keys = _keys(union)
     diagonal = np.searchsorted(keys, np.arange(union.shape[1]) * (union.shape[1] + 1))
@@ -242,10 +225,6 @@ def _scatter(matrix: sp.csc_array, keys: Int[np.ndarray, " e"]) -> Float[np.ndar
     data = np.zeros(len(keys))
     data[np.searchsorted(keys, _keys(matrix))] = matrix.data
     return data
-
-
-def _ones(matrix: sp.csc_array) -> sp.csc_array:
-    return sp.csc_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _keys(matrix: sp.csc_array) -> Int[np.ndarray, " e"]:

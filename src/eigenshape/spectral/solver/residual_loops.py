@@ -4,7 +4,7 @@ from typing import no_type_check
 
 from eigenshape._compile import njit
 
-ROWS = 256  # rows whose sums are added up separately first, for accuracy
+SUMMED_ROWS = 256  # rows whose sums are added up separately first, for accuracy
 
 
 @njit
@@ -27,7 +27,7 @@ def add_sums(stiffness, mass, vectors, values, weights, with_residuals, images, 
             for c in range(k):
                 rest = images[0, c] - values[c] * images[1, c]
                 part[2, c] += rest * rest / weights[i]
-        if (i + 1) % ROWS == 0 or i + 1 == n:
+        if (i + 1) % SUMMED_ROWS == 0 or i + 1 == n:
             for row in range(3):
                 for c in range(k):
                     sums[row, c] += part[row, c]

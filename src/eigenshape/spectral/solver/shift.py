@@ -73,10 +73,7 @@ def factor_below(pencil: Pencil, shift: float) -> Factor:
 def factorize_near(pencil: Pencil, shift: float) -> Factor:
     """Factor at `shift`, or within a few per cent of it where pivots there are poor or an eigenvalue is too near.
 
-    Raises
-    ------
-    ConvergenceError
-        If that is so at all of them.
+    Raises a ConvergenceError if that is so at all of them.
     """
     for nudge in SHIFT_NUDGES:
         factor = factorize(pencil, nudge * shift)

@@ -29,10 +29,7 @@ FAIR = (0.2, 0.9)
 def walk(pencil: Pencil, k: int, report: Report) -> tuple[Float[np.ndarray, "n j"], Factor]:
     """Return the lowest k eigenvectors as far as they were seen, and the factor at the last shift.
 
-    Raises
-    ------
-    ConvergenceError
-        If a slice does not converge, or has no gap to end in.
+    Raises a ConvergenceError if a slice does not converge, or has no gap to end in.
     """
     return walk_on(pencil, shift_inside(pencil, next_slice(k, 0)), 0, k, report)
 
@@ -47,10 +44,7 @@ def walk_on(
     lie between. What a slice does not see, copies of a multiple eigenvalue beyond the width of its
     block, is left out.
 
-    Raises
-    ------
-    ConvergenceError
-        If a slice does not converge, or has no gap to end in.
+    Raises a ConvergenceError if a slice does not converge, or has no gap to end in.
     """
     parts: list[Float[np.ndarray, "n j"]] = []
     begin, floor = known, -np.inf
@@ -58,12 +52,14 @@ def walk_on(
         target = next_slice(k, known)
         last = known + target >= k
         above = max(known + target - factor.count, 1 if not last else 0) + (0 if last else OVERLAP)
-        share = (known - begin) / (k - begin), target / (k - begin)
         wanted = Wanted(below=factor.count - known, above=above, floor=floor)
         none = np.empty((pencil.n, 0))
-        values, vectors = block_lanczos(
-            pencil, factor, wanted, locked=none, report=_within(report, *share)
-        )
+        start, share = (known - begin) / (k - begin), target / (k - begin)
+
+        def within(done: float, start: float = start, share: float = share) -> None:
+            report(start + share * done)
+
+        values, vectors = block_lanczos(pencil, factor, wanted, locked=none, report=within)
         if last:
             return np.hstack([*parts, vectors]) if parts else vectors, factor
         kept, floor = _find_cut(values, factor.shift)
@@ -78,10 +74,6 @@ def next_slice(k: int, known: int) -> int:
     """Return the number of eigenvalues of the next slice, such that the remaining slices are equal."""
     remaining = k - known
     return -(-remaining // max(-(-remaining // SLICE), 1))
-
-
-def _within(report: Report, start: float, share: float) -> Report:
-    return lambda done: report(start + share * done)
 
 
 def _find_cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float]:
@@ -100,10 +92,7 @@ def _find_cut(values: Float[np.ndarray, " j"], shift: float) -> tuple[int, float
 def factor_beyond(pencil: Pencil, floor: float, spacing: float, known: int, target: int) -> Factor:
     """Factor at a shift with about half of the next slice between `floor` and it.
 
-    Raises
-    ------
-    ConvergenceError
-        If none is found beyond `floor`.
+    Raises a ConvergenceError if none is found beyond `floor`.
     """
     step = spacing * target / 2
     for _ in range(SLICE_TRIALS):

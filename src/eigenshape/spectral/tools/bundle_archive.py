@@ -35,11 +35,8 @@ def write_bundle(path: Path, fields: Mapping[str, Any]) -> None:
 def read_bundle(path: Path) -> dict[str, Any]:
     """Read the arrays of a bundle.
 
-    Raises
-    ------
-    FileFormatError
-        If the file is not a bundle, is damaged or of another version, or its arrays do not fit
-        together or are not finite.
+    Raise FileFormatError if the file is not a bundle, is damaged or of another version, or its
+    arrays do not fit together or are not finite.
     """
     require_regular(path)
     try:

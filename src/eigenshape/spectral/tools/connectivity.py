@@ -154,11 +154,8 @@ def read_faces(
 ) -> Int[np.ndarray, "f 3"]:
     """Walk over faces as `write_faces` did.
 
-    Raises
-    ------
-    FileFormatError
-        If symbols or references end early or are left over, a symbol is unknown or leads to no
-        vertex, or there are more vertices than `n_vertices`.
+    Raise FileFormatError if symbols or references end early or are left over, a symbol is unknown
+    or leads to no vertex, or there are more vertices than `n_vertices`.
     """
     front = Front()
     coming, pointing = iter(symbols), iter(references)

@@ -210,10 +210,8 @@ def spectral_distances(
 def count_constant_modes(spectrum: Spectrum) -> int:
     """Return the number of eigenvalues that count as 0, one for each component of the shape.
 
-    Raises
-    ------
-    InvalidParameterError
-        If all are 0, or the spectrum does not begin with the lowest eigenvalue.
+    Raise InvalidParameterError if all are 0, or the spectrum does not begin with the lowest
+    eigenvalue.
     """
     require_lowest(spectrum, "spectrum")
     values = spectrum.eigenvalues

@@ -215,13 +215,7 @@ class SpectralClusterer(ClusterMixin, BaseEstimator):  # type: ignore[misc]
 
 
 def _require_data_points(X: Any) -> None:
-    """Raise an error for our own shapes: an estimator takes data points.
-
-    Raises
-    ------
-    InvalidParameterError
-        The message names what takes a shape instead.
-    """
+    """Raise an error for our own shapes: an estimator takes data points."""
     if isinstance(X, TriangleMesh | SimplicialMesh | PointCloud):
         raise InvalidParameterError(
             f"An estimator takes (n, d) data points; X is {describe_value(X)}. Pass its points, or use "

@@ -100,10 +100,7 @@ def filter_values(
 def _factors(response: Response, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
     """Return the factor of each eigenvalue.
 
-    Raises
-    ------
-    InvalidParameterError
-        If the response does not return one finite number per eigenvalue.
+    Raise InvalidParameterError if the response does not return one finite number per eigenvalue.
     """
     factors = real_numbers(response(eigenvalues), "The factors of a filter").astype(np.float64)
     if factors.shape != eigenvalues.shape:

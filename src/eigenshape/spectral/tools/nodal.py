@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float, Int
-from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze, vertex_values
@@ -14,6 +12,7 @@ from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.level_sets import LevelSet, level_set
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
+from eigenshape.geometry.facet_lists import label_components
 from eigenshape.operators.graph import edge_graph
 from eigenshape.spectral.spectrum import Spectrum
 
@@ -110,11 +109,7 @@ def nodal_domains(mesh: MeshLike, values: ArrayLike, *, zero: float = ZERO_SHARE
     signs = np.sign(_without_noise(heights, zero)).astype(np.int64)
     edges = edge_graph(mesh).tocoo()
     joined = (signs[edges.row] == signs[edges.col]) & (signs[edges.row] != 0)
-    graph = sp.coo_array(
-        (np.ones(joined.sum(), dtype=np.int8), (edges.row[joined], edges.col[joined])),
-        shape=edges.shape,
-    )
-    _, pieces = connected_components(graph, directed=False)
+    _, pieces = label_components(mesh.n_points, edges.row[joined], edges.col[joined])
 
     # Vertices at zero are pieces of their own and drop out; the rest is numbered in the order of
     # its lowest vertices.

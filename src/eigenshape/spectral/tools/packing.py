@@ -25,10 +25,7 @@ def pack(data: bytes) -> bytes:
 def unpack(data: bytes, most: int, what: str) -> bytes:
     """Decompress bytes; never more than `most` are unpacked.
 
-    Raises
-    ------
-    FileFormatError
-        If there are more, or the stream is damaged.
+    Raise FileFormatError if there are more, or the stream is damaged.
     """
     reader = lzma.LZMADecompressor(format=lzma.FORMAT_RAW, filters=FILTERS)
     try:
@@ -55,10 +52,7 @@ def to_bytes(numbers: Int[np.ndarray, " n"]) -> tuple[bytes, bytes]:
 def from_bytes(first: bytes, rest: bytes) -> Int[np.ndarray, " n"]:
     """Return the numbers of `to_bytes`.
 
-    Raises
-    ------
-    FileFormatError
-        If the second stream does not fit the first.
+    Raise FileFormatError if the second stream does not fit the first.
     """
     folded = np.frombuffer(first, dtype=np.uint8).astype(np.int64)
     large = np.flatnonzero(folded == ESCAPE)
@@ -81,10 +75,7 @@ def to_varints(numbers: list[int]) -> bytes:
 def from_varints(data: bytes, count: int) -> list[int]:
     """Return the numbers of `to_varints`.
 
-    Raises
-    ------
-    FileFormatError
-        If there are not `count` of them, or one has more than nine bytes.
+    Raise FileFormatError if there are not `count` of them, or one has more than nine bytes.
     """
     numbers, number, shift = [], 0, 0
     for byte in data:

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from eigenshape._errors import ConvergenceError
-from eigenshape.operators.graph import adjacency_matrix
+from eigenshape.geometry.topology import adjacency_matrix
 
 # Most vertices of a patch. A dense basis of 400 takes 0.04 s; with 800 files are 2 % smaller and
 # take four times as long (experiment ch1_compression).
@@ -95,10 +95,7 @@ def find_seed(laplacian: Float[np.ndarray, "p p"]) -> tuple[int, Float[np.ndarra
 
     Only the writer chooses, so two machines never choose differently.
 
-    Raises
-    ------
-    ConvergenceError
-        If no seed gives eigenvalues and signs that are far enough from a tie.
+    Raise ConvergenceError if no seed gives eigenvalues and signs that are far enough from a tie.
     """
     for seed in range(N_SEEDS):
         values, vectors, components = patch_basis(laplacian, seed)

@@ -40,10 +40,7 @@ def neighbor_edges(shape: Shape3) -> Int[np.ndarray, "2 e"]:
 def point_frames(shape: Shape3, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarray, "n 3 3"]:
     """Return two tangents and the normal of each point, an orthonormal right-handed frame.
 
-    Raises
-    ------
-    InvalidShapeError
-        If the normals of the faces at a vertex cancel.
+    Raise InvalidShapeError if the normals of the faces at a vertex cancel.
     """
     normals = (
         mean_normals(shape) if isinstance(shape, TriangleMesh) else _fitted_normals(shape, edges)

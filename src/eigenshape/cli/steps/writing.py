@@ -1,0 +1,169 @@
+"""The files that verbs write: checks of their paths before any work is done, and writing them."""
+
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import TypedDict
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from matplotlib.figure import Figure
+
+from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape._files import replace_file
+from eigenshape.cli.console import err, escape_text, print_written
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.carrying import carry_attributes
+from eigenshape.io.formats.registry import WITH_COLORS, WITH_MORE, WRITTEN
+from eigenshape.io.labeled_shapes import write_labels
+from eigenshape.io.mesh_files import read_mesh, save_mesh, write_mesh
+from eigenshape.matching.shape_match import ShapeMatch
+from eigenshape.plot.camera import UP_NAMES, VIEWS, Up, View
+from eigenshape.plot.fields import value_colors
+from eigenshape.plot.figure import require_picture_path, save_figure
+
+LABEL_LISTS = (".seg", ".txt")  # files with one label a line
+MAP_COLUMNS = "vertex,whole_vertex,face,weight_1,weight_2,weight_3,confidence"
+
+
+class Side(TypedDict):
+    """From which side a picture shows a shape, as figures take it."""
+
+    view: View
+    up: Up
+
+
+def picture_side(view: str, up: str, *pictures: Path | None) -> Side:
+    """Return the side of pictures; raise an error if one cannot be written to its path.
+
+    --view and --up are names, or directions as three numbers separated by commas.
+    """
+    for path in pictures:
+        if path is not None:
+            require_picture_path(path)
+    return {
+        "view": _name_or_direction(view, "--view", ("auto", *VIEWS)),
+        "up": _name_or_direction(up, "--up", UP_NAMES),
+    }
+
+
+def _name_or_direction(text: str, option: str, names: tuple[str, ...]) -> str | list[float]:
+    if text in names:
+        return text
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3 or not any(numbers):
+        raise InvalidParameterError(
+            f"{option} takes {', '.join(names)}, or a direction as three numbers separated by "
+            f"commas, such as 1,0,2; it is {text!r}."
+        )
+    return numbers
+
+
+def require_mesh_path(path: Path | None, *, colors: bool = False, labels: bool = False) -> None:
+    """Raise an error if no mesh can be written to a path, or none with colors or labels."""
+    if labels:
+        require_output(path, (*WITH_COLORS, *LABEL_LISTS), "A mesh with labels")
+    elif colors:
+        require_output(path, WITH_COLORS, "A mesh with colors")
+    else:
+        require_output(path, WRITTEN, "A mesh")
+
+
+def require_output(path: Path | None, suffixes: Sequence[str], what: str) -> None:
+    """Raise an error if the path ends in none of the suffixes, or its folder does not exist."""
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        raise InvalidParameterError(
+            f"{what} must be written to a file that ends in {', '.join(suffixes)}; {path} ends in "
+            f"{path.suffix!r}."
+        )
+    if not path.absolute().parent.is_dir():
+        raise InvalidParameterError(
+            f"{what} must be written to a folder that exists; {path.absolute().parent} does not."
+        )
+
+
+def save_like(
+    source: Path,
+    mesh: TriangleMesh,
+    path: Path,
+    moved: Float[np.ndarray, "n 3"] | None = None,
+    *,
+    colors: UInt8[np.ndarray, "n 3"] | None = None,
+    face_labels: Int[np.ndarray, " f"] | None = None,
+) -> None:
+    """Write a mesh with all else that its file holds, and print so, and what is lost, on stderr.
+
+    Parameters
+    ----------
+    source : Path
+        The file that the mesh was read from.
+    mesh : TriangleMesh
+        After repairs.
+    path : Path
+    moved : (n, 3) float, optional
+        Where its vertices are to be written.
+    colors, face_labels : optional
+        Colors and labels to write, as in `write_mesh`.
+    """
+    attributes = None
+    if source.suffix.lower() in WITH_MORE:
+        try:
+            found = read_mesh(source, attributes=True, drop_missing=True)[1]
+            attributes = carry_attributes(found, mesh)
+        except FileFormatError as error:  # the shape was read; only the rest is broken
+            err.print(f"[yellow]lost:[/] all but the shape. {escape_text(error)}")
+    written = mesh if moved is None else TriangleMesh(moved, mesh.faces)
+    lost = save_mesh(written, path, colors=colors, face_labels=face_labels, attributes=attributes)
+    print_written(path)
+    if lost:
+        err.print(f"[yellow]lost:[/] {escape_text(lost)}")
+
+
+def save_labels(
+    source: Path,
+    mesh: TriangleMesh,
+    labels: Int[np.ndarray, " f"],
+    colors: UInt8[np.ndarray, "n 3"],
+    path: Path,
+) -> None:
+    """Write labels of faces, with the mesh of a file or alone, and print so on stderr."""
+    if path.suffix.lower() in LABEL_LISTS:
+        write_labels(labels, path)
+        print_written(path)
+    else:
+        save_like(source, mesh, path, colors=colors, face_labels=labels)
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure, and print so on stderr."""
+    save_figure(figure, path)
+    print_written(path)
+
+
+def save_match(match: ShapeMatch, path: Path) -> None:
+    """Write a map as a table, as arrays, or as one vertex a line, and print so on stderr."""
+    file = BytesIO()
+    if path.suffix.lower() == ".txt":
+        np.savetxt(file, match.vertices, fmt="%d")
+    elif path.suffix.lower() == ".csv":
+        number = np.arange(match.n_vertices)
+        columns = (number, match.vertices, match.faces, match.weights, match.confidence)
+        formats = "%d,%d,%d,%.6g,%.6g,%.6g,%.4g"
+        np.savetxt(file, np.column_stack(columns), formats, header=MAP_COLUMNS, comments="")
+    else:
+        arrays = ("vertices", "faces", "corners", "weights", "confidence")
+        np.savez_compressed(file, **{name: getattr(match, name) for name in arrays})
+    replace_file(path, file.getvalue())
+    print_written(path)
+
+
+def save_heat(mesh: TriangleMesh, heat: Float[np.ndarray, " n"], path: Path) -> None:
+    """Write a mesh, colored by the logarithm of its heat, and print so on stderr."""
+    smallest = np.finfo(np.float64).tiny
+    write_mesh(mesh, path, colors=value_colors(np.log(np.maximum(heat, smallest))))
+    print_written(path)

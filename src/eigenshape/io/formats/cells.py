@@ -1,0 +1,243 @@
+"""Selection of the cells of a file: those of the highest dimension, or of a requested kind."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, cast, get_args
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape.geometry.solids import N_TETRAHEDRA, split_solids
+from eigenshape.io.formats.registry import CellKind
+
+SEGMENTS = "segments"
+FOUR_CORNERED = "polygons of four corners"  # quads or tetrahedra: LaPy writes both as polygons
+N_CORNERS = {
+    SEGMENTS: 2, "triangles": 3, "quads": 4, "tetrahedra": 4, "hexahedra": 8, "wedges": 6, "pyramids": 5,
+}  # fmt: skip
+SOLIDS = ("hexahedra", "wedges", "pyramids")
+NO_TRIANGLES = np.empty((0, 3), dtype=np.int64)
+Cells = dict[str, Int[np.ndarray, "_ _"]]  # corners, by CellKind or another kind of cell
+SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
+# Largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7.
+FLAT = 1e-6
+
+VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, QUAD, TETRAHEDRON = 1, 2, 3, 4, 5, 9, 10
+HEXAHEDRON, WEDGE, PYRAMID = 12, 13, 14
+VTK_KINDS = {
+    LINE: SEGMENTS, TRIANGLE: "triangles", QUAD: "quads", TETRAHEDRON: "tetrahedra",
+    HEXAHEDRON: "hexahedra", WEDGE: "wedges", PYRAMID: "pyramids",
+}  # fmt: skip
+VTK_NAMES = {
+    6: "triangle strip", 7: "polygon", 8: "pixel", 11: "voxel",
+    21: "quadratic edge", 22: "quadratic triangle", 23: "quadratic quad", 24: "quadratic tetrahedron", 42: "polyhedron",
+}  # fmt: skip
+
+
+def require_kind(cells: str | None) -> CellKind | None:
+    """Return the kind of cells; raise an error if there is no such kind."""
+    if cells is not None and cells not in get_args(CellKind):
+        raise InvalidParameterError(
+            f"cells must be {', '.join(get_args(CellKind))} or None; it is {cells!r}."
+        )
+    return cast(CellKind | None, cells)
+
+
+def require_splittable(others: Sequence[str]) -> None:
+    """Raise an error that names the cells that can neither be taken nor split."""
+    if others:
+        raise FileFormatError(
+            "A file must hold simplices, quads, hexahedra, wedges or pyramids, with straight sides; "
+            f"it holds {', '.join(others)}. Save it with simplices, or with straight sides."
+        )
+
+
+def select_cells(
+    points: Float[np.ndarray, "n d"], blocks: Cells, cells: CellKind | None
+) -> Int[np.ndarray, "s corners"]:
+    """Return the simplices of the requested kind, where each quad becomes two triangles.
+
+    The kind "quads" includes the triangles between them, and "tetrahedra" those of hexahedra,
+    wedges and pyramids. Without cells the shape is (0, 3).
+
+    Raise FileFormatError if the file has no cells of the requested kind, and InvalidShapeError if a
+    hexahedron, wedge or pyramid cannot be split.
+    """
+    if FOUR_CORNERED in blocks:
+        blocks = dict(blocks)
+        four = blocks.pop(FOUR_CORNERED)
+        blocks[_kind_of(points, four, cells)] = four
+    quads = fans(blocks["quads"]) if "quads" in blocks else NO_TRIANGLES
+    triangles = blocks.get("triangles", NO_TRIANGLES)
+    surface = np.concatenate([triangles, quads])
+    tetrahedra = blocks.get("tetrahedra", np.empty((0, 4), dtype=np.int64))
+    if cells in (None, "tetrahedra"):
+        split = [split_solids(points, blocks[name]).simplices for name in SOLIDS if name in blocks]
+        tetrahedra = np.concatenate([tetrahedra, *split])
+    found = {"tetrahedra": tetrahedra, "quads": surface, "triangles": triangles}
+    if cells is not None:
+        if not len(found[cells]):
+            held = ", ".join(name for name, block in blocks.items() if len(block)) or "points alone"
+            raise FileFormatError(
+                f"A file that is read with cells={cells!r} must hold {cells}; it holds {held}."
+            )
+        return found[cells]
+    by_dimension = [tetrahedra, surface, blocks.get(SEGMENTS, surface)]
+    return next((block for block in by_dimension if len(block)), surface)
+
+
+def split_sentence(blocks: Cells) -> str:
+    """Say which cells of a file were split into tetrahedra; nothing if there are none."""
+    solids = {name: blocks[name] for name in SOLIDS if name in blocks and len(blocks[name])}
+    if not solids:
+        return ""
+    counts = [f"{len(cells):,} {name}" for name, cells in solids.items()]
+    n_made = sum(len(cells) * N_TETRAHEDRA[cells.shape[1]] for cells in solids.values())
+    return f"{' and '.join(counts)} were split into {n_made:,} tetrahedra"
+
+
+def _kind_of(
+    points: Float[np.ndarray, "n d"], four: Int[np.ndarray, "c 4"], cells: CellKind | None
+) -> CellKind:
+    """Return the kind of polygons of four corners: as requested, or as they join."""
+    if cells is not None:
+        return "tetrahedra" if cells == "tetrahedra" else "quads"
+    kind = four_cornered(points, four)
+    if kind is None:
+        raise FileFormatError(
+            f"Polygons of four corners must be known to be quads or tetrahedra; these {len(four)} could be either; "
+            f'the first is {four[0].tolist()}. cells="quads" or cells="tetrahedra" says which in read_shape and '
+            "read_mesh, and --cells in the commands info, spectrum and repair."
+        )
+    return kind
+
+
+def four_cornered(
+    points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "c 4"]
+) -> Literal["quads", "tetrahedra"] | None:
+    """Return whether cells of four corners are quads or tetrahedra; None if they could be either.
+
+    They are quads if all are flat, or if they join like the faces of a surface: most share a side
+    with another cell, no side belongs to more than two, and few cells share three corners. They are
+    tetrahedra if most share three corners with another, and some side belongs to more than two.
+    """
+    if not len(cells) or cells.min() < 0 or cells.max() >= len(points):
+        return "quads"  # the mesh that is built from them raises an error with the index
+    if _are_flat(points, cells):
+        return "quads"
+    distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)[1]
+    cells = cells[np.sort(distinct)]
+    triples = np.sort(
+        np.stack([np.delete(cells, corner, axis=1) for corner in range(4)], axis=1), axis=2
+    )
+    sides = np.sort(np.stack([cells[:, side] for side in SIDES], axis=1), axis=2)
+    shares_triple = (_multiplicities(triples) > 1).any(axis=1).mean()
+    of_sides = _multiplicities(sides)
+    if of_sides.max() > 2:
+        return "tetrahedra" if shares_triple > 0.5 else None
+    shares_side = (of_sides == 2).any(axis=1).mean()
+    return "quads" if shares_triple < 0.5 < shares_side else None
+
+
+def _are_flat(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "c 4"]) -> bool:
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    size = np.abs(edges).max(axis=(1, 2))
+    unit = edges / np.where(size > 0, size, 1.0)[:, None, None]
+    return points.shape[1] < 3 or bool((np.abs(np.linalg.det(unit)) <= FLAT).all())
+
+
+def _multiplicities(rows: Int[np.ndarray, "c p corners"]) -> Int[np.ndarray, "c p"]:
+    """Return, for each row of corners, how often it occurs."""
+    flat = rows.reshape(-1, rows.shape[2])
+    _, inverse, counts = np.unique(flat, axis=0, return_inverse=True, return_counts=True)
+    return counts[inverse.ravel()].reshape(rows.shape[:2])
+
+
+def fans(polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> Int[np.ndarray, "f 3"]:
+    """Split polygons into triangles around their first corner."""
+    if isinstance(polygons, np.ndarray):
+        first = np.broadcast_to(polygons[:, :1], polygons[:, 1:-1].shape)
+        return np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2).reshape(-1, 3)
+    triangles = [
+        (corners[0], corners[place], corners[place + 1])
+        for corners in polygons
+        for place in range(1, len(corners) - 1)
+    ]
+    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def strip_triangles(strips: Sequence[Int[np.ndarray, " _"]]) -> Int[np.ndarray, "f 3"]:
+    """Split strips into triangles, every second one reversed so that all agree.
+
+    A strip changes its direction by a repeated point. The triangles without area that result from
+    this are left out.
+    """
+    pieces = [np.empty((0, 3), dtype=np.int64)]
+    for corners in strips:
+        triangles = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
+        triangles[1::2] = triangles[1::2, [1, 0, 2]]
+        pieces.append(triangles)
+    found = np.concatenate(pieces).astype(np.int64)
+    first, second, third = found.T
+    return found[(first != second) & (second != third) & (third != first)]
+
+
+@dataclass(frozen=True)
+class CellLists:
+    """Lists of points of varying length: list i is corners[starts[i] : starts[i + 1]]."""
+
+    starts: Int[np.ndarray, " c1"]
+    corners: Int[np.ndarray, " k"]
+
+    @property
+    def lengths(self) -> Int[np.ndarray, " c"]:
+        """Number of points of each list."""
+        return np.diff(self.starts)
+
+    def rows(self, chosen: Int[np.ndarray, " s"], length: int) -> Int[np.ndarray, "s length"]:
+        """Return lists of equal length as rows."""
+        return self.corners[self.starts[chosen][:, None] + np.arange(length)]
+
+    def split(self) -> list[Int[np.ndarray, " _"]]:
+        """Return all lists, one by one."""
+        return np.split(self.corners, self.starts[1:-1])
+
+    def pairs(self, chosen: Int[np.ndarray, " s"]) -> Int[np.ndarray, "p 2"]:
+        """Return the pairs of successive points in lists."""
+        owner = np.repeat(np.arange(len(self.lengths)), self.lengths)
+        follows = (owner[1:] == owner[:-1]) & np.isin(owner[1:], chosen)
+        return np.column_stack([self.corners[:-1][follows], self.corners[1:][follows]])
+
+
+def cells_of_types(lists: CellLists, types: Int[np.ndarray, " c"]) -> Cells:
+    """Sort cells by their kind; ignore cells that are points.
+
+    Raise FileFormatError if a cell has another type, or its number of corners does not match its
+    type.
+    """
+    others = np.setdiff1d(types, [VERTEX, POLY_VERTEX, POLYLINE, *VTK_KINDS])
+    if others.size:
+        named = ", ".join(VTK_NAMES.get(int(kind), f"VTK's type {kind}") for kind in others)
+        raise FileFormatError(
+            "Cells of a VTK file must be simplices, quads, polylines, hexahedra, wedges or pyramids; "
+            f"it holds {named}. Save it with those."
+        )
+    blocks = {}
+    for kind, name in VTK_KINDS.items():
+        length = N_CORNERS[name]
+        chosen = np.flatnonzero(types == kind)
+        wrong = chosen[lists.lengths[chosen] != length]
+        if wrong.size:
+            count = lists.lengths[wrong[0]]
+            raise FileFormatError(
+                f"A VTK cell of type {kind} must have {length} corners; cell {wrong[0]} has {count}."
+            )
+        if chosen.size:
+            blocks[name] = lists.rows(chosen, length)
+    polylines = np.flatnonzero(types == POLYLINE)
+    if polylines.size:
+        blocks[SEGMENTS] = np.concatenate(
+            [blocks.get(SEGMENTS, np.empty((0, 2), int)), lists.pairs(polylines)]
+        )
+    return blocks

@@ -1,0 +1,67 @@
+"""NumPy archives: the arrays `vertices` and `faces`, and functions on them."""
+
+from io import BytesIO
+
+import numpy as np
+
+from eigenshape._errors import FileFormatError
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.formats.cursor import require_reasonable
+
+VERTEX_FIELD, FACE_FIELD = "vertex_", "face_"  # how the names of functions begin
+Arrays = dict[str, np.ndarray]
+
+
+def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Read vertices and faces of a .npz file."""
+    arrays = _read_arrays(data)
+    missing = {"vertices", "faces"} - arrays.keys()
+    if missing:
+        raise FileFormatError(
+            f"A .npz file of a mesh must hold the arrays vertices and faces; it lacks {sorted(missing)[0]}."
+        )
+    vertices, faces = arrays["vertices"], arrays["faces"]
+    if (
+        vertices.ndim != 2
+        or faces.ndim != 2
+        or vertices.dtype.kind not in "fiu"
+        or faces.dtype.kind not in "iu"
+    ):
+        raise FileFormatError(
+            "A .npz file of a mesh must hold vertices (n, 3) of numbers and faces (f, 3) of whole numbers; they are "
+            f"{vertices.shape} {vertices.dtype} and {faces.shape} {faces.dtype}."
+        )
+    return vertices.astype(np.float64), faces.astype(np.int64)
+
+
+def _read_arrays(data: bytes) -> Arrays:
+    """Read all arrays by name; none may hold Python objects."""
+    try:
+        with np.load(BytesIO(data), allow_pickle=False) as file:
+            sizes = [entry.file_size for entry in file.zip.infolist()]
+            require_reasonable(sum(sizes), len(data))
+            return {name: file[name] for name in file.files}
+    except FileFormatError:
+        raise
+    except Exception as err:  # zipfile, zlib and numpy each raise their own
+        raise FileFormatError(f"A .npz file must hold arrays of numbers; {err}.") from err
+
+
+def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
+    """Return the functions on vertices and those on faces, by name."""
+    of_vertices, of_faces = Arrays(), Arrays()
+    for name, array in _read_arrays(data).items():
+        if name.startswith(VERTEX_FIELD):
+            of_vertices[name.removeprefix(VERTEX_FIELD)] = array
+        elif name.startswith(FACE_FIELD):
+            of_faces[name.removeprefix(FACE_FIELD)] = array
+    return of_vertices, of_faces
+
+
+def format_fields(mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:
+    """Write a mesh and functions on its vertices and faces."""
+    file = BytesIO()
+    named = {VERTEX_FIELD + name: values for name, values in of_vertices.items()}
+    named |= {FACE_FIELD + name: values for name, values in of_faces.items()}
+    np.savez(file, allow_pickle=False, vertices=mesh.vertices, faces=mesh.faces, **named)
+    return file.getvalue()

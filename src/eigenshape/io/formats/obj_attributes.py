@@ -1,0 +1,433 @@
+"""Attributes of OBJ files: read with their materials and images, and written with them."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import FileFormatError
+from eigenshape._files import read_regular
+from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.attributes import (
+    Material,
+    MeshAttributes,
+    WriteJob,
+    corner_normals,
+    plain_attributes,
+    unit_rows,
+)
+from eigenshape.io.formats.cells import fans
+from eigenshape.io.formats.obj import Corner, ObjSheet, read_sheet
+from eigenshape.io.formats.text import rows_text
+from eigenshape.io.sources import SourceFile
+
+MAP = re.compile(r"(?im)^([ \t]*(?:map_\w+|bump|disp|decal|norm|refl)[ \t]+)(.+?)[ \t\r]*$")
+PLAIN_MATERIAL = {"newmtl", "kd", "d", "tr", "map_kd", "ka", "ke", "ks", "ns", "ni", "illum"}
+Files = dict[Path, bytes]  # to write, by path
+
+
+def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
+    """Return the attributes of an OBJ file, by face as in the mesh that was read."""
+    sheet = read_sheet(source.data)
+    coordinates = np.array(
+        [[*map(float, row.split()[1:3]), 0.0][:2] for row in _rows(sheet, "vt")] or [[0.0, 0.0]]
+    )
+    _, textures, normals = np.moveaxis(_triangle_corners(sheet), 2, 0)
+    if textures.max() > len(coordinates):
+        raise FileFormatError(
+            f"A corner must name one of {len(coordinates)} texture coordinates; one names {textures.max()}."
+        )
+    faces_of = np.array([len(polygon) - 2 for polygon in sheet.polygons])
+    groups, face_groups = _switches(sheet, ("g ", "o "))
+    names, face_materials = _switches(sheet, ("usemtl ",))
+    defined, others = _read_materials(sheet, source)
+    if (faces_of > 1).any():
+        others.append("polygons, of which triangles are made")
+    if _rows(sheet, "o") and _rows(sheet, "g"):
+        others.append("names of objects beside those of groups")
+    if _rows(sheet, "s"):
+        others.append("smoothing groups")
+    others += sheet.dropped
+    has_normals = (normals >= 0).any()
+    return replace(
+        plain_attributes(mesh),
+        face_materials=np.repeat(face_materials, faces_of),
+        face_groups=np.repeat(face_groups, faces_of),
+        texture_coordinates=coordinates[textures - 1] if textures.any() else None,
+        normals=np.array([*sheet.normals, (0.0, 0.0, 0.0)])[normals] if has_normals else None,
+        colors=_colors(sheet)[mesh.faces]
+        if any(len(t.split()) == 3 for t in sheet.tails)
+        else None,
+        materials=tuple(defined.get(name, Material(_unicode(name))) for name in names),
+        groups=tuple(map(_unicode, groups)),
+        others=tuple(others),
+        source=source,
+    )
+
+
+def _triangle_corners(sheet: ObjSheet) -> Int[np.ndarray, "f 3 3"]:
+    """Return the corners of triangles; each polygon is a fan of them around its first corner."""
+    corners = np.array([corner for polygon in sheet.polygons for corner in polygon])
+    ends = np.cumsum([0, *map(len, sheet.polygons)]).tolist()
+    return corners[fans([range(start, end) for start, end in pairwise(ends)])]
+
+
+def _rows(sheet: ObjSheet, keyword: str) -> list[str]:
+    return [row for row in sheet.rows if isinstance(row, str) and row.split(None, 1)[0] == keyword]
+
+
+def _switches(sheet: ObjSheet, keywords: tuple[str, ...]) -> tuple[list[str], np.ndarray]:
+    """Return the names that lines switch to, and the number of that of each polygon."""
+    names: dict[str, int] = {}
+    current, numbers = -1, []
+    for row in sheet.rows:
+        if not isinstance(row, str):
+            numbers.append(current)
+        elif row.startswith(keywords):
+            name = row.split(None, 1)[1].strip()
+            current = names.setdefault(name, len(names))
+    return list(names), np.array(numbers, dtype=np.int64)
+
+
+def _colors(sheet: ObjSheet) -> np.ndarray:
+    """Return the colors behind coordinates; vertices without one are white."""
+    table = np.full((len(sheet.tails), 4), 255, np.uint8)
+    for number, tail in enumerate(sheet.tails):
+        words = tail.split()
+        if len(words) == 3:
+            table[number, :3] = np.rint(255 * np.nan_to_num(np.array(words, float)).clip(0, 1))
+    return table
+
+
+def _unicode(name: str) -> str:
+    """Return a name that was read byte by byte as text."""
+    try:
+        return name.encode("latin-1").decode()
+    except UnicodeDecodeError:
+        return name
+
+
+def find_beside(name: str, folder: Path) -> Path | None:
+    """Return the file that a line names: in or below the folder, or there by its name alone."""
+    root = folder.resolve()
+    for wanted in (name.replace("\\", "/"), re.split(r"[\\/]", name)[-1]):
+        path = (root / wanted).resolve()
+        if path.is_relative_to(root) and path.is_file():
+            return path
+    return None
+
+
+def _material_files(sheet: ObjSheet, source: SourceFile) -> tuple[str, list[str]]:
+    """Return the text of all libraries of materials, and sentences about those that are missing."""
+    text, missing = "", []
+    for row in _rows(sheet, "mtllib"):
+        rest = _unicode(row.split(None, 1)[1])
+        whole = find_beside(rest, source.path.parent)
+        for name in [rest] if whole else rest.split():
+            path = find_beside(name, source.path.parent)
+            if path is None:
+                missing.append(f"the materials of {name!r}, which is not in the folder of the file")
+            elif path.stat().st_size:
+                text += read_regular(path, "materials").decode("latin-1") + "\n"
+    return text, missing
+
+
+def _image_of(rest: str, folder: Path) -> Path | None:
+    """Return the image that a line of a material names, behind its options."""
+    return find_beside(_unicode(rest), folder) or find_beside(
+        _unicode(rest.rsplit(maxsplit=1)[-1]), folder
+    )
+
+
+def _read_materials(sheet: ObjSheet, source: SourceFile) -> tuple[dict[str, Material], list[str]]:
+    text, lost = _material_files(sheet, source)
+    found: dict[str, Material] = {}
+    for block in re.split(r"(?im)^[ \t]*newmtl[ \t]+", text)[1:]:
+        name, *rows = map(str.strip, block.splitlines())
+        pairs = [row.split(None, 1) for row in rows if row and row[0] != "#"]
+        values = {pair[0].lower(): pair[1] for pair in pairs if len(pair) > 1}
+        if set(values) - PLAIN_MATERIAL:
+            lost.append("properties of materials other than color and image")
+        red, green, blue = ([float(x) for x in values.get("kd", "1 1 1").split()[:3]] * 3)[:3]
+        alpha = float(values["d"].split()[-1]) if "d" in values else None
+        if alpha is None:
+            alpha = 1.0 - float(values.get("tr", "0").split()[-1])
+        image, image_name = None, ""
+        if "map_kd" in values:
+            path = _image_of(values["map_kd"], source.path.parent)
+            if path is None:
+                lost.append(
+                    f"the image {values['map_kd'][:80]!r}, which is not in the folder of the file"
+                )
+            else:
+                image, image_name = read_regular(path, "an image"), path.name
+        found[name] = Material(_unicode(name), (red, green, blue, alpha), image, image_name)
+    return found, lost
+
+
+def write(job: WriteJob) -> Files:
+    """Write an OBJ file with its materials and images beside it: that of the source, or a new one."""
+    held, source = job.attributes, job.attributes.source
+    if not source or source.suffix != ".obj" or held.from_file.mean() <= 0.5:
+        job.lose(["fields"])
+        return write_new(held, job.mesh, job.path)
+    sheet = read_sheet(source.data)
+    data = format_sheet(sheet, held, job.mesh)
+    job.lost.extend(sheet.dropped)
+    if job.path.absolute().parent.resolve() == source.path.absolute().parent.resolve():
+        return {job.path: data}
+    text, missing = _material_files(sheet, source)
+    job.lost.extend(missing)
+    if not text:
+        return {job.path: data}
+    files: Files = {}
+
+    def link(match: re.Match[str]) -> str:
+        image = _image_of(match[2], source.path.parent)
+        if image is None:
+            job.lost.append(f"the image {match[2][:80]!r}, which is not in the folder of the file")
+            return match[0]
+        copy = add_image(files, job.path, image.name, read_regular(image, "an image"))
+        return match[1] + copy.name.encode().decode("latin-1")
+
+    materials = job.path.with_suffix(".mtl")
+    files[materials] = MAP.sub(link, text).encode("latin-1")
+    library = f"mtllib {materials.name}\n".encode()
+    files[job.path] = library + re.sub(rb"(?m)^mtllib[ \t].*\n", b"", data)
+    return files
+
+
+def format_sheet(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
+    """Write a repaired or deformed mesh with the remaining polygons, textures and groups.
+
+    A polygon is kept if all its triangles still exist. Otherwise its remaining triangles are
+    written. Triangles that the file does not have, such as those of a filled hole, come last.
+
+    Parameters
+    ----------
+    sheet : ObjSheet
+        The content of the file that the attributes were read from.
+    attributes : MeshAttributes
+        Of the mesh after repairs.
+    mesh : TriangleMesh
+        The same faces, with the vertices to write.
+    """
+    # The new corners at the three corners of each triangle of the file that is still there
+    file_corners = attributes.corners.indices[attributes.corners.indptr[:-1]].reshape(-1, 3)
+    order = np.argsort(file_corners % 3, axis=1)
+    is_old = attributes.from_file & (np.sort(file_corners % 3, axis=1) == np.arange(3)).all(axis=1)
+    corners_of: dict[int, list[int]] = {}
+    added: list[int] = []
+    for face, corners in enumerate((3 * np.arange(mesh.n_faces)[:, None] + order).tolist()):
+        triangle = int(file_corners[face, 0]) // 3
+        if is_old[face] and triangle not in corners_of:
+            corners_of[triangle] = corners
+        else:
+            added.append(face)
+
+    rows: list[str | list[Corner]] = []
+    new_vertices = mesh.faces.ravel().tolist()
+    n_triangles = n_textures = 0
+    for row in sheet.rows:
+        if isinstance(row, str):
+            rows.append(row)
+            n_textures += row.split(None, 1)[0] == "vt"
+            continue
+        polygon = sheet.polygons[row]
+        triangles = [corners_of.get(n_triangles + place) for place in range(len(polygon) - 2)]
+        n_triangles += len(triangles)
+        rows += _pieces(polygon, triangles, new_vertices)
+    for face in added:
+        group, material = attributes.face_groups[face], attributes.face_materials[face]
+        rows += [f"g {_latin(attributes.groups[group])}"] if group >= 0 else []
+        rows += [f"usemtl {_latin(attributes.materials[material].name)}"] if material >= 0 else []
+        textures = [0, 0, 0]
+        if attributes.texture_coordinates is not None:
+            rows += rows_text("vt ", attributes.texture_coordinates[face])
+            textures = [n_textures + number for number in (1, 2, 3)]
+            n_textures += 3
+        vertices = mesh.faces[face].tolist()
+        rows.append([(vertices[place], textures[place], -1) for place in range(3)])
+
+    lines = _vertex_lines(sheet, attributes, mesh)
+    faces = [content for content in rows if not isinstance(content, str)]
+    normals, numbers = _normals(sheet, faces, mesh.vertices)
+    lines += rows_text("vn ", normals)
+    for content in rows:
+        if isinstance(content, str):
+            lines.append(content)
+            continue
+        lines.append("f")
+        for vertex, texture, normal in content:
+            number = numbers.get((vertex, sheet.normals[normal])) if normal >= 0 else None
+            tail = "" if number is None else f"/{number + 1}"
+            lines[-1] += f" {vertex + 1}" + (f"/{texture or ''}{tail}" if texture or tail else "")
+    return ("\n".join(lines) + "\n").encode("latin-1")
+
+
+def _pieces(
+    polygon: Sequence[Corner], triangles: Sequence[list[int] | None], new_vertices: Sequence[int]
+) -> list[list[Corner]]:
+    """Return what is left of a polygon, with new vertices: the whole, or some triangles.
+
+    It is whole if its triangles are all there, join as before, and none or all of them are turned
+    over.
+    """
+    left = [corners for corners in triangles if corners is not None]
+    joins = [
+        (new_vertices[one[0]], new_vertices[one[2]]) == (new_vertices[two[0]], new_vertices[two[1]])
+        for one, two in pairwise(left)
+    ]
+    if len(left) == len(triangles) and all(joins) and len({*map(_is_turned, left)}) == 1:
+        pieces = [(polygon, [*left[0][:2], *(corners[2] for corners in left)])]
+    else:
+        pieces = [
+            ((polygon[0], polygon[place], polygon[place + 1]), corners)
+            for place, corners in enumerate(triangles, 1)
+            if corners is not None
+        ]
+    rows = []
+    for old, corners in pieces:
+        row = [
+            (new_vertices[corner], texture, normal)
+            for corner, (_, texture, normal) in zip(corners, old, strict=True)
+        ]
+        rows.append([row[0], *row[:0:-1]] if _is_turned(corners) else row)
+    return rows
+
+
+def _is_turned(corners: Sequence[int]) -> bool:
+    """Return whether the first two corners of a face are in reverse order."""
+    return (corners[1] - corners[0]) % 3 == 2
+
+
+def _vertex_lines(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh) -> list[str]:
+    """Write vertices, each with the weight or color that it has in the file."""
+    lines = rows_text("v ", mesh.vertices)
+    if not any(sheet.tails):
+        return lines
+    # A corner with one entry in its row is a corner of the file; a vertex without faces is itself.
+    shared = min(mesh.n_vertices, len(sheet.vertices))
+    stays = (attributes.mesh.vertices[:shared] == sheet.vertices[:shared]).all(axis=1)
+    tails = {index: sheet.tails[index] for index in np.flatnonzero(stays).tolist()}
+    file_vertices = _triangle_corners(sheet)[..., 0].ravel()
+    starts = attributes.corners.indptr
+    singles = np.flatnonzero(np.diff(starts) == 1)
+    sources = file_vertices[attributes.corners.indices[starts[singles]]]
+    for vertex, source in zip(mesh.faces.ravel()[singles].tolist(), sources.tolist(), strict=True):
+        tails[vertex] = sheet.tails[source]
+    return [f"{line} {tails.get(index, '')}".rstrip() for index, line in enumerate(lines)]
+
+
+def _normals(
+    sheet: ObjSheet, faces: Sequence[Sequence[Corner]], vertices: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "m 3"], dict[tuple[int, tuple[float, ...]], int]]:
+    """Compute a normal for each vertex and each normal that it had, so that creases stay."""
+    numbers: dict[tuple[int, tuple[float, ...]], int] = {}
+    owners, triangles = [], []
+    for row in faces:
+        corners = fans([[vertex for vertex, _, _ in row]]).tolist()
+        for vertex, _, normal in row:
+            if normal >= 0:
+                key = (vertex, sheet.normals[normal])
+                number = numbers.setdefault(key, len(numbers))
+                triangles += corners
+                owners += [number] * len(corners)
+    if not numbers:
+        return np.empty((0, 3)), numbers
+    vectors = area_vectors(vertices[np.array(triangles)])
+    sums = np.column_stack([np.bincount(owners, weights=column) for column in vectors.T])
+    units, old = unit_rows(sums), np.array([normal for _, normal in numbers])
+    return np.where(units.any(axis=1, keepdims=True), units, old), numbers
+
+
+def _latin(name: str) -> str:
+    """Return a name as its bytes stand in a sheet."""
+    return name.encode().decode("latin-1")
+
+
+def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Files:
+    """Write an OBJ file with groups and materials, and its materials and images beside it."""
+    files: Files = {}
+    lines: list[str] = []
+    materials = attributes.materials
+    of_faces = attributes.face_materials
+    if materials and of_faces.min() < 0:  # a line usemtl holds for all faces that follow
+        of_faces = np.where(of_faces < 0, len(materials), of_faces)
+        materials = (*materials, Material("plain"))
+    names = _distinct([material.name for material in materials], "material")
+    if materials:
+        library = path.with_suffix(".mtl")
+        lines.append(f"mtllib {library.name}")
+        text = []
+        for name, material in zip(names, materials, strict=True):
+            red, green, blue, alpha = material.color
+            text += [f"newmtl {name}", f"Kd {red:.6g} {green:.6g} {blue:.6g}", f"d {alpha:.6g}"]
+            if material.image is not None:
+                image = add_image(files, path, material.image_name, material.image)
+                text.append(f"map_Kd {image.name}")
+        files[library] = ("\n".join(text) + "\n").encode()
+    vertices = rows_text("v ", mesh.vertices)
+    if attributes.colors is not None:
+        tints = np.ones((mesh.n_vertices, 3))
+        tints[mesh.faces.ravel()] = attributes.colors.reshape(-1, 4)[:, :3] / 255
+        vertices = [
+            f"{row} {r:.4g} {g:.4g} {b:.4g}" for row, (r, g, b) in zip(vertices, tints, strict=True)
+        ]
+    lines += vertices
+    columns = [mesh.faces.ravel() + 1]
+    tables = {"vt": attributes.texture_coordinates, "vn": corner_normals(attributes, mesh)}
+    for keyword, table in tables.items():
+        if table is None:
+            columns.append(np.zeros_like(columns[0]))
+            continue
+        distinct, numbers = np.unique(
+            table.reshape(-1, table.shape[2]), axis=0, return_inverse=True
+        )
+        lines += rows_text(f"{keyword} ", distinct)
+        columns.append(numbers.ravel() + 1)
+    corners = [
+        f"{v}" if not t and not n else f"{v}/{t or ''}" + (f"/{n}" if n else "")
+        for v, t, n in np.column_stack(columns).tolist()
+    ]
+    state = (-1, -1)
+    for face in np.lexsort([of_faces, attributes.face_groups]).tolist():
+        group, number = int(attributes.face_groups[face]), int(of_faces[face])
+        if group != state[0]:
+            lines.append(f"g {attributes.groups[group] or f'group_{group}'}")
+        if number != state[1] and number >= 0:
+            lines.append(f"usemtl {names[number]}")
+        state = group, number
+        lines.append("f " + " ".join(corners[3 * face : 3 * face + 3]))
+    files[path] = ("\n".join(lines) + "\n").encode()
+    return files
+
+
+def add_image(files: Files, path: Path, name: str, data: bytes) -> Path:
+    """Put an image beside an OBJ file, under another name if there is a different one already."""
+    word, number = _word(name), 0
+    place = path.with_name(word)
+    while files.get(place, place.read_bytes() if place.is_file() else data) != data:
+        number += 1
+        place = path.with_name(f"{path.stem}_{number}_{word}")
+    files[place] = data
+    return place
+
+
+def _word(name: str) -> str:
+    """Return a name of which a line or a file name can be made."""
+    return re.sub(r"[^\w.+-]+", "_", name) or "image"
+
+
+def _distinct(names: list[str], noun: str) -> list[str]:
+    """Return words that name materials, each another one."""
+    words: list[str] = []
+    for number, name in enumerate(names):
+        word = _word(name) if name else f"{noun}_{number}"
+        words.append(f"{word}_{number}" if word in words else word)
+    return words

@@ -1,0 +1,401 @@
+"""Polygon File Format: a header that declares tables, then their rows, as text or binary of either order."""
+
+import re
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int
+
+from eigenshape._errors import FileFormatError
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.formats.cells import NO_TRIANGLES, fans, strip_triangles
+from eigenshape.io.formats.text import (
+    Line,
+    lines_of,
+    number,
+    number_table,
+    quote_line,
+    rows_text,
+    whole,
+    whole_table,
+)
+
+AXES = ("x", "y", "z")
+CORNERS = ("vertex_indices", "vertex_index")
+WRITTEN_TYPES = {"u1": "uchar", "i4": "int", "f8": "double"}  # of columns
+LABEL = "label"  # the property of faces that holds the number of their part
+Table = dict[str, Any]  # the values of each column, by name
+TYPES = {
+    "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",
+    "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f", "float64": "d",
+}  # fmt: skip
+TEXT = "text"
+ORDERS = {"ascii": TEXT, "binary_little_endian": "<", "binary_big_endian": ">"}
+MOST_DIGITS = 18  # more rows than any file can hold
+END = re.compile(rb"(?:^|(?<=[\r\n]))end_header[ \t]*(\r\n|\n|\r|$)")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A property: its name, the letter of its type, and for a list that of its length."""
+
+    name: str
+    kind: str
+    length_kind: str = ""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether its values are whole numbers."""
+        return self.kind not in "fd"
+
+
+@dataclass(frozen=True)
+class Element:
+    """A table: its name, its declared number of rows, and its columns."""
+
+    name: str
+    count: int
+    columns: tuple[Column, ...] = ()
+
+    @property
+    def least_bytes(self) -> int:
+        """Least number of bytes of a row of the table, in binary."""
+        return sum(np.dtype(column.length_kind or column.kind).itemsize for column in self.columns)
+
+
+@dataclass(frozen=True)
+class Header:
+    """The byte order (or TEXT), the tables, and the place where their rows begin."""
+
+    order: str
+    elements: tuple[Element, ...]
+    end: int
+    n_lines: int
+
+
+def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Read vertices and faces; polygons and strips become triangles, the rest is ignored."""
+    tables = read_tables(data)
+    vertices = np.column_stack(
+        [np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES]
+    )
+    triangles = [NO_TRIANGLES]
+    polygons = read_lists(tables, "face")
+    are_equal = isinstance(polygons, np.ndarray)
+    for index, corners in enumerate(polygons[:1] if are_equal else polygons):
+        if len(corners) < 3:
+            raise FileFormatError(
+                f"A face must have three corners or more; face {index} is {list(map(int, corners))}."
+            )
+    if len(polygons):
+        triangles.append(fans(polygons.astype(np.int64) if are_equal else polygons))
+    for strip in read_lists(tables, "tristrips"):
+        corners = np.asarray(strip, dtype=np.int64)
+        pieces = np.split(corners, np.flatnonzero(corners == -1))  # -1 separates strips
+        triangles.append(strip_triangles([piece[piece != -1] for piece in pieces]))
+    return vertices, np.concatenate(triangles)
+
+
+def parse_header(data: bytes) -> Header:
+    """Read the header, refusing tables that are larger than the file before anybody makes room for them."""
+    if not re.match(rb"ply\s", data):
+        raise FileFormatError(
+            f"A PLY file must begin with ply; it begins with {quote_line((1, data[:10]))}."
+        )
+    mark = END.search(data)
+    if mark is None:
+        raise FileFormatError("A PLY header must end with end_header; the file has no such line.")
+    lines = data[: mark.start()].splitlines()
+    order, elements = _declarations(lines)
+    if not order:
+        raise FileFormatError("A PLY header must name its format; it has no such line.")
+    # Where lines end in a carriage return alone, a line feed that follows belongs to the rows.
+    end = mark.end() - (mark[1] == b"\r\n" and not re.match(rb"ply[ \t]*\r?\n", data))
+    n_bytes = len(data) - end
+    for element in elements:
+        least = element.least_bytes if order != TEXT else 2 * len(element.columns)
+        if element.count * least > n_bytes + 1:  # the last line of a text may lack its end
+            raise FileFormatError(
+                f"A PLY file must hold the rows it declares; {element.count} rows of {element.name} take "
+                f"{element.count * least} bytes or more and {n_bytes} follow the header."
+            )
+    return Header(order, elements, end, len(lines) + 1)
+
+
+def _declarations(lines: Sequence[bytes]) -> tuple[str, tuple[Element, ...]]:
+    """Return the byte order, empty if there is none, and the tables that the lines of a header declare."""
+    order = ""
+    counts: dict[str, int] = {}
+    tables: dict[str, dict[str, Column]] = {}
+    columns: dict[str, Column] | None = None  # of the last table
+    for index, line in enumerate(lines, 1):
+        match line.decode("latin-1").split():
+            case [] | ["ply" | "comment" | "obj_info", *_]:
+                pass
+            case ["format", name, *_] if name in ORDERS:
+                order = ORDERS[name]
+            case ["element", name, count, *_] if (
+                name not in tables and count.isdecimal() and len(count) <= MOST_DIGITS
+            ):
+                counts[name] = int(count)
+                columns = tables[name] = {}
+            case ["property", "list", lengths, kind, name, *_] if (
+                columns is not None
+                and name not in columns
+                and kind in TYPES
+                and TYPES.get(lengths, "f") not in "fd"
+            ):
+                columns[name] = Column(name, TYPES[kind], TYPES[lengths])
+            case ["property", kind, name, *_] if (
+                columns is not None and name not in columns and kind in TYPES
+            ):
+                columns[name] = Column(name, TYPES[kind])
+            case _:
+                raise FileFormatError(
+                    f"A PLY header must declare format, elements and properties; "
+                    f"line {index} is {quote_line((index, line))}."
+                )
+    return order, tuple(
+        Element(name, counts[name], tuple(table.values())) for name, table in tables.items()
+    )
+
+
+def read_tables(data: bytes) -> dict[str, Table]:
+    """Read all columns, by table and name; of text those that make no mesh are left as words."""
+    header = parse_header(data)
+    elements = [element for element in header.elements if element.columns]
+    columns = {
+        (element.name, column.name): column for element in elements for column in element.columns
+    }
+    axes = [columns.get(("vertex", axis)) for axis in AXES]
+    if any(axis is None or axis.length_kind for axis in axes):
+        raise FileFormatError(
+            "A PLY file must declare an element vertex with the numbers x, y and z; it does not."
+        )
+    for element in elements:
+        if element.name not in ("face", "tristrips") or not element.count:
+            continue
+        names = [(element.name, name) for name in CORNERS]
+        corners = next((columns[name] for name in names if name in columns), None)
+        if corners is None or not corners.length_kind or not corners.is_whole:
+            raise FileFormatError(
+                f"The element {element.name} of a PLY file must declare a list of whole vertex_indices; it does not."
+            )
+    body = data[header.end :]
+    if header.order == TEXT:
+        return _read_text(lines_of(body, first=header.n_lines + 1), elements)
+    tables, start = {}, 0
+    for element in elements:
+        tables[element.name], start = _binary_table(body, element, header.order, start)
+    if body[start:].strip(b"\r\n\0 "):
+        raise FileFormatError(
+            f"A PLY file must end with its last row; {len(body) - start} more bytes follow."
+        )
+    return tables
+
+
+def read_lists(tables: dict[str, Table], name: str) -> Any:
+    """Return the lists of corners of faces or strips."""
+    table = tables.get(name, {})
+    return next((table[column] for column in CORNERS if column in table), ())
+
+
+def _read_text(lines: Sequence[Line], elements: Sequence[Element]) -> dict[str, Table]:
+    declared = sum(element.count for element in elements)
+    if declared != len(lines):
+        raise FileFormatError(
+            f"A PLY file must hold the rows it declares; it declares {declared} in all and holds {len(lines)}."
+        )
+    tables, start = {}, 0
+    for element in elements:
+        rows = lines[start : start + element.count]
+        table = _plain_table(rows, element)
+        tables[element.name] = _row_by_row(rows, element) if table is None else table
+        start += element.count
+    return tables
+
+
+def _plain_table(rows: Sequence[Line], element: Element) -> Table | None:
+    """Read rows of plain numbers with lists of equal lengths at once; None if there are others."""
+    is_whole = all(column.is_whole for column in element.columns)
+    if not is_whole and any(column.length_kind for column in element.columns):
+        return None
+    values = whole_table(rows) if is_whole else number_table(rows)
+    if values is None:
+        return None
+    table, place = {}, 0
+    for column in element.columns:
+        if place >= values.shape[1]:
+            return None
+        length = int(values[0, place]) if column.length_kind else 1
+        if column.length_kind and (length < 0 or (values[:, place] != length).any()):
+            return None
+        place += bool(column.length_kind)
+        table[column.name] = (
+            values[:, place : place + length] if column.length_kind else values[:, place]
+        )
+        place += length
+    return table if place == values.shape[1] else None
+
+
+def _row_by_row(rows: Sequence[Line], element: Element) -> Table:
+    table: Table = {column.name: [] for column in element.columns}
+    for row in rows:
+        words = row[1].split()
+        place = 0
+        for column in element.columns:
+            count = 1
+            if column.length_kind and place < len(words):
+                count = whole(words[place], row, "The length of a list")
+                place += 1
+            if not 0 <= count <= len(words) - place:
+                raise FileFormatError(
+                    f"A row must hold all its columns; line {row[0]} lacks {column.name}: {quote_line(row)}."
+                )
+            values: Sequence[Any] = words[place : place + count]
+            place += count
+            if column.name in AXES:
+                values = [number(word, row) for word in values]
+            elif column.name in CORNERS:
+                values = [whole(word, row, "A corner") for word in values]
+            table[column.name].append(values if column.length_kind else values[0])
+        if place < len(words):
+            raise FileFormatError(
+                f"A row of {element.name} must end with its columns; line {row[0]} goes on with "
+                f"{quote_line((0, b' '.join(words[place:])))}."
+            )
+    return table
+
+
+def _binary_table(body: bytes, element: Element, order: str, start: int) -> tuple[Table, int]:
+    """Read all rows at once if their lists have equal lengths, as in most files."""
+    first, end = _ragged_table(body, replace(element, count=min(element.count, 1)), order, start)
+    if not element.count:
+        return first, end
+    fields: list[Any] = []
+    for column in element.columns:
+        shape: tuple[int, ...] = ()
+        if column.length_kind:
+            fields.append((f"length of {column.name}", order + column.length_kind))
+            shape = (len(first[column.name][0]),)
+        fields.append((column.name, order + column.kind, shape))
+    record = np.dtype(fields)
+    end = start + element.count * record.itemsize
+    if end <= len(body):
+        rows = np.frombuffer(body, record, element.count, start)
+        lists = [column.name for column in element.columns if column.length_kind]
+        if all((rows[f"length of {name}"] == rows[name].shape[1]).all() for name in lists):
+            return {column.name: rows[column.name] for column in element.columns}, end
+    return _ragged_table(body, element, order, start)
+
+
+def _ragged_table(body: bytes, element: Element, order: str, start: int) -> tuple[Table, int]:
+    table: Table = {column.name: [] for column in element.columns}
+    for index in range(element.count):
+        for column in element.columns:
+            try:
+                count = 1
+                if column.length_kind:
+                    (count,) = struct.unpack_from(order + column.length_kind, body, start)
+                    start += struct.calcsize(order + column.length_kind)
+                values = struct.unpack_from(f"{order}{count}{column.kind}", body, start)
+            except struct.error as err:
+                raise FileFormatError(
+                    f"A PLY file must hold the rows it declares; {column.name} of {element.name} {index} does not fit."
+                ) from err
+            start += struct.calcsize(f"{order}{count}{column.kind}")
+            table[column.name].append(values if column.length_kind else values[0])
+    return table, start
+
+
+def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
+    """Read the property `label` of faces: one whole number for each triangle that `parse` makes of them.
+
+    Raise FileFormatError if faces have no such property, or it is not a whole number.
+    """
+    tables = read_tables(data)
+    labels = tables.get("face", {}).get(LABEL)
+    if labels is None:
+        raise FileFormatError(
+            f"Faces of a PLY file of labels must have a property {LABEL}; they have none."
+        )
+    try:
+        values = np.array([int(label) for label in labels], dtype=np.int64)
+    except (TypeError, ValueError, OverflowError) as err:
+        raise FileFormatError(
+            f"The property {LABEL} of faces must be a whole number; it is not: {err}."
+        ) from err
+    n_triangles = [len(polygon) - 2 for polygon in read_lists(tables, "face")]
+    return np.repeat(values, n_triangles)
+
+
+def format_text(
+    mesh: TriangleMesh,
+    of_vertices: Table | None = None,
+    of_faces: Table | None = None,
+    comment: str = "",
+) -> bytes:
+    """Write a mesh, and columns of vertices and faces by name, as text that reads back exactly."""
+    tables = _columns(mesh, of_vertices, of_faces)
+    rows: list[str] = []
+    for columns in tables.values():
+        words = [
+            rows_text(f"{values.shape[1]} ", values)
+            if values.ndim == 2
+            else map(repr, values.tolist())
+            for values in columns.values()
+        ]
+        rows += map(" ".join, zip(*words, strict=True))
+    return _header_text(tables, "ascii", comment) + ("\n".join(rows) + "\n").encode()
+
+
+def format_binary(
+    mesh: TriangleMesh,
+    of_vertices: Table | None = None,
+    of_faces: Table | None = None,
+    comment: str = "",
+) -> bytes:
+    """Write a mesh, and columns of vertices and faces by name, in binary that reads back exactly."""
+    return _pack(_columns(mesh, of_vertices, of_faces), comment)
+
+
+def format_points(points: np.ndarray, _suffix: str) -> bytes:
+    """Write points without faces, in binary."""
+    return _pack({"vertex": dict(zip(AXES, points.T, strict=True))})
+
+
+def _columns(
+    mesh: TriangleMesh, of_vertices: Table | None, of_faces: Table | None
+) -> dict[str, Table]:
+    corners = {CORNERS[0]: mesh.faces.astype(np.int32)}
+    places = dict(zip(AXES, mesh.vertices.T, strict=True))
+    return {"vertex": places | (of_vertices or {}), "face": corners | (of_faces or {})}
+
+
+def _pack(tables: dict[str, Table], comment: str = "") -> bytes:
+    data = _header_text(tables, "binary_little_endian", comment)
+    for columns in tables.values():
+        filled: Table = {}
+        for name, values in columns.items():
+            if values.ndim == 2:
+                filled[f"length of {name}"] = np.full(len(values), values.shape[1], np.uint8)
+            filled[name] = values
+        kinds = [(name, v.dtype.newbyteorder("<"), v.shape[1:]) for name, v in filled.items()]
+        rows = np.zeros(len(next(iter(columns.values()))), dtype=kinds)
+        for name, values in filled.items():
+            rows[name] = values
+        data += rows.tobytes()
+    return data
+
+
+def _header_text(tables: dict[str, Table], order: str, comment: str) -> bytes:
+    lines = ["ply", f"format {order} 1.0", *([f"comment {comment}"] if comment else [])]
+    for element, columns in tables.items():
+        lines.append(f"element {element} {len(next(iter(columns.values())))}")
+        for name, values in columns.items():
+            kind = WRITTEN_TYPES[values.dtype.str[1:]]
+            lines.append(f"property {'list uchar ' if values.ndim == 2 else ''}{kind} {name}")
+    return ("\n".join([*lines, "end_header"]) + "\n").encode()

@@ -1,0 +1,218 @@
+"""Pictures of two shapes: a map between them, and a report on how near they are."""
+
+import matplotlib as mpl
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.ticker import MaxNLocator, NullFormatter
+
+from eigenshape._arguments import require_type
+from eigenshape._errors import InvalidParameterError
+from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh, as_shape
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.matching.shape_match import ShapeMatch
+from eigenshape.plot.camera import Up, View, aim_camera
+from eigenshape.plot.eigenvalues import draw_comparison
+from eigenshape.plot.fields import PANEL, map_colors, show
+from eigenshape.plot.figure import Figure
+from eigenshape.plot.render import draw
+from eigenshape.stability.report import StabilityReport
+
+GRAY = 0.72  # of points that the map is not sure of
+# Colors run from this value to 1, so that the shading stays visible.
+DARKEST = 0.15
+TRUSTED = "#e4f1e4"
+
+
+def figure_match(
+    part: MeshLike,
+    whole: MeshLike,
+    match: ShapeMatch,
+    *,
+    view: View = "auto",
+    up: Up = "auto",
+) -> Figure:
+    """Draw a part and a whole side by side, corresponding points in one color.
+
+    The colors are the coordinates of the whole. Points of the part fade to gray as far as the map
+    is not sure of them.
+
+    Parameters
+    ----------
+    part : MeshLike
+        With n vertices.
+    whole : MeshLike
+    match : ShapeMatch
+        Of `match_shapes(part, whole)`.
+    view : str or (3,) float
+        The side from which each shape is drawn, as in `aim_camera`.
+    up : str or (3,) float
+        The upward direction of both shapes, as in `aim_camera`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InvalidParameterError
+        If the match has another number of vertices than the part.
+
+    See Also
+    --------
+    eigenshape.matching.match_shapes : Compute the map.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> fish, other = (es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1))
+    >>> match = es.match_shapes(fish, other)
+    >>> figure = es.plot.figure_match(fish, other, match)
+    >>> figure.axes[1].get_title()
+    'whole'
+    """
+    part = as_mesh(part, "part")
+    whole = as_mesh(whole, "whole")
+    require_type(match, ShapeMatch, "match")
+    if match.n_vertices != part.n_vertices:
+        raise InvalidParameterError(
+            f"The match must be of the part; it has {match.n_vertices} vertices, and the part has "
+            f"{part.n_vertices}."
+        )
+    figure = Figure(figsize=(4.4 * PANEL, 2.2 * PANEL + 0.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    colors = place_colors(whole.vertices)
+    sure = match.confidence[:, None]
+    pulled = sure * match.pull(colors) + (1 - sure) * GRAY
+    show(left, draw(part, aim_camera(part, view=view, up=up), vertex_colors=pulled))
+    show(right, draw(whole, aim_camera(whole, view=view, up=up), vertex_colors=colors))
+    left.set_title(f"part: {match.confidence.mean():.0%} sure on average", fontsize=10)
+    right.set_title("whole", fontsize=10)
+    return figure
+
+
+def place_colors(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """Return red, green and blue by the three coordinates, each from its lowest to its highest."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    shares = (points - low) / np.maximum(high - low, np.finfo(float).tiny)
+    return DARKEST + (1 - DARKEST) * shares
+
+
+def figure_stability(
+    report: StabilityReport,
+    one: ShapeLike,
+    two: ShapeLike,
+    *,
+    titles: tuple[str, str] = ("one", "two"),
+    view: View = "auto",
+    up: Up = "auto",
+) -> Figure:
+    """Draw a report on two shapes.
+
+    It shows the shapes colored by the distance from each other, their spectra, the change at each
+    heat time, and the angles between their eigenspaces.
+
+    Parameters
+    ----------
+    report : StabilityReport
+        Of `compare_shapes(one, two)`.
+    one, two : ShapeLike
+        The shapes that were compared. They are drawn if both are triangle meshes.
+    titles : (str, str)
+        Titles of the two shapes.
+    view : str or (3,) float
+        The side from which the first shape is drawn, as in `aim_camera`; the other is drawn alike.
+    up : str or (3,) float
+        The upward direction, as in `aim_camera`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    See Also
+    --------
+    compare_shapes : Compute the report.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(3)
+    >>> longer = es.TriangleMesh(ball.vertices * [1, 1, 1.1], ball.faces)
+    >>> report = es.compare_shapes(ball, longer, es.stability.StabilityPlan(k=10, n_samples=100))
+    >>> figure = es.plot.figure_stability(report, ball, longer, titles=("ball", "longer"))
+    >>> figure.axes[0].get_title()
+    'ball'
+    """
+    require_type(report, StabilityReport, "report")
+    one = as_shape(one, "one")
+    two = as_shape(two, "two")
+    drawn = isinstance(one, TriangleMesh) and isinstance(two, TriangleMesh)
+    figure = Figure(figsize=(11, 11.5 if drawn else 8), layout="constrained")
+    rows = figure.subfigures(
+        2 if drawn else 1, 1, squeeze=False, height_ratios=[PANEL, 8] if drawn else None
+    )[:, 0]
+    if isinstance(one, TriangleMesh) and isinstance(two, TriangleMesh):
+        camera = aim_camera(one, view=view, up=up)
+        panels = rows[0].subplots(1, 2)
+        scale, colors = Normalize(0.0, report.distance or 1.0), mpl.colormaps["viridis"]
+        shown = zip(panels, (one, two), report.distances, titles, strict=True)
+        for axes, mesh, values, title in shown:
+            show(axes, draw(mesh, camera, vertex_colors=map_colors(values, scale, colors)))
+            axes.set_title(title)
+        bar = rows[0].colorbar(ScalarMappable(scale, colors), ax=panels.tolist(), shrink=0.8)
+        bar.set_label("distance from the other shape, length")
+    grid = rows[-1].subplots(2, 2)
+    draw_comparison(grid[:, 0], report.spectra, titles)
+    _draw_times(grid[0, 1], report)
+    _draw_angles(grid[1, 1], report)
+    for axes in grid.flat:
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def _draw_times(axes: Axes, report: StabilityReport) -> None:
+    times = np.array([change.t for change in report.changes])
+    rows = (
+        ("bound", "bound for points at this distance", "^:", "#999999"),
+        ("weyl", "Weyl's bound", "s--", "#9467bd"),
+        ("change", "between the shapes", "o-", "#d9541e"),
+        ("floor", "between two samples of the first", "o-", "#7f7f7f"),
+    )
+    for name, label, style, color in rows:
+        values = [getattr(change, name) for change in report.changes]
+        axes.plot(times, values, style, color=color, ms=4, lw=1, label=label)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    if not report.times.empty:
+        low, high, label = report.times.low, report.times.high, "heat times to trust (green)"
+        axes.axvspan(low, high, color=TRUSTED, zorder=0, label=label)
+    # The labels of a logarithmic axis overlap if the times span less than a decade.
+    shown = times[np.linspace(0, len(times) - 1, min(len(times), 4)).round().astype(int)]
+    axes.set_xticks(shown, [f"{time:.3g}" for time in shown])
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel("heat time t, length²")
+    axes.set_ylabel("largest change / last eigenvalue")
+    axes.set_title(
+        f"graph Laplacians of {report.n_samples} random points on each", fontsize=10, loc="left"
+    )
+    axes.legend(frameon=False, fontsize=8)
+
+
+def _draw_angles(axes: Axes, report: StabilityReport) -> None:
+    found = report.angles
+    middle = (found.starts + found.stops - 1) / 2
+    reach = np.maximum((found.stops - 1 - found.starts) / 2, 0.15)
+    angles, blue = np.degrees(found.angles), "#1f77b4"
+    axes.errorbar(middle, angles, None, reach, "o", ms=4, lw=1.5, color=blue, label="measured")
+    if found.bounds is not None:
+        bounds, label = np.degrees(found.bounds), "at most, by the gap (90°: none)"
+        axes.plot(middle, bounds, "v", ms=4, color="#999999", label=label)
+    axes.set_ylim(0, 110)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("numbers of the eigenvalues of a group")
+    axes.set_ylabel("largest angle of eigenspaces, degrees")
+    where = "vertex to vertex" if report.closeness else "between matched points"
+    axes.set_title(f"eigenspaces, {where}", fontsize=10, loc="left")
+    axes.legend(frameon=False, fontsize=8, loc="upper left", ncols=2)

@@ -1,0 +1,220 @@
+"""Comparison of the spectra of two shapes: what changes, by how much, and which changes are proved."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from eigenshape._arguments import require_each, require_type
+from eigenshape._arrays import ReadOnly, finite_values, freeze
+from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr, short_repr
+from eigenshape._typing import ArrayLike
+from eigenshape.spectral.bounds.brackets import Brackets
+from eigenshape.spectral.spectrum import NULL, Spectrum, require_lowest
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumComparison(ReadOnly):
+    """The k lowest eigenvalues of two shapes, compared by number.
+
+    Attributes
+    ----------
+    one, two : (k,) float
+        Eigenvalues, ascending, in 1/length².
+    intervals_one, intervals_two : (k, 2) float
+        Intervals that contain the exact eigenvalues: those of the operator, by the residuals, or
+        those of the shape, by brackets.
+    relative : (k,) float
+        |two - one| / one; 0 if both are 0 to rounding, infinite if one of them is.
+    zero : (k,) bool
+        Whether both are 0 to rounding.
+    bracketed : bool
+        Whether the intervals are brackets.
+
+    See Also
+    --------
+    es.spectral.compare_spectra : Compare two spectra.
+
+    Examples
+    --------
+    At twice the size, positive eigenvalues are a quarter:
+
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> large = es.TriangleMesh(2 * ball.vertices, ball.faces)
+    >>> one, two = (es.solve_spectrum(es.cotangent_laplacian(mesh), 4) for mesh in (ball, large))
+    >>> es.spectral.compare_spectra(one, two).relative.round(6)
+    array([0.  , 0.75, 0.75, 0.75])
+    """
+
+    one: Float[np.ndarray, " k"]
+    two: Float[np.ndarray, " k"]
+    intervals_one: Float[np.ndarray, "k 2"]
+    intervals_two: Float[np.ndarray, "k 2"]
+    relative: Float[np.ndarray, " k"]
+    zero: Bool[np.ndarray, " k"]
+    bracketed: bool
+
+    __repr__ = short_repr
+    _repr_html_ = html_repr
+
+    @property
+    def proved_changes(self) -> Bool[np.ndarray, " k"]:
+        """Mask (k,) of the changes that are proved: the two intervals do not overlap."""
+        (low_one, high_one), (low_two, high_two) = self.intervals_one.T, self.intervals_two.T
+        return np.asarray((high_one < low_two) | (high_two < low_one))
+
+    @property
+    def index_distance(self) -> float:
+        """Largest |λ_i - ω_i|, in 1/length² (thesis, theorem 3.1.5)."""
+        return float(np.abs(self.one - self.two).max())
+
+    @property
+    def hausdorff(self) -> float:
+        """Hausdorff distance of the two sets, as far as they are known, in 1/length² (thesis, theorem 3.1.4)."""
+        return spectral_hausdorff_distance(self.one, self.two)
+
+    @property
+    def mean_relative(self) -> float:
+        """Mean relative change of the eigenvalues that are not 0 in both; 0 where there is none."""
+        return float(self._changes().mean())
+
+    @property
+    def median_relative(self) -> float:
+        """Median relative change of the eigenvalues that are not 0 in both; 0 where there is none."""
+        return float(np.median(self._changes()))
+
+    def _changes(self) -> Float[np.ndarray, " j"]:
+        return np.zeros(1) if self.zero.all() else self.relative[~self.zero]
+
+    def explain(self) -> str:
+        """Return a text that says how far apart the spectra are, and which changes are proved."""
+        k, n_proved = len(self.one), int(self.proved_changes.sum())
+        worst = int(np.abs(self.one - self.two).argmax())
+        bars = "brackets of the shapes'" if self.bracketed else "error bars of the operators'"
+        return (
+            f"Of the {k} lowest eigenvalues, number {worst} changes most, from {self.one[worst]:.6g} to "
+            f"{self.two[worst]:.6g} (1/length²). They change by {self.median_relative:.3g} of themselves in the median "
+            f"and {self.mean_relative:.3g} in the mean, and the sets are {self.hausdorff:.3g} apart (Hausdorff). "
+            f"{n_proved} of the {k} changes are proved: the {bars} eigenvalues do not overlap."
+        )
+
+
+def compare_spectra(
+    one: Spectrum, two: Spectrum, *, brackets: tuple[Brackets, Brackets] | None = None
+) -> SpectrumComparison:
+    """Compare the lowest eigenvalues of two shapes, as many as both have (thesis 3.1, 3.4).
+
+    Parameters
+    ----------
+    one, two : Spectrum
+        From the lowest eigenvalue on. To ignore size, scale both shapes to the same area.
+    brackets : (Brackets, Brackets), optional
+        Brackets of the two shapes. Changes are then proved for the shapes, not only for the
+        operators.
+
+    Returns
+    -------
+    SpectrumComparison
+
+    Raises
+    ------
+    InvalidParameterError
+        If a spectrum does not begin with the lowest eigenvalue, or there are fewer brackets than
+        eigenvalues.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> one, two = (
+    ...     es.solve_spectrum(es.cotangent_laplacian(mesh), 4)
+    ...     for mesh in (es.icosphere(2), es.TriangleMesh(2 * es.icosphere(2).vertices, es.icosphere(2).faces))
+    ... )
+    >>> found = es.spectral.compare_spectra(one, two)
+    >>> found.relative.round(6).tolist()  # a quarter, as 1/length²
+    [0.0, 0.75, 0.75, 0.75]
+    >>> found.proved_changes.tolist()
+    [False, True, True, True]
+    """
+    require_type(one, Spectrum, "one")
+    require_type(two, Spectrum, "two")
+    require_lowest(one, "one")
+    require_lowest(two, "two")
+    k = min(len(one.eigenvalues), len(two.eigenvalues))
+    values = one.eigenvalues[:k], two.eigenvalues[:k]
+    bars = [within_residuals(one, k), within_residuals(two, k)]
+    zeros = bars[0][:, 0] <= 0, bars[1][:, 0] <= 0
+    if brackets is not None:
+        require_each(brackets, Brackets, "brackets")
+        bars = [
+            within_brackets(each, k, name)
+            for each, name in zip(brackets, ("one", "two"), strict=True)
+        ]
+    return SpectrumComparison(
+        one=freeze(values[0]),
+        two=freeze(values[1]),
+        intervals_one=freeze(bars[0]),
+        intervals_two=freeze(bars[1]),
+        relative=freeze(relative_change(*values, zero=zeros)),
+        zero=freeze(zeros[0] & zeros[1]),
+        bracketed=brackets is not None,
+    )
+
+
+def within_residuals(spectrum: Spectrum, k: int) -> Float[np.ndarray, "k 2"]:
+    """Return [λ - r, λ + r], from 0 on where λ is 0 to rounding."""
+    values, residuals = spectrum.eigenvalues[:k], spectrum.residuals[:k]
+    lower = np.where(count_as_zero(values), 0.0, np.maximum(values - residuals, 0.0))
+    return np.column_stack([lower, values + residuals])
+
+
+def within_brackets(brackets: Brackets, k: int, name: str) -> Float[np.ndarray, "k 2"]:
+    """Return the lowest k brackets.
+
+    Raises an InvalidParameterError if there are fewer.
+    """
+    if len(brackets.upper) < k:
+        raise InvalidParameterError(
+            f"There must be a bracket for each eigenvalue that is compared; there are {k} eigenvalues, and "
+            f"{len(brackets.upper)} brackets of {name}."
+        )
+    return np.column_stack([brackets.lower[:k], brackets.upper[:k]])
+
+
+def count_as_zero(values: Float[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
+    """Return which of these eigenvalues are 0 beside the last."""
+    return np.asarray(values <= NULL * values[-1])
+
+
+def relative_change(
+    one: Float[np.ndarray, " k"],
+    two: Float[np.ndarray, " k"],
+    *,
+    zero: tuple[Bool[np.ndarray, " k"], Bool[np.ndarray, " k"]],
+) -> Float[np.ndarray, " k"]:
+    """Return |two - one| / one, where masks say which of each are 0: of two zeros 0, of one alone infinite."""
+    either, both = zero[0] | zero[1], zero[0] & zero[1]
+    change = np.abs(two - one) / np.where(either, 1.0, one)
+    return np.where(either, np.where(both, 0.0, np.inf), change)
+
+
+def spectral_hausdorff_distance(one: ArrayLike, two: ArrayLike) -> float:
+    """Compute the Hausdorff distance of two sets of eigenvalues (thesis, theorem 3.1.4).
+
+    max(max_λ dist(λ, Ω), max_ω dist(ω, Λ)), restricted to what two truncated spectra determine. An
+    eigenvalue above the last known one of the other set is left out, because its nearest neighbor
+    may be unknown. For all others the distance is exact: unknown eigenvalues of the other set are
+    at or above its last known one, and so no nearer than that. Raises an error
+    if a value is not finite, or a set is empty.
+    """
+    first, second = np.sort(finite_values(one, "one")), np.sort(finite_values(two, "two"))
+    return max(_farthest(first, second), _farthest(second, first))
+
+
+def _farthest(values: Float[np.ndarray, " k"], others: Float[np.ndarray, " j"]) -> float:
+    known = values[values <= others[-1]]
+    above = np.searchsorted(others, known)
+    below = np.maximum(above - 1, 0)
+    distances = np.minimum(np.abs(others[above] - known), np.abs(known - others[below]))
+    return float(distances.max(initial=0.0))

@@ -1,0 +1,148 @@
+"""Chebyshev filters: a polynomial of an operator in place of its inverse, where factors are large."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from eigenshape._errors import ConvergenceError
+from eigenshape._threads import free_threads, map_in_threads, share_units
+from eigenshape.sparse.basis import Block
+from eigenshape.sparse.basis_loops import multiply_lanes
+from eigenshape.sparse.largest import largest_ritz_value
+from eigenshape.spectral.solver.pencil import Pencil
+
+# What a filter gains between its first damped eigenvalue and 0 is about cosh of this. A higher one
+# needs fewer vectors and more products: 4 to 6 products a vector are best where a tenth of the
+# spectrum is not damped (measured).
+REACH = 2.2
+# Degrees of a filter.
+LOWEST_DEGREE, HIGHEST_DEGREE = 2, 60
+# What the estimate of the largest eigenvalue is raised by.
+RAISED = 1.01
+# Rows that a thread multiplies at least.
+ROWS_A_THREAD = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class ChebyshevFilter:
+    """T_m(z(A)) for A = B^-½ W B^-½ with B diagonal, on u = B^½ φ, in the plain inner product.
+
+    z takes the eigenvalues that are to be damped to [-1, 1], where the polynomial T_m is at most 1;
+    lower ones are beyond 1, where it grows like cosh(m arcosh z) (Zhou, Saad, Tiago and Chelikowsky
+    2006).
+
+    Attributes
+    ----------
+    pencil : Pencil
+    order : (n,) int
+        The point of each row: points that are near each other in it share what is in the cache.
+    roots : (n, 1) float
+        B^½, by points.
+    matrix : tuple
+        Pointers, indices and entries of 2 z(A).
+    degree : int
+        m.
+    damped : (float, float)
+        The eigenvalues of the pencil that are damped.
+    """
+
+    pencil: Pencil
+    order: Int[np.ndarray, " n"]
+    roots: Float[np.ndarray, "n 1"]
+    matrix: tuple[Int[np.ndarray, " p"], Int[np.ndarray, " e"], Float[np.ndarray, " e"]]
+    degree: int
+    damped: tuple[float, float]
+
+    @property
+    def size(self) -> float:
+        """The lower end of what is damped, since eigenvalues up to about half of it are wanted."""
+        return self.damped[0] / 2
+
+    def image(self, block: Block) -> Block:
+        """Return the polynomial's image of each slot, by the recurrence T_{j+1} = 2 z T_j - T_{j-1}."""
+        images = np.empty_like(block)
+        scratch = np.empty_like(block[0])
+        for slot, image in zip(block, images, strict=True):
+            # Of T_1, T_2, ... each takes the place of the one two before; the last is the image.
+            odd, even = (image, scratch) if self.degree % 2 else (scratch, image)
+            self._multiply(slot, slot, 0.5, 0.0, odd)
+            self._multiply(odd, slot, 1.0, 1.0, even)
+            before, latest = odd, even
+            for _ in range(self.degree - 2):
+                self._multiply(latest, before, 1.0, 1.0, before)
+                before, latest = latest, before
+        return images
+
+    def weigh(self, block: Float[np.ndarray, "g n b"]) -> Float[np.ndarray, "g n b"]:
+        """Return the block: the inner product is the plain one."""
+        return block
+
+    def enter(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return u for φ, in the order of the rows."""
+        return (vectors * self.roots)[self.order]
+
+    def leave(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return φ for u, in the order of the points."""
+        points = np.empty_like(vectors)
+        points[self.order] = vectors
+        points /= self.roots
+        return points
+
+    def values(
+        self, thetas: Float[np.ndarray, " m"]
+    ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+        """Return λ for θ = T_m(z(λ)) > 1, and |dλ/dθ|; both infinite for other θ, which several λ share."""
+        low, high = self.damped
+        values, slopes = np.full_like(thetas, np.inf), np.full_like(thetas, np.inf)
+        beyond = thetas > 1
+        angles = np.arccosh(thetas[beyond]) / self.degree
+        half = (high - low) / 2
+        values[beyond] = low - half * (np.cosh(angles) - 1)
+        slopes[beyond] = half * np.sinh(angles) / (self.degree * np.sinh(self.degree * angles))
+        return values, slopes
+
+    def _multiply(
+        self,
+        given: Float[np.ndarray, "n 8"],
+        before: Float[np.ndarray, "n 8"],
+        factor: float,
+        share: float,
+        out: Float[np.ndarray, "n 8"],
+    ) -> None:
+        rows = share_units(len(given), ROWS_A_THREAD, free_threads())
+        map_in_threads(
+            lambda part: multiply_lanes(self.matrix, given, before, factor, share, *part, out), rows
+        )
+
+
+def chebyshev_filter(pencil: Pencil, order: Int[np.ndarray, " n"], low: float) -> ChebyshevFilter:
+    """Return a filter that damps the eigenvalues from `low` on; B is diagonal.
+
+    Raises a ConvergenceError if that is less than half of the spectrum.
+    """
+    roots = np.sqrt(pencil.mass_diagonal)
+    scaled = sp.csr_array(pencil.stiffness[order][:, order])
+    scaled.sort_indices()
+    inverse = 1 / roots[order]
+    scaled.data *= np.repeat(inverse, np.diff(scaled.indptr)) * inverse[scaled.indices]
+    # A little less than the largest eigenvalue does no harm.
+    value, rest, share = largest_ritz_value(lambda column: scaled @ column, pencil.n)
+    high = RAISED * (value + share * rest)
+    if not 0 < low < high / 2:
+        raise ConvergenceError(
+            f"A filter must damp most of the spectrum; it is to begin at {low / high:.2g} of it."
+        )
+    degree = round(REACH / np.sqrt(low / high))
+    scaled.data *= -4 / (high - low)
+    scaled.setdiag(scaled.diagonal() + 2 * (high + low) / (high - low))
+    pointers, indices = scaled.indptr.astype(np.int64), scaled.indices.astype(np.int32)
+    return ChebyshevFilter(
+        pencil=pencil,
+        order=order,
+        roots=roots[:, None],
+        matrix=(pointers, indices, scaled.data),
+        degree=min(max(degree, LOWEST_DEGREE), HIGHEST_DEGREE),
+        damped=(low, high),
+    )
