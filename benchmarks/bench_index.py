@@ -6,8 +6,9 @@
 
 Shapes are described by patches without views, with random codes and the points of one creature, so that a shape takes
 6 KB of rows; all else is as in any index. A reader is opened in a process of its own. "Memory" is what that process
-holds for itself after it was opened and asked once. What it has mapped of files besides, the short rows of the scan
-among them, the system may take back at any time. A query is described already; it is scanned, scored and verified.
+holds for itself after it was opened and asked once. What it has mapped of files besides, the short rows of the scan and
+pages of the database, the system may take back at any time. A query is described already; it is scanned, scored and
+verified.
 """
 
 import os

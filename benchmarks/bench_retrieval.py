@@ -114,7 +114,8 @@ def asked(method: str, n_shapes: int) -> Row:
             if number < len(poses):
                 index.add(name, poses[number], recipe=recipe)
             else:
-                index.add_descriptors(name, index.descriptors(copied, recipe))
+                stored = index.descriptors(copied, recipe)
+                index.add_many([es.retrieval.DescribedShape(name, stored)])
         query = es.describe(scan, recipe)
         index.query(query)
         return measured(lambda: index.query(query))

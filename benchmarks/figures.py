@@ -76,7 +76,7 @@ FIGURES = {
     "calls": Figure("bench_calls.py", ("operators", "matching", "spectral")),
     "start": Figure("bench_start.py", ("__init__.py", "cli")),
     "threads": Figure("bench_threads.py", ("_threads.py", "sparse", "spectral/solver")),
-    "search": Figure("bench_search.py --queries 10 --qdrant 0", ("retrieval/search",)),
+    "search": Figure("bench_search.py --queries 20 --qdrant 0", STORE),
     "retrieval": Figure("bench_retrieval.py --repeats 1", DESCRIBING),
     "deform": Figure("bench_deform.py --repeats 1", ("deformation",)),
     "kernel": Figure("bench_kernel.py --repeats 1", ("operators",)),

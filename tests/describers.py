@@ -1,7 +1,9 @@
 """What worker processes of the tests read; importable by name."""
 
 import os
+import sqlite3
 import time
+from contextlib import closing
 
 import numpy as np
 from filelock import FileLock
@@ -10,6 +12,7 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.heat.descriptor import HeatDescriptor
 from eigenshape.retrieval.heat.recipe import HeatRecipe
+from eigenshape.retrieval.store.writing import DescribedShape
 from eigenshape.shapes.surfaces import icosphere
 
 RECIPE = HeatRecipe(name="test", scales=(1.0, 2.0, 4.0), n_features=2, n_shifts=0)
@@ -23,6 +26,20 @@ class PicklesBadlyError(Exception):
 def descriptor(seed, recipe=RECIPE, m=2):
     rng = np.random.default_rng(seed)
     return HeatDescriptor(rng.random((m, len(recipe.scales))), np.arange(m), recipe)
+
+
+def keep(index, name, descriptors, *, replace=False, **facts):
+    """Add a shape that is described already."""
+    index.add_many([DescribedShape(name, descriptors, **facts)], replace=replace)
+
+
+def spoil(folder, query):
+    """Change the database of an index behind the back of its checksums."""
+    with closing(sqlite3.connect(folder / "index.sqlite")) as database, database:
+        database.execute(query)
+
+
+SPOIL_ROWS = "UPDATE descriptor SET rows = zeroblob(length(rows)) WHERE id = 1"
 
 
 def mesh_of(number):

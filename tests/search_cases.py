@@ -41,8 +41,8 @@ class Source:
     def n_shapes(self):
         return len(self.codes)
 
-    def rows(self, place):
-        return pack_codes(self.codes[place].reshape(-1, WIDTH))
+    def rows_of(self, places, *, checked=False):
+        return [pack_codes(self.codes[place].reshape(-1, WIDTH)) for place in places]
 
     def beside(self, name):
         return self.folder / name

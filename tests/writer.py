@@ -6,11 +6,11 @@ import signal
 import sys
 from pathlib import Path
 
-from describers import descriptor
+from describers import descriptor, keep
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.store import files
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.store import database
 from eigenshape.retrieval.store.writing import DescribedShape
 
 
@@ -19,7 +19,7 @@ def add_shapes(folder, done):
     start = len(index)
     done.send(start - 1)
     for number in itertools.count(start):
-        index.add_descriptors(f"shape-{number:05}", [descriptor(number)], digest=str(number))
+        keep(index, f"shape-{number:05}", [descriptor(number)], digest=str(number))
         done.send(number)
 
 
@@ -28,7 +28,7 @@ def replace_a_shape(folder, done):
     start = int(index.records()[0].digest)
     done.send(start)
     for number in itertools.count(start + 1):
-        index.add_descriptors("one", [descriptor(number)], digest=str(number), replace=True)
+        keep(index, "one", [descriptor(number)], digest=str(number), replace=True)
         done.send(number)
 
 
@@ -43,14 +43,14 @@ def open_and_add(folder, done):
     done.send("ready")
     name = done.recv()
     try:
-        ShapeIndex.open_or_create(folder).add_descriptors(name, [descriptor(1)])
+        keep(ShapeIndex.open_or_create(folder), name, [descriptor(1)])
     except StoreError as err:
         done.send(str(err))
     else:
         done.send("added")
 
 
-STORE = str(Path(files.__file__).parent)
+STORE = str(Path(database.__file__).parent)
 N_STEPS = 12  # that a process takes unless it dies before
 N_KINDS = 4  # of steps: add two, remove one, merge, compact
 
@@ -75,7 +75,7 @@ def change_in_all_ways(folder, start, line, done):
     for number in range(start, start + N_STEPS):
         if number % N_KINDS == 2:
             parts[number] = ShapeIndex.create(None)
-            parts[number].add_descriptors("merged", [descriptor(number)], digest=str(number))
+            keep(parts[number], "merged", [descriptor(number)], digest=str(number))
     done.send(start - 1)
     if line is not None:
         die_at(line)

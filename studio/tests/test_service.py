@@ -21,7 +21,7 @@ from browser import drop_file, find, open_page, start_browser, wait_until
 from test_server import GOOD, HOSTILE, Server, ply_of
 
 import eigenshape as es
-from eigenshape.retrieval.store import files as store
+from eigenshape.retrieval.store import database as store
 from eigenshape_studio.service.openapi import openapi
 from eigenshape_studio.service.server import serve
 from eigenshape_studio.service.shelf import ShelfReader
@@ -131,7 +131,7 @@ def make_index(folder):
         index.add(f"zoo/{kind}", mesh, label=label, source=str(path), n_views=0, **facts)
     described = index.descriptors("zoo/bird", index.default_recipe())
     for name in NAMES:
-        index.add_descriptors(name, described, label=MARKUP)
+        index.add_many([es.retrieval.DescribedShape(name, described, label=MARKUP)])
     return index
 
 

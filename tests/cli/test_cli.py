@@ -8,13 +8,14 @@ import time
 
 import numpy as np
 import pytest
+from describers import keep
 from running import run, run_json
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.retrieval.heat.features import find_heat_features
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import icosphere
@@ -174,7 +175,7 @@ def test_a_stopped_index_goes_on_without_doing_a_shape_twice(tmp_path, how):
     running = subprocess.Popen(
         [*command, "--views", "0", "--method", "scale-free"], stderr=subprocess.PIPE, text=True
     )
-    while running.poll() is None and not (db / "rows-1.bin").exists():
+    while running.poll() is None and not (db / "changes.txt").exists():
         time.sleep(0.01)
     running.send_signal(getattr(signal, how))
     told = running.communicate()[1]
@@ -291,7 +292,7 @@ def test_a_match_without_its_file_leaves_its_place_empty(zoo, tmp_path):
         "changed": str(changed),
         "there": str(path),
     }.items():
-        index.add_descriptors(name, [descriptor], source=source)
+        keep(index, name, [descriptor], source=source)
     done = run("query", index.folder, path, "--picture", tmp_path / "sheet.png")
     for said in (
         "not drawn: loose: A match is drawn from its mesh file; it was added to the index without one",

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from describers import keep
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -102,7 +103,7 @@ def test_an_index(zoo, tmp_path):
     descriptor = es.retrieval.find_heat_features(
         es.make_creature("fish", 0, n_vertices=500)
     ).descriptor
-    foreign.add_descriptors(EVIL, [descriptor], label=EVIL, source=EVIL)
+    keep(foreign, EVIL, [descriptor], label=EVIL, source=EVIL)
     done = run("query", foreign.folder, zoo / f"{EVIL}0.ply", "--picture", sheet)
     assert done.stdout.count(SPELLED) == 2
     assert f"not drawn: {SPELLED}" in done.stderr
@@ -130,7 +131,7 @@ def test_shapes_of_any_name(tmp_path, monkeypatch):
     fish = es.make_creature("fish", 0, n_vertices=500)
     descriptor = es.retrieval.find_heat_features(fish).descriptor
     for name in NAMES:
-        index.add_descriptors(name, [descriptor], label=name, source=name)
+        keep(index, name, [descriptor], label=name, source=name)
     shown = run("index", "ls", "index").stdout
     assert SPELLED in shown
     assert r" spaces  and\ttabs " in shown

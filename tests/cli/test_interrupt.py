@@ -9,7 +9,7 @@ import time
 import pytest
 
 from eigenshape.io.mesh_files import write_mesh
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import icosphere
 
@@ -109,7 +109,7 @@ def test_while_loops_are_compiled(ball, tmp_path, n_files):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("sign", ["index.sqlite", "rows-1.bin"])
+@pytest.mark.parametrize("sign", ["index.sqlite", "changes.txt"])
 def test_while_workers_start_and_work(herd, tmp_path, sign):
     """The first sign comes before the workers' own imports, the second with the first shape."""
     db = tmp_path / "db"

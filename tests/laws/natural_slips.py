@@ -19,6 +19,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import scipy.sparse as sp
+from describers import keep
 from matplotlib.figure import Figure
 from public_names import public_things
 from typing_extensions import TypeAliasType
@@ -96,7 +97,7 @@ def patched() -> es.retrieval.PatchDescriptor:
 @cache
 def shelf() -> es.ShapeIndex:
     index = es.ShapeIndex.create(FOLDER / "index")
-    index.add_descriptors("body", [described().descriptor])
+    keep(index, "body", [described().descriptor])
     return index
 
 
@@ -258,7 +259,6 @@ NAMED: dict[str, Callable[[], Any]] = {
     "functional_map.pairs": lambda: np.column_stack([np.arange(160)] * 2),
     "heat_kernel.x": lambda: [0, 1],
     "heat_kernel.y": lambda: 2,
-    "index_folder.folder": folder_of_meshes,
     "indices": lambda: [1, 2],
     "items": list,
     "k": lambda: 5,
@@ -272,7 +272,6 @@ NAMED: dict[str, Callable[[], Any]] = {
     "make_creature.kind": lambda: "fish",
     "map_from_points.points": lambda: np.arange(body().n_vertices),
     "mask": lambda: es.deformation.region_mask(body(), HEAD),
-    "merge_matches.answers": lambda: [shelf().query(described().descriptor)],
     "move_skeleton.response": lambda: es.deformation.skeleton_response(binding()),
     "n": lambda: 50,
     "n_across": lambda: 8,
@@ -303,7 +302,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "ShapeIndex.add.n_views": lambda: 0,
     "ShapeIndex.merge.others": lambda: [es.ShapeIndex.create(None)],
     "ShapeIndex.add.replace": lambda: True,
-    "ShapeIndex.add_descriptors.replace": lambda: True,
+    "ShapeIndex.add_many.replace": lambda: True,
     "segment.n_regions": lambda: 3,
     "signed_distance.points": lambda: bent().vertices,
     "solve_harmonic.values": lambda: np.arange(4.0),

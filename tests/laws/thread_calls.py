@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from describers import keep
 from qdrant_client import QdrantClient
 from registered_operators import builders
 from search_cases import RECIPE, make_source, mixtures
@@ -116,8 +117,8 @@ class Shared:
         for number, (by_heat, by_patches) in enumerate(
             zip(self.by_heat, self.by_patches, strict=True)
         ):
-            self.index.add_descriptors(f"shape {number}", [by_heat])
-            self.index.add_descriptors(f"by patches {number}", [by_patches])
+            keep(self.index, f"shape {number}", [by_heat])
+            keep(self.index, f"by patches {number}", [by_patches])
 
         self.reader = self.index.reader()
         self.coarse = coarse_rows(make_source(self.folder, 400), RECIPE)
@@ -215,9 +216,9 @@ def session_of(v: Shared) -> tuple[object, ...]:
 def index_of(v: Shared) -> tuple[object, ...]:
     """Write an index of this call alone: one writer at a time is what an index allows."""
     index = es.ShapeIndex.create(v.folder / secrets.token_hex(8))
-    index.add_descriptors("one", [v.by_heat[0]])
+    keep(index, "one", [v.by_heat[0]])
     index.keep_recipe(v.recipe)
-    index.add_descriptors("two", [v.by_heat[1]])
+    keep(index, "two", [v.by_heat[1]])
     index.add("three", v.ball, n_views=0)
     index.remove("one")
     fish = es.retrieval.DescribedShape("four", [v.by_heat[1]], tags=["t"])
@@ -569,9 +570,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "mean_side_length": lambda v: es.geometry.mean_side_length(v.many),
     "measure_closeness": lambda v: es.stability.measure_closeness(v.change),
     "measure_distortion": lambda v: es.deformation.measure_distortion(v.animal, v.pose),
-    "merge_matches": lambda v: es.retrieval.merge_matches(
-        [v.index.query(v.by_heat[0], n_matches=3)], n_matches=2
-    ),
     "merge_targets": lambda v: es.features.merge_targets(v.tree),
     "merge_tree": lambda v: es.merge_tree(v.animal, v.heat[:, 0]),
     "mesh_laplacian": lambda v: [
@@ -788,7 +786,6 @@ for _name, _entry in builders().items():
 LEFT_OUT = {
     "cache_operator_bundles": "It starts processes, which take seconds to import.",
     "build_index": "It starts processes, which take seconds to import; it writes to an index, which admits one writer.",
-    "index_folder": "It starts processes, which take seconds to import.",
     "set_threads": "It sets one number for all threads; test_thread_count.py calls it.",
     "train_codebook_from_files": "It starts processes, which take seconds to import.",
     "view": "It shows a widget of the studio, which is a package of its own.",

@@ -113,7 +113,7 @@ def query(
     answers, failed = [], []
     with shelf.reader() as reader:
         # Before scans are described, which takes seconds
-        steps.require_attributes(reader.state.shapes, filters)
+        steps.choose_shapes(reader.state, filters)
         n_shown = max(n_matches, N_VOTES) if classify else n_matches
         options = {"n_matches": n_shown, "where": filters, "exact": exact}
         if is_file or is_folder:
@@ -167,20 +167,20 @@ def _ask_stored(
     reader: es.retrieval.IndexReader, name: str, recipe: Any, options: dict[str, Any]
 ) -> _Answer:
     """Search for the other shapes that are like one of the index, in the same state of the index."""
-    shape = reader.state.names.get(name)
-    if shape is None:
+    state = reader.state
+    facts = state.find(name)
+    if facts is None:
         raise InvalidParameterError(
             f"A query is a mesh file, a folder or the name of a shape of the index; {name} is none "
             "of them. `eigenshape index ls` lists the names."
         )
-    snapshot = reader.snapshot(recipe)
-    (places,) = (snapshot.shape_of == shape).nonzero()
-    if not len(places):
+    stored = [each for each in state.stored(state.descriptor_ids(facts)) if each.recipe == recipe]
+    if not stored:
         raise StoreError(
             f"A shape must be described by the method of a query; {name} is not described by "
             f"{recipe.name}. Choose another --method."
         )
-    descriptor = snapshot.descriptor(int(places[0]))
+    descriptor = stored[0].restored()
     began = perf_counter()
     matches = reader.query(descriptor, without=name, **options)
     return _Answer(name, descriptor, matches, {"describe": 0.0, "query": perf_counter() - began})

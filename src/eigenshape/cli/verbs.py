@@ -28,7 +28,7 @@ VERBS = (
     "stability", "index", "query", "fuse", "compress", "decompress", "studio", "serve", "report", "warm-up", "demo",
 )  # fmt: skip
 INDEX_VERBS = (
-    "add", "ls", "rm", "stats", "verify", "compact", "export", "merge", "duplicates", "learn",
+    "add", "ls", "rm", "stats", "verify", "compact", "export", "merge", "convert", "duplicates", "learn",
 )  # fmt: skip
 MARKUP: Any = "markdown"  # leaves plain brackets alone, which rich markup would take for its own
 

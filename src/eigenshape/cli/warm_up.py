@@ -56,7 +56,8 @@ def _steps() -> dict[str, Callable[[], object]]:
         with TemporaryDirectory() as folder:
             es.write_mesh(mesh, Path(folder) / "biped.ply")
             # In a process, whose arrays make signatures of their own
-            es.io.index_folder(folder, index, workers=es.retrieval.Workers(1))
+            items, workers = es.io.find_items(folder), es.retrieval.Workers(1)
+            es.retrieval.build_index(index, items, es.io.read_surface, workers=workers)
 
     def search() -> None:
         for match in index.query(scan):

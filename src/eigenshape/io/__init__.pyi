@@ -10,7 +10,6 @@ from .edits import write_edits as write_edits
 from .fields import read_fields as read_fields
 from .fields import write_fields as write_fields
 from .folders import find_items as find_items
-from .folders import index_folder as index_folder
 from .formats.registry import MESH_FORMATS as MESH_FORMATS
 from .formats.registry import SHAPE_FORMATS as SHAPE_FORMATS
 from .labeled_shapes import read_label_names as read_label_names

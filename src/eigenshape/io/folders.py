@@ -1,4 +1,4 @@
-"""Find the shapes of folders, with what is known of them, and index them."""
+"""Find the shapes of folders, with what is known of them."""
 
 import csv
 import os
@@ -14,12 +14,9 @@ from typing import Any
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._typing import Integer
-from eigenshape._workers import Item, Workers
+from eigenshape._workers import Item
 from eigenshape.io.formats.registry import POINT_FORMATS, SHAPE_FORMATS
-from eigenshape.io.surfaces import read_surface
-from eigenshape.retrieval.store.batch import Callback, build_index
 from eigenshape.retrieval.store.damage import StoreWarning
-from eigenshape.retrieval.store.index import ShapeIndex
 
 NAME, LABEL, TAGS = "name", "label", "tags"  # columns of a table of labels; others are attributes
 
@@ -72,7 +69,7 @@ def find_items(
 
     See Also
     --------
-    index_folder, eigenshape.retrieval.build_index
+    eigenshape.retrieval.build_index : Describe them, and add them to an index.
 
     Examples
     --------
@@ -96,84 +93,6 @@ def find_items(
     if labels is not None:
         items = _labeled(items, Path(labels))
     return items if part is None else _part_of(items, *part)
-
-
-def index_folder(  # noqa: PLR0913 - one keyword for each choice of a batch
-    folder: str | Path,
-    index: ShapeIndex | None = None,
-    *,
-    labels: str | Path | None = None,
-    repairs: Sequence[str] = ("auto",),
-    n_views: Integer | None = None,
-    workers: Workers = Workers(),
-    callback: Callback | None = None,
-) -> ShapeIndex:
-    """Describe all shapes of a folder, and return an index of them.
-
-    Point clouds and frames of depth cameras become surfaces, as by `read_surface`.
-
-    Parameters
-    ----------
-    folder : path
-    index : ShapeIndex, optional
-        To which shapes are added. By default a new one in memory.
-    labels : path, optional
-        Table of names, labels, tags and attributes, as of `find_items`.
-    repairs : sequence of str
-        Of `eigenshape.repair`, applied to each mesh before it is described.
-    n_views, workers, callback : optional
-        As of `build_index`.
-
-    Returns
-    -------
-    ShapeIndex
-        That was given, or the new one.
-
-    Warns
-    -----
-    StoreWarning
-        If files could not be described: it names them, with the reasons.
-
-    Raises
-    ------
-    InvalidParameterError, FileFormatError, StoreError, EigenshapeError
-        As `find_items` and `build_index`.
-
-    See Also
-    --------
-    find_items, eigenshape.retrieval.build_index, eigenshape.ShapeIndex.query
-
-    Examples
-    --------
-    >>> import pathlib, tempfile
-    >>> import eigenshape as es
-    >>> folder = pathlib.Path(tempfile.mkdtemp())
-    >>> for kind in ("fish", "bird"):
-    ...     es.write_mesh(es.make_creature(kind, n_vertices=500), folder / f"{kind}.ply")
-    >>> if __name__ == "__main__":  # a script needs this, since workers import it
-    ...     index = es.io.index_folder(folder, n_views=0)
-    ...     print(index.query(es.make_creature("fish", 1, n_vertices=500))[0].name)
-    fish
-    """
-    index = ShapeIndex.create(None) if index is None else index
-    report = build_index(
-        index,
-        find_items(folder, labels=labels),
-        read_surface,
-        learn=True,
-        repairs=repairs,
-        n_views=n_views,
-        workers=workers,
-        callback=callback,
-    )
-    if report.failed:
-        reasons = "; ".join(f"{name}: {reason}" for name, reason in report.failed)
-        warnings.warn(
-            f"{len(report.failed)} files could not be indexed. {reasons}",
-            StoreWarning,
-            stacklevel=2,
-        )
-    return index
 
 
 def _items_of(source: Path) -> Iterator[Item]:

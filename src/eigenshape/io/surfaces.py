@@ -52,7 +52,7 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
     See Also
     --------
     read_mesh : Read a mesh, and nothing else.
-    index_folder : Index such files.
+    eigenshape.retrieval.build_index : Index such files.
 
     Examples
     --------

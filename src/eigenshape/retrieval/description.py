@@ -1,9 +1,13 @@
-"""Describe a mesh by any recipe."""
+"""Describe a mesh by any recipe, to search an index or to be kept in one."""
+
+from typing import SupportsIndex
 
 from eigenshape._arguments import require_type
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.scans.partial import view_number
 
 
 def describe(mesh: MeshLike, recipe: AnyRecipe | None = None) -> Descriptor:
@@ -50,3 +54,13 @@ def describe(mesh: MeshLike, recipe: AnyRecipe | None = None) -> Descriptor:
         recipe = PatchRecipe()
     descriptor: Descriptor = kind_of(recipe).describe_query(mesh, recipe)
     return descriptor
+
+
+def describe_to_store(
+    mesh: TriangleMesh, recipe: AnyRecipe, n_views: SupportsIndex | None = None
+) -> list[Descriptor]:
+    """Describe a mesh as an index keeps it: the whole, and what viewpoints see if it is closed."""
+    kind = kind_of(recipe)
+    count = kind.n_views if n_views is None else view_number(n_views, "n_views")
+    descriptors: list[Descriptor] = kind.describe_to_store(mesh, recipe, count)
+    return descriptors

@@ -4,13 +4,14 @@ from functools import partial
 
 import numpy as np
 import pytest
+from describers import keep
 
 import eigenshape as es
+from eigenshape.retrieval.building import batch
+from eigenshape.retrieval.description import describe_to_store
 from eigenshape.retrieval.kinds import recipe_from_text, recipe_to_text
 from eigenshape.retrieval.patches.codebook import CLIP, encode_patches, round_codes
 from eigenshape.retrieval.patches.patches import surface_patches
-from eigenshape.retrieval.store import batch
-from eigenshape.retrieval.store.writing import describe_to_store
 
 KINDS = ("quadruped", "hand", "octopus", "biped")
 
@@ -124,7 +125,7 @@ def test_an_index_keeps_heat_and_patches_side_by_side(tmp_path, recipe, meshes):
     assert (index.recipes(), len(index)) == ([recipe], 0)
     for kind in KINDS[:2]:
         shapes = [es.describe(meshes[kind], one) for one in (recipe, es.retrieval.SCALE_FREE)]
-        index.add_descriptors(kind, shapes)
+        keep(index, kind, shapes)
     assert index.recipes() == [recipe, es.retrieval.SCALE_FREE]
     for one in index.recipes():
         assert index.query(es.describe(meshes["hand"], one))[0].name == "hand"

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from describers import keep
 from search_cases import RECIPE, mixtures
 
 import eigenshape as es
@@ -56,7 +57,7 @@ def test_an_index_scores_as_descriptors_do_in_any_order(codes, points):
     for order in (range(len(shapes)), reversed(range(len(shapes)))):
         index = es.ShapeIndex.create(None)
         for number in order:
-            index.add_descriptors(str(number), [shapes[number]])
+            keep(index, str(number), [shapes[number]])
         found = {each.name: each.score for each in index.query(shapes[0], n_matches=len(shapes))}
         assert [found[str(number)] for number in range(len(shapes))] == expected.tolist()
 

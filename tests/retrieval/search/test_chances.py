@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from describers import keep
 
 import eigenshape as es
 from eigenshape.retrieval.search.chances import (
@@ -49,7 +50,7 @@ def test_classes_share_one_with_those_that_were_not_found():
 def test_classes_are_not_known_for_heat():
     index = es.ShapeIndex.create(None)
     heat = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
-    index.add_descriptors("fish", [heat], label="fish")
+    keep(index, "fish", [heat], label="fish")
     with pytest.raises(
         es.InvalidParameterError, match="known for patches; 'fish' was found by heat"
     ):

@@ -1,20 +1,16 @@
 """A writer that is killed, or whose disk is full, leaves the state before its change or after it."""
 
 import ctypes
-import multiprocessing
 import os
 import shutil
 import signal
 import subprocess
 import sys
-import time
-from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
-import writer
-from describers import descriptor
+import store_trials
+from describers import descriptor, keep
 
 import eigenshape as es
 from eigenshape.retrieval import DescribedShape
@@ -22,85 +18,12 @@ from eigenshape.retrieval import DescribedShape
 pytestmark = pytest.mark.long
 
 kills = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="kill -9 is a Unix thing")
-N_LINES = 5000  # of the store that the four kinds of steps run through, about
-
-
-def killed(folder, start, line, seconds):
-    """Run steps in a process that dies, at a line or after a time; return the last step that it called done."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["eigenshape.retrieval.store.index"])
-    ours, theirs = context.Pipe()
-    process = context.Process(target=writer.change_in_all_ways, args=(folder, start, line, theirs))
-    process.start()
-    theirs.close()
-    step = ours.recv()
-    if line is None:
-        time.sleep(seconds)
-        process.kill()
-    with suppress(EOFError, OSError):  # the last message may be cut short
-        while True:
-            step = ours.recv()
-    process.join()
-    ours.close()
-    return step
-
-
-def check_state(folder, step):
-    """Check that an index is as after a step or the one under way; return which."""
-    index = es.ShapeIndex.open(folder)
-    records = [record.name for record in index.records()]
-    now = next(
-        (number for number in (step, step + 1) if records == sorted(writer.names_after(number))),
-        None,
-    )
-    assert now is not None, f"after step {step} the index holds {records}"
-    expected = writer.names_after(now)
-    if records and "merged" in expected:
-        found = {
-            index.query(descriptor(writer.names_after(each)["merged"]))[0].score
-            for each in (step, step + 1)
-            if "merged" in writer.names_after(each)
-        }
-        assert 0 in found
-    report = index.verify()
-    assert (report.n_shapes, report.damages) == (len(expected), ())
-    for name, seed in expected.items():
-        if name != "merged":
-            assert index.query(descriptor(seed))[0].score == 0
-    return now
-
-
-def count_kills(tmp_path, lines, seconds):
-    """Kill a writer at each line, and after each time; each goes on where the one before died."""
-    folder = es.ShapeIndex.create(tmp_path / "index").folder
-    step = -1
-    ways = [(line, 0.0) for line in lines] + [(None, each) for each in seconds]
-    for line, each in ways:
-        if step > 200:  # start anew, so that a check stays quick
-            shutil.rmtree(folder)
-            es.ShapeIndex.create(folder)
-            step = -1
-        done = killed(folder, step + 1, line, each)
-        step = check_state(folder, done)
-        # What is not changed by a step cannot tell whether it was done.
-        if step % writer.N_KINDS == 2 and done == step:
-            step = done
-    return len(ways)
 
 
 @kills
-def test_a_killed_writer_leaves_the_state_before_or_after(tmp_path):
-    rng = np.random.default_rng(0)
-    lines = rng.integers(1, N_LINES, size=15).tolist()
-    assert count_kills(tmp_path, lines, rng.uniform(0.0, 0.3, size=15).tolist()) == 30
-
-
-@pytest.mark.long
-@kills
-def test_three_hundred_killed_writers(tmp_path):
-    rng = np.random.default_rng(1)
-    lines = np.linspace(1, N_LINES, 200).astype(int).tolist()
-    assert count_kills(tmp_path, lines, rng.uniform(0.0, 0.5, size=100).tolist()) == 300
+def test_killed_writers_leave_the_state_before_or_after(tmp_path):
+    """`python tests/store_trials.py --kills 1000` kills more."""
+    assert store_trials.try_kills(tmp_path / "index", 20) == 20
 
 
 # Fails each write to a regular file from the n-th on, as a full disk does.
@@ -196,7 +119,7 @@ def main(library, place, first, step):
     sound = es.ShapeIndex.create(place / "sound")
     sound.add_many(DescribedShape(f"s{seed}", [descriptor(seed)]) for seed in range(5))
     part = es.ShapeIndex.create(place / "part")
-    part.add_descriptors("part", [descriptor(77)], digest="part")
+    keep(part, "part", [descriptor(77)], digest="part")
     n_failed = 0
     for number in range(first, 200, step):
         index = es.ShapeIndex(Path(shutil.copytree(sound.folder, place / f"index {number}")))

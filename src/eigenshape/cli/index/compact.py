@@ -11,8 +11,8 @@ from eigenshape.cli.console import out, print_json
 def compact(index: Path, *, as_json: bool = False) -> None:
     """Give back the space of removed and replaced shapes.
 
-    Files are written anew beside the old ones, so the disk must hold both for a moment. Queries go
-    on meanwhile.
+    The last pages of the file move into free ones, so it takes as long as the removal. Queries go on
+    meanwhile.
     """
     n_bytes = es.ShapeIndex.open(index).compact()
     if as_json:

@@ -14,11 +14,10 @@ def merge(
     index: Path,
     others: list[Path],
     *,
-    by_reference: bool = False,
     replace: bool = False,
     as_json: bool = False,
 ) -> None:
-    """Make one index of several, by copying them or by reference.
+    """Make one index of several, by copying them.
 
     What is damaged in the others is left out with a warning. Shapes with different codebooks do not
     compare: build the others with --codebook.
@@ -29,15 +28,12 @@ def merge(
         Folder of the index. It is created if it does not exist.
     others
         Folders of the indexes to add to it.
-    by_reference
-        Leave the numbers in the folders of the other indexes, and refer to them. Do not move or
-        compact those.
     replace
         Let a shape replace one of the same name.
     """
     parts = [es.ShapeIndex.open(other) for other in others]
     shelf = es.ShapeIndex.open_or_create(index)
-    n_added = shelf.merge(parts, copy=not by_reference, replace=replace)
+    n_added = shelf.merge(parts, replace=replace)
     recipe = shelf.default_recipe()
     apart = [record.name for record in shelf.records() if recipe not in record.recipes]
     if as_json:

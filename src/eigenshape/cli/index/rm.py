@@ -19,9 +19,9 @@ def rm(
 ) -> None:
     """Remove shapes from an index.
 
-    Give names, or a filter that chooses shapes. Their numbers stay in the files until `eigenshape
-    index compact`. A shape whose mesh stays in its folder comes back with the next `eigenshape
-    index add`.
+    Give names, or a filter that chooses shapes. Their space serves shapes that are added later, or
+    is given back by `eigenshape index compact`. A shape whose mesh stays in its folder comes back
+    with the next `eigenshape index add`.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
 from .facts import shape_facts as shape_facts
+from .indexing import choose_shapes as choose_shapes
+from .indexing import convert_index as convert_index
 from .indexing import describe_all as describe_all
 from .indexing import find_doubles as find_doubles
 from .indexing import learn_codebook as learn_codebook
@@ -6,7 +8,6 @@ from .indexing import parse_filters as parse_filters
 from .indexing import parse_part as parse_part
 from .indexing import prune as prune
 from .indexing import read_stage as read_stage
-from .indexing import require_attributes as require_attributes
 from .indexing import worker_processes as worker_processes
 from .parts import area_shares as area_shares
 from .parts import count_fragments as count_fragments

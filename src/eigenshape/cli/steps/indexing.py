@@ -12,10 +12,7 @@ from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, err, progress_bar
 from eigenshape.cli.inputs import memory_bytes
 from eigenshape.io.surfaces import read_surface
-from eigenshape.retrieval.kinds import AnyRecipe
-from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
-from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.store.batch import (
+from eigenshape.retrieval.building.batch import (
     BatchReport,
     Callback,
     announce_learning,
@@ -23,14 +20,15 @@ from eigenshape.retrieval.store.batch import (
     read_stage,
     train_codebook_from_files,
 )
-from eigenshape.retrieval.store.filters import (
-    parse_filters,
-    require_attributes,
-)
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.kinds import AnyRecipe
+from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
+from eigenshape.retrieval.store.conversion import convert_index
+from eigenshape.retrieval.store.filters import choose_shapes, parse_filters
 
 # For the verbs, as they are, beside what is defined here
-__all__ = ["parse_filters", "read_stage", "require_attributes"]
+__all__ = ["choose_shapes", "convert_index", "parse_filters", "read_stage"]
 
 RETRIES = 3  # workers of a cluster that a task may lose before it counts as failed
 

@@ -8,10 +8,10 @@ from zipfile import BadZipFile
 from eigenshape._errors import FileFormatError, InvalidParameterError, StoreError
 from eigenshape.cli.console import err
 from eigenshape.retrieval.heat.recipe import PRESETS
+from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import read_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.store.index import ShapeIndex
 
 
 def index_recipe(

@@ -25,7 +25,7 @@ from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
-from eigenshape.retrieval.store.records import Match
+from eigenshape.retrieval.search.matches import Match
 
 CAPTION = "corresponding parts have one color; a lower score is more similar"
 N_CELLS = 12  # of the query by patches

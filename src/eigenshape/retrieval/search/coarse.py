@@ -45,8 +45,8 @@ class Rows(Protocol):
     def row_checksums(self) -> Int[np.ndarray, " n"]:
         """Return a checksum of the rows of each place, which tells whether they have changed."""
 
-    def rows(self, place: int) -> np.ndarray:
-        """Return the packed rows of a place: those of the whole shape first."""
+    def rows_of(self, places: Int[np.ndarray, " k"], *, checked: bool = False) -> list[np.ndarray]:
+        """Return the packed rows of some places: those of the whole shape first."""
 
     def beside(self, name: str) -> Path:
         """Return the path of a file that can be made again from the rows."""
@@ -187,7 +187,7 @@ def _codes(
     """Return the codes of whole shapes."""
     shape = recipe.codebook.code_shape
     count = shape[0] * shape[1]
-    packed = [np.asarray(source.rows(place)[:count]) for place in places.tolist()]
+    packed = [np.asarray(rows[:count]) for rows in source.rows_of(places, checked=True)]
     return unpack_codes(np.concatenate(packed)).reshape(len(places), *shape)
 
 

@@ -45,8 +45,8 @@ def stored_isolations(
     shape: Any = recipe.codebook.code_shape
 
     def whole(number: int) -> np.ndarray:
-        rows = source.rows(int(firsts[number]))[: shape[0] * shape[1]]
-        return unpack_codes(rows).reshape(shape)
+        (rows,) = source.rows_of(firsts[[number]], checked=True)
+        return unpack_codes(rows[: shape[0] * shape[1]]).reshape(shape)
 
     found[missing] = measure_isolations(whole, len(distinct), missing)
     if len(missing) and len(distinct) >= FEWEST_TO_KEEP:

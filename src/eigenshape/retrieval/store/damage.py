@@ -36,8 +36,6 @@ class Damage:
         What differs.
     shape : str or None
         Name of the shape that is concerned, if it is known.
-    start, end : int or None
-        The bytes of the file that differ lie between these places, if they are known.
 
     See Also
     --------
@@ -46,26 +44,22 @@ class Damage:
     Examples
     --------
     >>> import eigenshape as es
-    >>> print(es.retrieval.Damage("rows-1.bin", "its rows differ", "cat", 0, 24))
-    rows-1.bin, bytes 0 to 24, shape 'cat': its rows differ
+    >>> print(es.retrieval.Damage("index.sqlite", "its rows differ", "cat"))
+    index.sqlite, shape 'cat': its rows differ
     """
 
     file: str
     what: str
     shape: str | None = None
-    start: int | None = None
-    end: int | None = None
 
     __repr__ = short_repr
     _repr_html_ = html_repr
 
     def __str__(self) -> str:
-        where = [printable(self.file)]
-        if self.start is not None:
-            where.append(f"bytes {self.start} to {self.end}")
+        place = printable(self.file)
         if self.shape is not None:
-            where.append(f"shape {self.shape!r}")
-        return f"{', '.join(where)}: {self.what}"
+            place += f", shape {self.shape!r}"
+        return f"{place}: {self.what}"
 
 
 def warn_of_damage(place: str, damages: Sequence[Damage]) -> None:

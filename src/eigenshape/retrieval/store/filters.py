@@ -1,16 +1,15 @@
 """Which shapes of an index a filter chooses."""
 
 import csv
-import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Int
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
-from eigenshape.retrieval.store.snapshot import Shapes
+from eigenshape.retrieval.store.state import IndexState, tags_and_attributes
 
 RESERVED = ("label", "tag")  # keys of a filter that are no attributes; their values are texts
 RANGE = ".."  # between the least and the largest number of a filter as text
@@ -74,23 +73,26 @@ def _number_or_text(text: str) -> float | str:
         return text
 
 
-def choose_shapes(shapes: Shapes, where: Mapping[str, Any] | None) -> Bool[np.ndarray, " n"]:
-    """Return which shapes agree with all conditions of a filter.
+def choose_shapes(
+    state: IndexState, where: Mapping[str, Any] | None, *, must_know: bool = True
+) -> Int[np.ndarray, " k"] | None:
+    """Return the numbers of the shapes that agree with all conditions of a filter.
 
     Parameters
     ----------
-    shapes : Shapes
+    state : IndexState
     where : mapping, optional
-        As of `ShapeIndex.query`; without it all are chosen.
+        As of `ShapeIndex.query`; without it all are chosen, and None is returned.
+    must_know : bool
+        Whether an attribute that no shape has is an error: it is often misspelled.
 
     Raises
     ------
     InvalidParameterError
-        If a condition is none.
+        If a condition is none, or about an attribute that no shape has.
     """
-    chosen = np.ones(len(shapes.ids), dtype=bool)
     if where is None:
-        return chosen
+        return None
     require_type(where, Mapping, "where")
     require_each(list(where), str, "where")
     # The key without its sign, whether the condition must be met, and its test
@@ -98,41 +100,35 @@ def choose_shapes(shapes: Shapes, where: Mapping[str, Any] | None) -> Bool[np.nd
         (key.removesuffix(NOT), not key.endswith(NOT), _condition(key.removesuffix(NOT), value))
         for key, value in where.items()
     ]
-    for key, wanted, test in tests:
-        if key == "label" and shapes.labels:  # by the codes alone: no text is read
-            known = np.array([test(each) == wanted for each in shapes.labels], dtype=bool)
-            chosen &= known[shapes.label_codes]
+    keys = {key for key, _, _ in tests}
+    chosen = state.shape_ids
+    if "label" in keys:  # by the labels without duplicates: no row is read
+        labels, codes = state.labels
+        ids = chosen
+        chosen = ids[codes >= 0]
+        for _, wanted, test in (each for each in tests if each[0] == "label"):
+            agrees = np.array([test(label) == wanted for label in labels], dtype=bool)
+            chosen = np.intersect1d(chosen, ids[agrees[codes]] if labels else chosen)
     tests = [each for each in tests if each[0] != "label"]
-    for place in np.flatnonzero(chosen).tolist() if tests else []:
-        row = shapes.row(place)
-        attributes = json.loads(row.attributes)
+    if not tests:
+        return chosen
+    found, known = [], set(RESERVED)
+    for facts in state.every():
+        tags, attributes = tags_and_attributes(facts)
+        known |= attributes.keys()
         for key, wanted, test in tests:
-            if key == "tag":
-                agrees = any(test(tag) for tag in json.loads(row.tags))
-            else:
-                agrees = key in attributes and test(attributes[key])
-            if agrees != wanted:
-                chosen[place] = False
+            values = tags if key == "tag" else [attributes[key]] if key in attributes else []
+            if any(map(test, values)) != wanted:
                 break
-    return chosen
-
-
-def require_attributes(shapes: Shapes, where: Mapping[str, Any] | None) -> None:
-    """Raise an error if a condition is about an attribute of no shape, which is often misspelled."""
-    if where is None:
-        return
-    keys = {key.removesuffix(NOT) for key in where} - set(RESERVED)
-    known: set[str] = set()
-    for place in range(len(shapes.ids)):
-        if keys <= known:  # usually after the first shape
-            return
-        known |= json.loads(shapes.row(place).attributes).keys()
+        else:
+            found.append(facts.id)
     missing = sorted(keys - known)
-    if missing and len(shapes.ids):
+    if missing and must_know and len(state.shape_ids):
         raise InvalidParameterError(
             f"A filter must be about label, tag or an attribute that a shape has; no shape has "
-            f"{missing[0]!r}. The attributes are: {', '.join(sorted(known)) or 'none'}."
+            f"{missing[0]!r}. The attributes are: {', '.join(sorted(known - set(RESERVED))) or 'none'}."
         )
+    return np.intersect1d(chosen, np.array(found, dtype=np.int64))
 
 
 def _condition(key: str, value: Any) -> Callable[[Any], bool]:

@@ -1,21 +1,37 @@
 """Adding shapes to an index: what is checked, and which rows are written."""
 
 import json
+import sqlite3
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, SupportsIndex
+from pathlib import Path
+from typing import Any
+from zlib import crc32
 
 import numpy as np
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._text import html_repr, short_repr
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
-from eigenshape.retrieval.store.change import Change
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of, recipe_to_text
+from eigenshape.retrieval.store.damage import Damage
+from eigenshape.retrieval.store.database import (
+    DATABASE,
+    Facts,
+    checksum,
+    integer_checksums,
+    read_recipes,
+    read_seals,
+)
 from eigenshape.retrieval.store.filters import RESERVED
 from eigenshape.retrieval.store.records import Record
-from eigenshape.scans.partial import view_number
+from eigenshape.retrieval.store.state import (
+    DamagedEntryError,
+    IndexState,
+    StoredDescriptor,
+    StoredShape,
+)
 
 LARGEST_THUMBNAIL = 8192  # bytes, so that a shape takes less than 60 KB
 
@@ -70,16 +86,6 @@ class DescribedShape:
 
     __repr__ = short_repr
     _repr_html_ = html_repr
-
-
-def describe_to_store(
-    mesh: TriangleMesh, recipe: AnyRecipe, n_views: SupportsIndex | None = None
-) -> list[Descriptor]:
-    """Describe a mesh as an index keeps it: the whole, and what viewpoints see if it is closed."""
-    kind = kind_of(recipe)
-    count = kind.n_views if n_views is None else view_number(n_views, "n_views")
-    descriptors: list[Descriptor] = kind.describe_to_store(mesh, recipe, count)
-    return descriptors
 
 
 def require_name(name: str) -> None:
@@ -147,82 +153,207 @@ def rows_of_each(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarra
     return [kind_of(descriptor.recipe).rows(descriptor, name) for descriptor in descriptors]
 
 
-def require_columns(descriptor: Descriptor, rows: np.ndarray, n_columns: int) -> None:
-    """Raise an error if the rows of a descriptor are not as long as those of others by its recipe."""
-    if rows.shape[1] != n_columns:
+def require_columns(recipe: AnyRecipe, n_columns: int, known: int) -> None:
+    """Raise an error if rows by a recipe are longer or shorter than others."""
+    if n_columns != known:
         raise InvalidParameterError(
             f"All features of one recipe must have as many numbers; those of recipe "
-            f"{descriptor.recipe.name!r} have {n_columns}, and these have {rows.shape[1]}."
+            f"{recipe.name!r} have {known}, and these have {n_columns}."
         )
 
 
-def write_shape(change: Change, shape: DescribedShape, *, replace: bool) -> None:
-    """Write a shape in an open change."""
+def described(shape: DescribedShape) -> StoredShape:
+    """Return a shape as it is stored; refuse what cannot be."""
     require_each(shape.descriptors, Descriptor, "descriptors")
     require_name(shape.name)
     require_text(shape.label, shape.source, shape.digest)
     facts = facts_text(shape.tags, shape.attributes)
-    rows = rows_of_each(shape.name, shape.descriptors)
-    number = _keep_shape(change, shape, facts, replace=replace)
-    recipes = list(dict.fromkeys(descriptor.recipe for descriptor in shape.descriptors))
-    for recipe in recipes:
-        recipe_number = change.keep_recipe(recipe)
-        known = change.is_described(number, recipe_number)
-        pairs = zip(shape.descriptors, rows, strict=True)
-        views = [pair for pair in pairs if pair[0].recipe == recipe]
-        for view, (descriptor, each) in enumerate(views):
-            columns = change.keep_columns(recipe_number, each.shape[1])
-            require_columns(descriptor, each, columns)
-            if known:
-                continue
-            details = kind_of(recipe).details(descriptor)
-            at, offset, _, checksum = change.append(f"rows-{recipe_number}", each.tobytes())
-            where = change.append(f"details-{recipe_number}", details)
-            fields = (number, recipe_number, view)
-            change.insert("descriptor", *fields, at, offset, *each.shape, checksum, *where)
-
-
-def update_shape(change: Change, record: Record) -> None:
-    """Write what is known of a shape anew, in an open change."""
-    require_text(record.name, record.label, record.source, record.digest)
-    tags, attributes = facts_text(record.tags, record.attributes)
-    old = change.find_shape(record.name)
-    if old is None:
-        raise StoreError(
-            f"A shape must be in the index to be updated; {record.name!r} is not. Add it first."
+    if shape.thumbnail is not None and len(shape.thumbnail) > LARGEST_THUMBNAIL:
+        raise InvalidParameterError(
+            f"A thumbnail must have at most {LARGEST_THUMBNAIL} bytes; that of {shape.name!r} has "
+            f"{len(shape.thumbnail)}. Use draw_thumbnail."
         )
-    new = old._replace(
-        label=record.label,
-        source=record.source,
-        digest=record.digest,
-        tags=tags,
-        attributes=attributes,
+    views: Counter[AnyRecipe] = Counter()
+    stored = []
+    pairs = zip(shape.descriptors, rows_of_each(shape.name, shape.descriptors), strict=True)
+    for descriptor, rows in pairs:
+        recipe = descriptor.recipe
+        details = kind_of(recipe).details(descriptor)
+        n_rows, n_columns = rows.shape
+        view, data = views[recipe], rows.tobytes()
+        stored.append(StoredDescriptor(recipe, view, n_rows, n_columns, data, details))
+        views[recipe] += 1
+    return StoredShape(
+        shape.name, shape.label, shape.source, shape.digest, *facts, shape.thumbnail, stored
     )
-    if new != old:
-        change.replace("shape", new)
 
 
-def _keep_shape(
-    change: Change, shape: DescribedShape, facts: tuple[str, str], *, replace: bool
-) -> int:
-    """Return the number of a shape, which is added unless the index has the same."""
-    name, digest = shape.name, shape.digest
-    old = change.find_whole_shape(name, digest)
-    if old is not None and old.digest is not None and old.digest == digest:
-        return old.id
-    if old is not None and not replace:
-        raise StoreError(
-            f"A name stands for one shape; {name!r} is in the index with digest {old.digest}, "
-            f"not {digest}. Remove it first, or add it with replace=True."
-        )
-    if old is not None:
-        change.delete_shape(old)
-    picture = (0, 0, 0, 0)
-    if shape.thumbnail is not None:
-        if len(shape.thumbnail) > LARGEST_THUMBNAIL:
-            raise InvalidParameterError(
-                f"A thumbnail must have at most {LARGEST_THUMBNAIL} bytes; that of {name!r} has "
-                f"{len(shape.thumbnail)}. Use draw_thumbnail."
+class Writer:
+    """Writes shapes in an open transaction. What it costs does not grow with the index.
+
+    Parameters
+    ----------
+    folder : Path
+    database : Connection
+        In a transaction of `writing`.
+
+    Raises
+    ------
+    StoreError
+        If a recipe of the index is damaged.
+    """
+
+    def __init__(self, folder: Path, database: sqlite3.Connection) -> None:
+        damages: list[Damage] = []
+        seals = read_seals(str(folder / DATABASE), database)
+        recipes = read_recipes(str(folder / DATABASE), database, damages)
+        if damages:
+            raise StoreError(
+                f"An index must be whole to be changed; {folder}: {damages[0]}. Merge it into a "
+                "new index to keep what is whole."
             )
-        picture = change.append("thumbnails", shape.thumbnail)
-    return change.insert("shape", name, shape.label, shape.source, digest, *facts, *picture)
+        # As a state that sees what this transaction has changed
+        self.state = IndexState(folder, database, seals, recipes, damages)
+        self.database = database
+        self._n_columns = dict(database.execute("SELECT id, n_columns FROM recipe"))
+
+    def add(self, shape: StoredShape, *, replace: bool) -> bool:
+        """Write a shape; return whether it is new.
+
+        One of the same name and digest gains the recipes that it lacks. It is written anew if it is
+        damaged: what has the same digest is the same.
+
+        Raises
+        ------
+        StoreError
+            If the name is in the index with another digest and `replace` is False.
+        InvalidParameterError
+            If rows are longer or shorter than those of others by the same recipe.
+        """
+        old = self.find(shape.name)
+        same = old is not None and old.digest is not None and old.digest == shape.digest
+        if old is not None and not same and not replace:
+            raise StoreError(
+                f"A name stands for one shape; {shape.name!r} is in the index with digest "
+                f"{old.digest}, not {shape.digest}. Remove it first, or add it with replace=True "
+                "(--replace)."
+            )
+        if old is not None and not (same and self._is_whole(old)):
+            self.delete(old)
+            old = None
+        known = set()
+        if old is None:
+            number = self._insert_shape(shape)
+        else:
+            number = old.id
+            query = "SELECT DISTINCT recipe FROM descriptor WHERE shape = ?"
+            known = {self.state.recipes[row[0]] for row in self.database.execute(query, (number,))}
+        new = [each for each in shape.descriptors if each.recipe not in known]
+        for each in new:
+            self._insert_descriptor(number, each)
+        if old is not None and new:
+            self._update(old._replace(n_descriptors=old.n_descriptors + len(new)))
+        return not same
+
+    def find(self, name: str) -> Facts | None:
+        """Return the shape of a name, or None if there is none."""
+        found = self.database.execute("SELECT id FROM shape WHERE name = ?", (name,)).fetchone()
+        if found is None:
+            return None
+        query = f"SELECT {', '.join(Facts._fields)} FROM shape WHERE id = ?"
+        row = self.database.execute(query, found).fetchone()
+        if row is None or row[1] != name:  # a flipped bit in the list of names
+            raise StoreError(
+                f"The list of names must lead from {name!r} to its shape; it leads to "
+                f"{row and row[1]!r}. {self.state.folder / DATABASE} is damaged: merge the index "
+                "into a new one to keep what is whole."
+            )
+        return Facts(*row)
+
+    def _is_whole(self, facts: Facts) -> bool:
+        """Return whether a shape, its numbers and its picture agree with their checksums."""
+        try:
+            self.state.facts([facts.id])
+            self.state.shape(facts)
+        except DamagedEntryError:
+            return False
+        return True
+
+    def delete(self, facts: Facts) -> None:
+        """Delete a shape, its descriptors and its picture."""
+        self.database.execute("DELETE FROM descriptor WHERE shape = ?", (facts.id,))
+        for table in ("picture", "shape"):
+            self.database.execute(f"DELETE FROM {table} WHERE id = ?", (facts.id,))
+
+    def update(self, record: Record) -> None:
+        """Write what is known of a shape anew."""
+        require_text(record.name, record.label, record.source, record.digest)
+        tags, attributes = facts_text(record.tags, record.attributes)
+        old = self.find(record.name)
+        if old is None:
+            raise StoreError(
+                f"A shape must be in the index to be updated; {record.name!r} is not. Add it first."
+            )
+        new = old._replace(
+            label=record.label,
+            source=record.source,
+            digest=record.digest,
+            tags=tags,
+            attributes=attributes,
+        )
+        if new != old:
+            self._update(new)
+
+    def _update(self, facts: Facts) -> None:
+        fields = ", ".join(f"{name} = ?" for name in Facts._fields[1:])
+        query = f"UPDATE shape SET {fields}, checksum = ? WHERE id = ?"
+        self.database.execute(query, (*facts[1:], checksum(*facts), facts.id))
+
+    def _insert_shape(self, shape: StoredShape) -> int:
+        number = self._next("shape")
+        n_pictures = int(shape.picture is not None)
+        facts = Facts(number, *shape[:6], len(shape.descriptors), n_pictures)
+        self._insert("shape", *facts, checksum(*facts))
+        if shape.picture is not None:
+            self._insert("picture", number, shape.picture, checksum(number, shape.picture))
+        return number
+
+    def _insert_descriptor(self, shape: int, each: StoredDescriptor) -> None:
+        recipe = self.keep_recipe(each.recipe, each.n_columns)
+        number = self._next("descriptor")
+        sizes = (each.view, each.n_rows, each.n_columns)
+        integers = (number, shape, recipe, *sizes, crc32(each.rows), crc32(each.details))
+        row = integer_checksums(np.array([integers], dtype=np.int64))
+        self._insert("descriptor", *integers, int(row[0]), each.rows, each.details)
+
+    def _insert(self, table: str, *values: Any) -> None:
+        marks = ", ".join("?" * len(values))
+        self.database.execute(f"INSERT INTO {table} VALUES ({marks})", values)
+
+    def _next(self, table: str) -> int:
+        """Return a number that no row of a table has had."""
+        query = "SELECT seq FROM sqlite_sequence WHERE name = ?"
+        row = self.database.execute(query, (table,)).fetchone()
+        return 1 + (row[0] if row else 0)
+
+    def keep_recipe(self, recipe: AnyRecipe, n_columns: int = 0) -> int:
+        """Return the number of a recipe, which is stored if it is new.
+
+        A field that a stored recipe lacks, since it was introduced later, has its default. Rows by
+        one recipe have as many numbers as those of the first shape.
+        """
+        numbers = [number for number, other in self.state.recipes.items() if other == recipe]
+        number = numbers[0] if numbers else len(self._n_columns) + 1
+        known = self._n_columns.get(number)
+        if known and n_columns:
+            require_columns(recipe, n_columns, known)
+        if known or known == n_columns:
+            return number
+        fields, codebook = recipe_to_text(recipe)
+        row = (number, fields, n_columns, codebook or b"")
+        if known is not None:
+            self.database.execute("DELETE FROM recipe WHERE id = ?", (number,))
+        self._insert("recipe", *row, checksum(*row))
+        self.state.recipes[number] = recipe
+        self._n_columns[number] = n_columns
+        return number

@@ -1,6 +1,5 @@
 """The index of a service: what it answers is read here, and nowhere else."""
 
-import json
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +11,8 @@ import numpy as np
 from jaxtyping import Int
 
 import eigenshape as es
-from eigenshape.retrieval.store.filters import choose_shapes, require_attributes
+from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.state import tags_and_attributes
 
 REFRESH_SECONDS = 1.0  # between looks for shapes that other processes have added or removed
 
@@ -100,7 +100,6 @@ class ShelfReader:
         self._lock = threading.Lock()
         self._writing = threading.Lock()
         self._due = monotonic() + REFRESH_SECONDS
-        self._list_names()
 
     def __len__(self) -> int:
         return len(self._reader)
@@ -110,15 +109,11 @@ class ShelfReader:
         """Return the recipe by which queries are described."""
         return self._reader.default_recipe()
 
-    def _list_names(self) -> None:
-        self._names: list[str] = sorted(self._reader.state.names)
-
     def refresh(self, *, now: bool = False) -> None:
         """See what other processes have added or removed; the index is looked at once a second."""
         with self._lock:
             if now or monotonic() >= self._due:
-                if self._reader.refresh():
-                    self._list_names()
+                self._reader.refresh()
                 self._due = monotonic() + REFRESH_SECONDS
 
     def add(self, shape: es.retrieval.DescribedShape, *, replace: bool) -> None:
@@ -135,7 +130,7 @@ class ShelfReader:
 
     def require_attributes(self, where: Mapping[str, Any] | None) -> None:
         """Refuse conditions about an attribute that no shape has."""
-        require_attributes(self._reader.state.shapes, where)
+        choose_shapes(self._reader.state, where)
 
     def query(
         self,
@@ -174,27 +169,25 @@ class ShelfReader:
         self, offset: int, limit: int, where: Mapping[str, Any] | None = None
     ) -> tuple[int, Sequence[Shape]]:
         """Return how many shapes meet some conditions, and a few of them, sorted by name."""
-        state, names = self._reader.state, self._names
-        if where is not None:
-            chosen = choose_shapes(state.shapes, where)
-            require_attributes(state.shapes, where)
-            names = sorted(name for name, place in state.names.items() if chosen[place])
+        state = self._reader.state
+        chosen = choose_shapes(state, where)
+        names = state.names
+        if chosen is not None:
+            names = sorted(facts.name for facts in state.facts(chosen).values())
         found = map(self.shape, names[offset : offset + limit])
         return len(names), [shape for shape in found if shape is not None]
 
     def shape(self, name: str) -> Shape | None:
         """Return a shape by its name."""
         state = self._reader.state
-        place = state.names.get(name)
-        if place is None:
+        facts = state.find(name)
+        if facts is None:
             return None
-        row = state.shapes.row(place)
-        tags, attributes = tuple(json.loads(row.tags)), json.loads(row.attributes)
-        has_thumbnail = bool(row.thumbnail_size)
-        return Shape(row.name, row.label, row.source, tags, attributes, has_thumbnail)
+        told = (facts.name, facts.label, facts.source, *tags_and_attributes(facts))
+        return Shape(*told, bool(facts.n_pictures))
 
     def thumbnail(self, name: str) -> bytes | None:
         """Return the picture that the index holds of a shape, PNG or WebP; None if it holds none."""
         state = self._reader.state
-        place = state.names.get(name)
-        return None if place is None else state.thumbnail(place)
+        facts = state.find(name)
+        return None if facts is None else state.picture(facts)

@@ -1,6 +1,5 @@
 """A collection of described shapes in a folder, searched for those that are most alike."""
 
-import json
 import tempfile
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,16 +13,15 @@ from eigenshape._errors import StoreError
 from eigenshape._files import as_path
 from eigenshape._text import html_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.retrieval.description import describe_to_store
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
-from eigenshape.retrieval.store import files as store
-from eigenshape.retrieval.store.catalog import DATABASE, read_seals
+from eigenshape.retrieval.search.matches import Matches
+from eigenshape.retrieval.search.reader import EngineMaker, IndexReader, choose_recipe
 from eigenshape.retrieval.store.damage import warn_of_damage
-from eigenshape.retrieval.store.filters import choose_shapes, require_attributes
-from eigenshape.retrieval.store.kept_tables import open_state
-from eigenshape.retrieval.store.reader import EngineMaker, IndexReader, choose_recipe
-from eigenshape.retrieval.store.records import Matches, Record
-from eigenshape.retrieval.store.snapshot import IndexState, read_shape
-from eigenshape.retrieval.store.thumbnails import draw_thumbnail
+from eigenshape.retrieval.store.database import create, writing
+from eigenshape.retrieval.store.filters import choose_shapes
+from eigenshape.retrieval.store.records import Record
+from eigenshape.retrieval.store.state import IndexState, read_state, tags_and_attributes
 from eigenshape.retrieval.store.upkeep import (
     IndexReport,
     compact_index,
@@ -33,13 +31,13 @@ from eigenshape.retrieval.store.upkeep import (
 )
 from eigenshape.retrieval.store.writing import (
     DescribedShape,
-    describe_to_store,
+    Writer,
+    described,
     facts_text,
     require_name,
     require_text,
-    update_shape,
-    write_shape,
 )
+from eigenshape.retrieval.thumbnails import draw_thumbnail
 
 IN_MEMORY = Path("/dev/shm")  # where Linux keeps files in memory
 
@@ -107,7 +105,7 @@ class ShapeIndex:
             weakref.finalize(index, rmtree, index.folder, ignore_errors=True)
         else:
             index = cls(as_path(folder, "folder"))
-        store.create(index.folder)
+        create(index.folder)
         return index
 
     @classmethod
@@ -158,23 +156,22 @@ class ShapeIndex:
         ...     es.ShapeIndex.open_or_create(folder) == es.ShapeIndex.open_or_create(folder)
         True
         """
-        store.create_if_missing(Path(folder))
+        create(Path(folder), exist_ok=True)
         return cls.open(folder)
 
     def __len__(self) -> int:
-        with store.reading(self.folder) as (database, _):
-            return read_seals(str(self.folder / DATABASE), database)["shape"].n_rows
+        return len(read_state(self.folder))
 
     def _read(self) -> IndexState:
-        state = open_state(self.folder)
+        state = read_state(self.folder)
         warn_of_damage(str(self.folder), state.damages)
         return state
 
     def reader(self, engine: EngineMaker | None = None) -> IndexReader:
         """Open a reader, which keeps the index in memory for many queries and many threads.
 
-        `query` opens one for each call. A reader takes 0.4 KB of memory a shape; the numbers that
-        are compared are mapped from disk.
+        `query` opens one for each call. A reader takes 72 bytes of memory a shape, and 1.2 KB of a
+        file that the scan maps; the numbers that are compared are read from the database.
 
         Parameters
         ----------
@@ -201,7 +198,7 @@ class ShapeIndex:
         >>> index = es.ShapeIndex.create(None)
         >>> fish = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
         >>> with index.reader() as reader:
-        ...     index.add_descriptors("fish", [fish])
+        ...     index.add_many([es.retrieval.DescribedShape("fish", [fish])])
         ...     before = len(reader)
         ...     reader.refresh()
         ...     before, len(reader), reader.query(fish)[0].name
@@ -227,13 +224,11 @@ class ShapeIndex:
         InvalidParameterError
             If a condition is none, or about an attribute that no shape has.
         """
-        state = self._read()
-        records = _records(state)
-        if where is None:
-            return records
-        chosen = choose_shapes(state.shapes, where)
-        require_attributes(state.shapes, where)
-        return [record for record in records if chosen[state.names[record.name]]]
+        state = read_state(self.folder)
+        chosen = choose_shapes(state, where)
+        records = _records(state, None if chosen is None else set(chosen.tolist()))
+        warn_of_damage(str(self.folder), state.damages)
+        return records
 
     def recipes(self) -> list[AnyRecipe]:
         """List the recipes of the index, in the order in which they were added.
@@ -242,7 +237,7 @@ class ShapeIndex:
         -------
         list of HeatRecipe or PatchRecipe
         """
-        return list(store.read_recipes_of(self.folder).values())
+        return list(self._read().recipes.values())
 
     def default_recipe(self) -> AnyRecipe:
         """Return the recipe by which `add` and `query` describe a mesh.
@@ -268,8 +263,8 @@ class ShapeIndex:
             If another process is writing.
         """
         require_type(recipe, AnyRecipe, "recipe")
-        with store.writing(self.folder) as change:
-            change.keep_recipe(recipe)
+        with writing(self.folder) as database:
+            Writer(self.folder, database).keep_recipe(recipe)
 
     def add(  # noqa: PLR0913 - one keyword for each fact of a shape, and how it is described
         self,
@@ -318,7 +313,7 @@ class ShapeIndex:
 
         See Also
         --------
-        ShapeIndex.add_descriptors, build_index
+        ShapeIndex.add_many, build_index
         """
         mesh = as_mesh(mesh)
         require_type(recipe, AnyRecipe | None, "recipe")
@@ -338,37 +333,6 @@ class ShapeIndex:
             attributes=attributes or {},
             thumbnail=draw_thumbnail(mesh),
         )
-        self.add_many([shape], replace=replace)
-
-    def add_descriptors(
-        self,
-        name: str,
-        descriptors: Sequence[Descriptor],
-        *,
-        label: str | None = None,
-        source: str | None = None,
-        digest: str | None = None,
-        replace: bool = False,
-    ) -> None:
-        """Add a shape that is described already.
-
-        Parameters
-        ----------
-        name, descriptors, label, source, digest
-            As of `DescribedShape`.
-        replace : bool
-            Whether a shape of the same name with another digest is replaced, in one step.
-
-        Raises
-        ------
-        InvalidParameterError, StoreError
-            As `add_many`.
-
-        See Also
-        --------
-        ShapeIndex.add, ShapeIndex.add_many, ShapeIndex.descriptors
-        """
-        shape = DescribedShape(name, descriptors, label, source, digest)
         self.add_many([shape], replace=replace)
 
     def add_many(self, shapes: Iterable[DescribedShape], *, replace: bool = False) -> None:
@@ -395,12 +359,13 @@ class ShapeIndex:
 
         See Also
         --------
-        ShapeIndex.add, build_index
+        ShapeIndex.add, ShapeIndex.descriptors, build_index
         """
-        with store.writing(self.folder) as change:
+        with writing(self.folder) as database:
+            writer = Writer(self.folder, database)
             for shape in shapes:
                 require_type(shape, DescribedShape, "shapes[...]")
-                write_shape(change, shape, replace=replace)
+                writer.add(described(shape), replace=replace)
 
     def update(self, records: Iterable[Record]) -> None:
         """Change what is known of shapes, all in one step, and keep their descriptors.
@@ -428,16 +393,17 @@ class ShapeIndex:
         >>> index.records()[0].label
         'fish'
         """
-        with store.writing(self.folder) as change:
+        with writing(self.folder) as database:
+            writer = Writer(self.folder, database)
             for record in records:
                 require_type(record, Record, "records[...]")
-                update_shape(change, record)
+                writer.update(record)
 
     def remove(self, *names: str) -> None:
         """Remove shapes, all in one step.
 
-        Their numbers stay in the files until `compact`, so that processes that read the old state
-        still find them.
+        Their space in the file serves shapes that are added later, or is given back by `compact`.
+        Readers find them until they are refreshed.
 
         Parameters
         ----------
@@ -448,14 +414,15 @@ class ShapeIndex:
         StoreError
             If there is no shape of a name, or another process is writing.
         """
-        with store.writing(self.folder) as change:
+        with writing(self.folder) as database:
+            writer = Writer(self.folder, database)
             for name in names:
-                shape = change.find_shape(name)
-                if shape is None:
+                facts = writer.find(name)
+                if facts is None:
                     raise StoreError(
                         f"A shape must be in the index to be removed; {name!r} is not."
                     )
-                change.delete_shape(shape)
+                writer.delete(facts)
 
     def query(
         self,
@@ -542,18 +509,17 @@ class ShapeIndex:
             If the shape has no descriptor by that recipe, or it is damaged.
         """
         require_type(recipe, AnyRecipe, "recipe")
-        state = read_shape(self.folder, name)
-        if state is None or not len(state.entries_by(recipe)):
-            state = self._read()  # which tells what is damaged, or which recipes there are
-        snapshot = state.snapshot(recipe)
-        shape = state.names.get(name, -1)
-        places = (snapshot.shape_of == shape).nonzero()[0].tolist()
-        if not places:
+        state = self._read()
+        facts = state.find(name)
+        ids = [] if facts is None else state.descriptor_ids(facts)
+        found = [each.restored() for each in state.stored(ids) if each.recipe == recipe]
+        if not found:
+            state.snapshot(recipe)  # which tells which recipes there are
             raise StoreError(
                 f"A shape must be described by the requested recipe; {name!r} is not described by "
                 f"{recipe}."
             )
-        return [snapshot.descriptor(place) for place in places]
+        return found
 
     def thumbnail(self, name: str) -> bytes | None:
         """Return the small picture of a shape.
@@ -572,10 +538,11 @@ class ShapeIndex:
         StoreError
             If there is no shape of that name, or the picture is damaged.
         """
-        state = read_shape(self.folder, name) or self._read()
-        if name not in state.names:
+        state = self._read()
+        facts = state.find(name)
+        if facts is None:
             raise StoreError(f"A shape must be in the index to have a picture; {name!r} is not.")
-        return state.thumbnail(state.names[name])
+        return state.picture(facts)
 
     def verify(self) -> IndexReport:
         """Compare everything in the index with its checksums.
@@ -583,7 +550,7 @@ class ShapeIndex:
         Returns
         -------
         IndexReport
-            With all damage by name of shape, file and bytes.
+            With all damage, by name of shape where it is known.
 
         Raises
         ------
@@ -601,24 +568,22 @@ class ShapeIndex:
     def compact(self) -> int:
         """Give the space of removed shapes back.
 
-        Files are written anew beside the old ones, so the disk needs space for both. Readers keep
-        the old files until they are refreshed or closed.
+        The last pages of the file take the place of free ones, so it costs as much as was removed,
+        and not as the index holds. The file becomes shorter when no reader holds an older state.
 
         Returns
         -------
         int
-            Bytes that were given back, without those of the database.
+            Bytes that were given back.
 
         Raises
         ------
         StoreError
-            If anything is damaged, another process is writing, or the disk is full.
+            If another process is writing, or the disk is full.
         """
         return compact_index(self.folder)
 
-    def merge(
-        self, others: Sequence["ShapeIndex"], *, copy: bool = True, replace: bool = False
-    ) -> int:
+    def merge(self, others: Sequence["ShapeIndex"], *, replace: bool = False) -> int:
         """Add all shapes of other indexes, in one step.
 
         What is damaged in the others is left out with a `StoreWarning`, so merging a damaged index
@@ -627,9 +592,6 @@ class ShapeIndex:
         Parameters
         ----------
         others : sequence of ShapeIndex
-        copy : bool
-            If False, the numbers stay where they are, and this index refers to the folders of the
-            others, relative to its own. Do not compact or move those.
         replace : bool
             Whether a shape replaces one of the same name with another digest.
 
@@ -641,9 +603,15 @@ class ShapeIndex:
 
         Raises
         ------
+        InvalidParameterError
+            If rows by one recipe are longer in one index than in another.
         StoreError
             If a name stands for two shapes and `replace` is False, another process is writing, or
             the disk is full.
+
+        See Also
+        --------
+        query_indexes : Ask several indexes, and leave them apart.
 
         Examples
         --------
@@ -654,9 +622,7 @@ class ShapeIndex:
         (1, ['fish'])
         """
         require_each(others, ShapeIndex, "others")
-        return merge_indexes(
-            self.folder, [other.folder for other in others], copy=copy, replace=replace
-        )
+        return merge_indexes(self.folder, [other.folder for other in others], replace=replace)
 
     def export(self, folder: str | Path, names: Sequence[str] | None = None) -> None:
         """Write records and descriptors as files for other programs.
@@ -692,24 +658,28 @@ class ShapeIndex:
         if names is not None:
             require_each(names, str, "names")
         state = self._read()
-        for name in names or ():
-            if name not in state.names:
-                raise StoreError(f"A shape must be in the index to be exported; {name!r} is not.")
-        chosen = None if names is None else set(names)
-        records = [record for record in _records(state) if chosen is None or record.name in chosen]
-        export_index(state, records, Path(folder))
+        chosen = None
+        if names is not None:
+            found = [state.find(name) for name in names]
+            for name, facts in zip(names, found, strict=True):
+                if facts is None:
+                    raise StoreError(
+                        f"A shape must be in the index to be exported; {name!r} is not."
+                    )
+            chosen = {facts.id for facts in found if facts is not None}
+        export_index(state, _records(state, chosen), Path(folder))
 
 
-def _records(state: IndexState) -> list[Record]:
-    """Return what is known of each shape, sorted by name."""
-    used: list[set[int]] = [set() for _ in state.shapes.ids]
-    recipes = state.descriptors["recipe"].tolist()
-    for place, recipe in zip(state.shape_of.tolist(), recipes, strict=True):
-        used[place].add(recipe)
+def _records(state: IndexState, chosen: set[int] | None = None) -> list[Record]:
+    """Return what is known of the chosen shapes, or of all, sorted by name."""
+    used: dict[int, set[int]] = {}
+    rows = state.descriptors
+    for shape, recipe in zip(rows["shape"].tolist(), rows["recipe"].tolist(), strict=True):
+        used.setdefault(shape, set()).add(recipe)
     records = []
-    for place, numbers in enumerate(used):
-        row = state.shapes.row(place)
-        by = tuple(state.recipes[number] for number in sorted(numbers))
-        tags, attributes = tuple(json.loads(row.tags)), json.loads(row.attributes)
-        records.append(Record(row.name, row.label, row.source, row.digest, tags, attributes, by))
+    for facts in state.every():
+        if chosen is None or facts.id in chosen:
+            by = tuple(state.recipes[number] for number in sorted(used.get(facts.id, ())))
+            told = (facts.name, facts.label, facts.source, facts.digest)
+            records.append(Record(*told, *tags_and_attributes(facts), by))
     return sorted(records, key=lambda record: record.name)

@@ -10,17 +10,17 @@ from typing import Any, SupportsIndex
 
 import numpy as np
 
-from eigenshape._arguments import require_each, require_type
+from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import Descriptor, kind_of
 from eigenshape.retrieval.patches.verification import N_VERIFIED
 from eigenshape.retrieval.search.chances import chances
-from eigenshape.retrieval.store.catalog import DATABASE
+from eigenshape.retrieval.search.matches import Match, Matches
+from eigenshape.retrieval.search.reader import IndexReader, choose_recipe
+from eigenshape.retrieval.store.database import DATABASE
 from eigenshape.retrieval.store.filters import choose_shapes
-from eigenshape.retrieval.store.reader import IndexReader, choose_recipe
-from eigenshape.retrieval.store.records import Match, Matches
 
 MOST_OPEN = 256  # readers that a process keeps open between queries
 
@@ -61,7 +61,7 @@ def query_indexes(
     Returns
     -------
     Matches
-        As of `merge_matches`.
+        Best first. `nothing_alike` if it is true of each answer.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def query_indexes(
 
     See Also
     --------
-    merge_matches, ShapeIndex.merge
+    ShapeIndex.query, ShapeIndex.merge
 
     Examples
     --------
@@ -105,71 +105,24 @@ def query_indexes(
         _ask, descriptor=descriptor, n_matches=wanted + N_VERIFIED, where=where, exact=exact
     )
     answers = map(ask, paths) if executor is None else executor.map(ask, paths)
-    return merge_matches(list(answers), n_matches=wanted)
+    return _merged(list(answers), wanted)
 
 
-def merge_matches(answers: Sequence[Matches], *, n_matches: SupportsIndex = 5) -> Matches:
+def _merged(answers: list[Matches], n_matches: int) -> Matches:
     """Merge what several indexes answered to one query into the answer of one index of them all.
 
     Each index has matched the points of its own thirty nearest shapes. Here those count that are
     among the thirty nearest of all, as they would in one index; the others keep the distance of
     their codes.
-
-    Parameters
-    ----------
-    answers : sequence of Matches
-        One of each index, to the same query, with ``n_matches`` 30 larger than is wanted here.
-    n_matches : int
-        Matches to return.
-
-    Returns
-    -------
-    Matches
-        Best first. `nothing_alike` if it is true of each answer.
-
-    Raises
-    ------
-    InvalidParameterError
-        If an answer has too few matches; its number is named.
-
-    See Also
-    --------
-    query_indexes
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> scan = es.describe(es.make_creature("fish", pose=1, n_vertices=500))
-    >>> answers = []
-    >>> for kind in ("fish", "bird"):
-    ...     index = es.ShapeIndex.create(None)
-    ...     index.add(kind, es.make_creature(kind, n_vertices=500), n_views=0)
-    ...     answers.append(index.query(scan, n_matches=31))
-    >>> merged = es.retrieval.merge_matches(answers, n_matches=1)
-    >>> merged[0].name, merged.n_shapes
-    ('fish', 2)
     """
-    require_each(answers, Matches, "answers")
-    if not answers:
-        raise InvalidParameterError("answers must hold those of one index at least; it is empty.")
-    wanted = whole_number(n_matches, "n_matches", 1, 2**30)
-    needed = wanted + N_VERIFIED
-    for number, answer in enumerate(answers):
-        if _by_patches(answer) and len(answer) < min(needed, answer.n_compared):
-            raise InvalidParameterError(
-                f"Answer {number} has {len(answer)} matches of {answer.n_compared} compared shapes; "
-                f"{needed} are needed to choose {wanted}. Ask with n_matches={needed}."
-            )
-    found = [match for answer in answers for match in answer]
-    found.sort(key=_distance)
+    found = sorted((match for answer in answers for match in answer), key=_distance)
     found = [*found[:N_VERIFIED], *map(_not_verified, found[N_VERIFIED:])]
     found.sort(key=lambda match: (match.score, match.name))
-    n_shapes = sum(answer.n_shapes for answer in answers)
     return Matches(
-        tuple(found[:wanted]),
+        tuple(found[:n_matches]),
         next((each.method for each in answers if each.method != "exact"), "exact"),
         sum(answer.n_compared for answer in answers),
-        n_shapes,
+        sum(answer.n_shapes for answer in answers),
         all(answer.nothing_alike for answer in answers),
     )
 
@@ -185,8 +138,9 @@ def _ask(
     reader = _open_reader(folder)
     reader.refresh()
     # One of several indexes need not have each attribute.
-    chosen = choose_shapes(reader.state.shapes, where)
-    return reader._search(reader.state, descriptor, n_matches, chosen, exact=exact)
+    state = reader.state
+    chosen = choose_shapes(state, where, must_know=False)
+    return reader._search(state, descriptor, n_matches, chosen, exact=exact)
 
 
 def _open_reader(folder: Path) -> IndexReader:
@@ -198,10 +152,6 @@ def _open_reader(folder: Path) -> IndexReader:
 @lru_cache(maxsize=MOST_OPEN)
 def _reader(folder: Path, inode: int) -> IndexReader:
     return IndexReader(folder)
-
-
-def _by_patches(answer: Matches) -> bool:
-    return any(match.distance is not None for match in answer)
 
 
 def _distance(match: Match) -> float:

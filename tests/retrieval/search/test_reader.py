@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from describers import RECIPE, descriptor
+from describers import RECIPE, descriptor, keep
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape.retrieval import DescribedShape
-from eigenshape.retrieval.store import snapshot
-from eigenshape.retrieval.store.reader import require_maker
+from eigenshape.retrieval.search.reader import require_maker
+from eigenshape.retrieval.store import database as store
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def test_an_attribute_that_no_shape_has_is_refused_with_those_there_are(index):
         with pytest.raises(es.InvalidParameterError, match=message):
             index.records(where=where)
     part = es.ShapeIndex.create(None)
-    part.add_descriptors("other", [descriptor(2)])
+    keep(part, "other", [descriptor(2)])
     folders = [index.folder, part.folder]  # of several indexes, one may lack it
     found = es.retrieval.query_indexes(descriptor(3), folders, where={"seed!=": (1, 9)})
     assert names(found) == {"s0", "other"}
@@ -109,11 +109,11 @@ def test_a_reader_keeps_its_state_until_it_is_refreshed(index):
     with index.reader() as reader:
         assert not reader.refresh()
         before = reader.state
-        index.add_descriptors("new", [descriptor(77)])
+        keep(index, "new", [descriptor(77)])
         assert "new" not in names(reader.query(descriptor(77), n_matches=20))
         assert reader.refresh()
         assert reader.query(descriptor(77))[0].name == "new"
-        assert reader.state.shapes.row(0) == before.shapes.row(0)
+        assert reader.state is not before
         index.remove("s3", "new")
         index.compact()
         assert reader.query(descriptor(77))[0].name == "new"
@@ -130,13 +130,8 @@ def test_a_reader_keeps_its_state_until_it_is_refreshed(index):
 
 def check_refreshed(index, old):
     with index.reader() as new:
-        for name in ("texts", "ids", "ends", "pictures"):
-            assert np.array_equal(getattr(old.state.shapes, name), getattr(new.state.shapes, name))
         assert np.array_equal(old.state.descriptors, new.state.descriptors)
-        labels = [
-            [r.state.shapes.labels[c] for c in r.state.shapes.label_codes] for r in (old, new)
-        ]
-        assert labels[0] == labels[1]
+        assert list(old.state.every()) == list(new.state.every())
         for reader in (old, new):
             assert reader.query(descriptor(5), n_matches=1)[0].name == "s5"
 
@@ -144,48 +139,53 @@ def check_refreshed(index, old):
 def test_a_refreshed_reader_is_as_a_new_one(index):
     with index.reader() as old:
         for seed in range(20, 30):
-            index.add_descriptors(f"t{seed}", [descriptor(seed)], label=f"label {seed % 4}")
+            keep(index, f"t{seed}", [descriptor(seed)], label=f"label {seed % 4}")
             if seed % 4 == 0:
                 index.remove(f"t{seed}")
             old.refresh()
             check_refreshed(index, old)
 
 
-def test_a_refresh_reads_what_was_changed_alone(index, monkeypatch):
+def test_a_refresh_after_all_kinds_of_changes(index):
     def change(number):
         if number == 0:
             index.remove("s0", "s3", "s9")
         if number == 1:  # one is changed that was there, one is new, one comes and goes
             index.update([replace(index.records()[0], label="other", tags=("new",))])
-            index.add_descriptors("t1", [descriptor(51)], digest="1")
-            index.add_descriptors("t2", [descriptor(52)])
+            keep(index, "t1", [descriptor(51)], digest="1")
+            keep(index, "t2", [descriptor(52)])
             index.remove("t2")
         if number == 2:  # one gains a recipe, another is replaced
             other = replace(RECIPE, name="other")
-            index.add_descriptors("t1", [descriptor(51, other)], digest="1")
+            keep(index, "t1", [descriptor(51, other)], digest="1")
             new = DescribedShape("s1", [descriptor(61), descriptor(62)], digest="2", label="new")
             index.add_many([new], replace=True)
         if number == 3:
             index.remove(*(record.name for record in index.records() if record.name != "s5"))
 
-    read_all = snapshot._all_rows
     for number in range(4):
         with index.reader() as reader:
             change(number)
-            monkeypatch.setattr(snapshot, "_all_rows", lambda *_: pytest.fail("all was read"))
             assert reader.refresh()
-            monkeypatch.setattr(snapshot, "_all_rows", read_all)
             check_refreshed(index, reader)
+            assert not reader.refresh()
 
 
-def test_a_refresh_reads_all_if_the_list_of_changes_is_damaged(index):
+def test_a_refresh_reads_what_was_added_alone(index, monkeypatch):
+    asked, whole_integers = [], store._whole_integers
+
+    def watch(database, source, last):
+        asked.append((source, last))
+        return whole_integers(database, source, last)
+
+    monkeypatch.setattr(store, "_whole_integers", watch)
     with index.reader() as reader:
-        index.remove("s0", "s3")
-        with closing(sqlite3.connect(index.folder / "index.sqlite")) as database:
-            database.execute("UPDATE touched SET shape = 2 WHERE id = 2")
-            database.commit()
-        assert reader.refresh()
-        check_refreshed(index, reader)
+        keep(index, "new", [descriptor(71)])
+        reader.refresh()
+        index.remove("new")
+        reader.refresh()
+    by = "INDEXED BY integers"
+    assert asked == [(by, 0), (by, 20), (by, 21), (by, 0)]
 
 
 def test_many_threads_see_whole_states_alone(index):
@@ -230,20 +230,17 @@ def test_a_snapshot_gives_what_search_needs(index):
         found = reader.snapshot(RECIPE)
         assert found.n_shapes == 20  # two views of each
         place = 7
-        for ahead in (False, True):
-            every = found.rows_of(np.arange(20), read_ahead=ahead)
+        for checked in (False, True):
+            every = found.rows_of(np.arange(20), checked=checked)
             assert np.array_equal(every[place], descriptor(1003).vectors.astype("<f4"))
-        assert np.array_equal(found.rows(place), every[place])
         assert reader.snapshot(RECIPE) is found
-        found.verify(place)
-        assert found.details(place) == np.arange(2, dtype="<i8").tobytes()
-        assert found.names([0, 7]) == ["s0", "s3"]
-        assert found.labels([18]) == [None]
-        assert found.sources([0]) == [None]
-        labels = [reader.state.shapes.labels[code] for code in found.label_codes]
-        assert labels == [found.shape(place).label for place in range(20)]
-        chosen = np.arange(10) == 3
-        assert np.flatnonzero(found.mask(chosen)).tolist() == [6, 7]
+        assert found.descriptor(place).vertices.tolist() == [0, 1]
+        facts = found.facts(np.array([0, 7, 18]))
+        assert [each.name for each in facts] == ["s0", "s3", "s9"]
+        assert [each.label for each in facts] == ["class 0", "class 0", None]
+        labels, codes = reader.state.labels
+        assert [labels[code] for code in codes[[0, 3, 9]]] == ["class 0", "class 0", None]
+        assert np.flatnonzero(found.mask(np.array([facts[1].id]))).tolist() == [6, 7]
         assert found.beside("coarse.bin").parent == index.folder
 
 
@@ -251,7 +248,7 @@ def test_one_shape_is_read_without_the_others(index, monkeypatch):
     picture = es.retrieval.draw_thumbnail(es.make_creature("fish", n_vertices=500))
     views = [descriptor(71), descriptor(72)]
     index.add_many([DescribedShape("new", views, thumbnail=picture)])
-    monkeypatch.setattr(snapshot, "_all_rows", lambda *_: pytest.fail("all was read"))
+    monkeypatch.setattr(store, "_whole_integers", lambda *_: pytest.fail("all was read"))
     found = index.descriptors("new", RECIPE)
     assert [each.vectors.tolist() for each in found] == [
         each.vectors.astype("<f4").tolist() for each in views
@@ -265,31 +262,28 @@ def test_a_damaged_bit_never_hides_a_descriptor_of_one_shape(index, table):
     """Flip bits of the indexes of SQLite by which one shape is found."""
     path = index.folder / "index.sqlite"
     with closing(sqlite3.connect(path)) as database:
-        (size,) = database.execute("PRAGMA page_size").fetchone()
-        query = "SELECT rootpage FROM sqlite_master WHERE type = 'index' AND tbl_name = ?"
-        (page,) = database.execute(query, (table,)).fetchone()
+        query = "SELECT rootpage FROM sqlite_master WHERE name = ?"
+        (page,) = database.execute(query, (f"sqlite_autoindex_{table}_1",)).fetchone()
     data = path.read_bytes()
     truth = [each.vectors.tolist() for each in index.descriptors("s4", RECIPE)]
-    start = (page - 1) * size
-    used = start + np.flatnonzero(np.frombuffer(data, np.uint8, size, start))
-    rng, n_alone, n_right = np.random.default_rng(0), 0, 0
-    places = rng.choice(used, min(len(used), 60), replace=False).tolist()
-    for place in places:
+    start = (page - 1) * store.PAGE
+    used = start + np.flatnonzero(np.frombuffer(data, np.uint8, store.PAGE, start))
+    rng, n_right = np.random.default_rng(0), 0
+    for place in rng.choice(used, min(len(used), 60), replace=False).tolist():
         spoilt = bytearray(data)
         spoilt[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(spoilt)
         with warnings.catch_warnings(), suppress(es.StoreError):
             warnings.simplefilter("ignore")
-            n_alone += snapshot.read_shape(index.folder, "s4") is not None
             assert [each.vectors.tolist() for each in index.descriptors("s4", RECIPE)] == truth
             n_right += 1
-    assert 0 < n_alone < n_right
+    assert n_right > 30
 
 
 def test_a_temporary_index_is_deleted_with_its_last_reference():
     index = es.ShapeIndex.create(None)
     folder = index.folder
-    index.add_descriptors("one", [descriptor(1)])
+    keep(index, "one", [descriptor(1)])
     assert folder.is_dir()
     assert index.query(descriptor(1))[0].name == "one"
     del index

@@ -3,7 +3,7 @@
 import pytest
 
 import eigenshape as es
-from eigenshape.retrieval.store.duplicates import AT_FIRST, find_duplicates
+from eigenshape.retrieval.duplicates import AT_FIRST, find_duplicates
 
 
 def test_copies_are_found_and_kinds_are_apart():

@@ -12,20 +12,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from describers import RECIPE, mesh_of, read_and_count, read_by_content
+from describers import RECIPE, SPOIL_ROWS, mesh_of, read_and_count, read_by_content, spoil
 from filelock import FileLock
 
 import eigenshape
 from eigenshape._errors import InvalidParameterError
 from eigenshape._workers import Item, Outcome, Workers
-from eigenshape.retrieval.description import describe
-from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.store.batch import (
+from eigenshape.retrieval.building.batch import (
     build_index,
     content_digest,
     train_codebook_from_files,
 )
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.description import describe
+from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.patches.descriptor import PatchRecipe
 
 
 @pytest.fixture
@@ -100,8 +100,7 @@ def test_what_is_there_is_not_done_twice(index, tmp_path):
 def test_a_damaged_shape_is_described_anew(index, tmp_path):
     todo = items(tmp_path, a="1", b="2", c="3")
     build(index, todo)
-    rows = index.folder / "rows-1.bin"
-    rows.write_bytes(b"?" + rows.read_bytes()[1:])
+    spoil(index.folder, SPOIL_ROWS)
     (damage,) = index.verify().damages
     report = build(index, todo)
     assert report.added == (damage.shape,)

@@ -25,17 +25,18 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_names import require_repairs
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
+from eigenshape.retrieval.description import describe_to_store
+from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descriptor
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
 from eigenshape.retrieval.patches.patches import Patches, extract_patches
 from eigenshape.retrieval.patches.training import train_codebook
-from eigenshape.retrieval.store.index import ShapeIndex
 from eigenshape.retrieval.store.records import Record
-from eigenshape.retrieval.store.thumbnails import draw_thumbnail
 from eigenshape.retrieval.store.upkeep import find_damaged
-from eigenshape.retrieval.store.writing import DescribedShape, describe_to_store
+from eigenshape.retrieval.store.writing import DescribedShape
+from eigenshape.retrieval.thumbnails import draw_thumbnail
 from eigenshape.scans.partial import view_number
 
 Recipes = TypeAliasType("Recipes", Sequence[AnyRecipe])

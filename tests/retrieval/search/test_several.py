@@ -5,12 +5,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from describers import keep
 from search_cases import RECIPE, mixtures
 
 import eigenshape as es
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.patches.isolation import USUAL_ISOLATION
-from eigenshape.retrieval.store import snapshot
+from eigenshape.retrieval.search import reader
 
 pytestmark = pytest.mark.long
 
@@ -24,7 +25,7 @@ def as_isolated_as_usual(monkeypatch):
     def isolations(source, recipe, checksums):
         return np.full(len(checksums), USUAL_ISOLATION)
 
-    monkeypatch.setattr(snapshot, "stored_isolations", isolations)
+    monkeypatch.setattr(reader, "stored_isolations", isolations)
 
 
 @pytest.fixture(scope="module")
@@ -133,17 +134,11 @@ def test_heat_is_merged_by_scores(tmp_path):
     folders = [tmp_path / "one", tmp_path / "two"]
     for kind, folder in zip(("fish", "bird"), folders, strict=True):
         described = es.describe(es.make_creature(kind, n_vertices=500), heat)
-        es.ShapeIndex.create(folder).add_descriptors(kind, [described])
+        keep(es.ShapeIndex.create(folder), kind, [described])
     query = es.describe(es.make_creature("fish", 1, n_vertices=500), heat)
     found = es.retrieval.query_indexes(query, folders)
     assert [match.name for match in found] == ["fish", "bird"]
     assert found[0].distance is None
-
-
-def test_too_few_matches_are_named(whole, queries):
-    answer = whole.query(queries[0], n_matches=20)
-    with pytest.raises(es.InvalidParameterError, match=r"Answer 1 has 20 matches.*n_matches=35"):
-        es.retrieval.merge_matches([whole.query(queries[0], n_matches=35), answer])
 
 
 def test_no_index_is_refused(queries, tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 from eigenshape._arguments import require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape.retrieval.store.index import ShapeIndex
+from eigenshape.retrieval.index import ShapeIndex
 
 # Of five kinds of synthetic creatures and eight real shapes, with six views each: moved and scaled,
 # or with another order of vertices, a shape has a score up to 0.053; with noise of a thousandth of
@@ -73,16 +73,16 @@ def find_duplicates(
     with index.reader() as reader:
         snapshot = reader.snapshot(reader.default_recipe())
         # The first descriptor of each shape is that of the whole.
-        places = np.flatnonzero(snapshot.columns["view"] == 0).tolist()
-        for number, place in enumerate(places):
-            name = snapshot.name(place)
+        places = np.flatnonzero(snapshot.columns["view"] == 0)
+        for number, (place, facts) in enumerate(zip(places, snapshot.facts(places), strict=True)):
+            name = facts.name
             if progress is not None:
                 progress(number / len(places), name)
             search = partial(
                 reader._search,
                 reader.state,
-                snapshot.descriptor(place),
-                chosen=np.arange(len(reader)) != snapshot.shape_of[place],
+                snapshot.descriptor(int(place)),
+                left_out=facts.id,
                 is_scaled=False,  # or shapes would be less alike where others are like them
             )
             n_matches = AT_FIRST

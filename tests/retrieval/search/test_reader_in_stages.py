@@ -4,13 +4,13 @@ import threading
 
 import numpy as np
 import pytest
+from describers import keep
 from search_cases import RECIPE, mixtures
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search import candidates
-from eigenshape.retrieval.store import snapshot
 
 pytestmark = pytest.mark.long
 
@@ -23,7 +23,7 @@ def staged(monkeypatch):
     monkeypatch.setattr(candidates, "FEWEST_TO_SCAN", 50)
     monkeypatch.setattr(candidates, "N_COMPARED", 60)
     monkeypatch.setattr(candidates, "PER_MATCH", 6)
-    monkeypatch.setattr("eigenshape.retrieval.store.reader.FEWEST_TO_SCAN", 50)
+    monkeypatch.setattr("eigenshape.retrieval.search.reader.FEWEST_TO_SCAN", 50)
 
 
 @pytest.fixture(scope="module")
@@ -135,18 +135,6 @@ def test_an_engine_serves_as_long_as_few_shapes_change(index, points):
         assert len(made) == 2
 
 
-def test_candidates_are_read_ahead_and_an_exact_search_reads_on(index, points, monkeypatch):
-    asked, ask_ahead = [], snapshot.ask_ahead
-    monkeypatch.setattr(
-        snapshot, "ask_ahead", lambda *piece: asked.append(piece) or ask_ahead(*piece)
-    )
-    (query,) = described(points, 5, 1)
-    index.query(query)
-    assert len(asked) == 60
-    index.query(query, exact=True)
-    assert len(asked) == 60
-
-
 def test_threads_share_the_scan_of_a_reader(index, points):
     queries = described(points, 5, 6)
     expected = [names(index.query(query)) for query in queries]
@@ -171,7 +159,7 @@ def test_chance_is_small_for_the_same_shape_and_large_for_others(index, points):
     assert match.chance < 1e-4
     assert not index.query(same).nothing_alike
     heat = es.describe(es.make_creature("fish", n_vertices=500), es.retrieval.SCALE_FREE)
-    index.add_descriptors("heat", [heat])
+    keep(index, "heat", [heat])
     assert index.query(heat)[0].chance is None
 
 

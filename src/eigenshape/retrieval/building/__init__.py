@@ -1,0 +1,1 @@
+"""Describe many files in worker processes, and add them to an index."""

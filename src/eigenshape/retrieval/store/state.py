@@ -1,0 +1,459 @@
+"""One state of an index: a transaction that is held, and the integers of all descriptors in arrays."""
+
+import json
+import sqlite3
+import weakref
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from threading import RLock
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from eigenshape._errors import StoreError
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
+from eigenshape.retrieval.store.damage import Damage
+from eigenshape.retrieval.store.database import (
+    DAMAGE,
+    DATABASE,
+    INTEGERS,
+    Facts,
+    Seal,
+    checksum,
+    committed_changes,
+    explained,
+    integer_checksums,
+    lost_changes,
+    open_to_read,
+    read_integers,
+    read_recipes,
+    read_rows,
+    read_seals,
+)
+
+SHAPES_AT_ONCE = 20_000  # whose facts are in memory at a time: 10 MB
+DESCRIPTOR = ", ".join((*INTEGERS[1:], "checksum", "rows", "details"))
+
+
+class StoredDescriptor(NamedTuple):
+    """A descriptor as it is stored: its recipe, its view, and bytes."""
+
+    recipe: AnyRecipe
+    view: int
+    n_rows: int
+    n_columns: int
+    rows: bytes
+    details: bytes
+
+    def restored(self) -> Descriptor:
+        """Return the descriptor."""
+        kind = kind_of(self.recipe)
+        rows = np.frombuffer(self.rows, kind.row_type).reshape(self.n_rows, self.n_columns)
+        found: Descriptor = kind.restore(rows, self.details, self.recipe)
+        return found
+
+
+class StoredShape(NamedTuple):
+    """All that an index holds of a shape; tags and attributes are JSON."""
+
+    name: str
+    label: str | None
+    source: str | None
+    digest: str | None
+    tags: str
+    attributes: str
+    picture: bytes | None
+    descriptors: Sequence[StoredDescriptor]
+
+    @property
+    def n_bytes(self) -> int:
+        """Return the bytes of the numbers and of the picture."""
+        numbers = sum(len(each.rows) + len(each.details) for each in self.descriptors)
+        return numbers + len(self.picture or b"")
+
+
+class DamagedEntryError(StoreError):
+    """Descriptors are not what was written; the message names the first.
+
+    Attributes
+    ----------
+    ids : sequence of int
+        Numbers of the descriptors.
+    damages : sequence of Damage
+    """
+
+    def __init__(self, ids: Sequence[int], damages: Sequence[Damage]) -> None:
+        super().__init__(f"An index must hold what was written; {damages[0]}.")
+        self.ids, self.damages = ids, damages
+
+
+@dataclass(eq=False)
+class IndexState:
+    """All of an index at one moment; any number of threads may use it.
+
+    Attributes
+    ----------
+    folder : Path
+    database : Connection
+        In a transaction, which ends with the last reference to this state.
+    seals : dict
+        By table.
+    recipes : dict
+        By number.
+    damages : list of Damage
+        What was found so far. Numbers of a shape are checked when it is among the best.
+    before : array, optional
+        Integers of an earlier state, of which only those that were added are read.
+    """
+
+    folder: Path
+    database: sqlite3.Connection
+    seals: dict[str, Seal]
+    recipes: dict[int, AnyRecipe]
+    damages: list[Damage]
+    before: np.ndarray | None = None
+    lock: RLock = field(default_factory=RLock)
+
+    def __len__(self) -> int:
+        return self.seals["shape"].n_rows
+
+    @cached_property
+    def descriptors(self) -> np.ndarray:
+        """Return the integers of all descriptors, by their numbers."""
+        with self.lock:
+            found = read_integers(
+                self.database, self.seals["descriptor"], self.damages, self.before
+            )
+            self.before = None
+            known = np.isin(found["recipe"], list(self.recipes))
+            return found if known.all() else found[known]
+
+    @cached_property
+    def shape_ids(self) -> Int[np.ndarray, " n"]:
+        """Return the numbers of all shapes, ascending."""
+        return np.unique(self.descriptors["shape"])
+
+    def leave_out(self, ids: Sequence[int]) -> None:
+        """Leave out descriptors that are damaged."""
+        with self.lock:
+            self.descriptors = self.descriptors[~np.isin(self.descriptors["id"], ids)]
+            self.__dict__.pop("shape_ids", None)
+
+    def read(
+        self, table: str, columns: str, ids: Int[np.ndarray, " k"] | Sequence[int]
+    ) -> dict[int, tuple[Any, ...]]:
+        """Return rows of a table by their numbers, as far as they can be read."""
+        numbers = np.asarray(ids, dtype=np.int64).tolist()
+        with self.lock:
+            return read_rows(self.database, table, columns, numbers) if numbers else {}
+
+    def facts(self, ids: Int[np.ndarray, " k"] | Sequence[int]) -> dict[int, Facts]:
+        """Return what is known of some shapes, by their numbers.
+
+        Raises
+        ------
+        DamagedEntryError
+            If some cannot be read, with all that are damaged.
+        """
+        columns = ", ".join((*Facts._fields[1:], "checksum"))
+        found: dict[int, Facts] = {}
+        for number, row in self.read("shape", columns, ids).items():
+            if checksum(*row[:-1]) == row[-1]:
+                found[number] = Facts(*row[:-1])
+        lost = sorted(set(np.asarray(ids).tolist()) - set(found))
+        if lost:
+            what = "row {} of table shape is lost or differs from its checksum"
+            damages = [Damage(DATABASE, what.format(number)) for number in lost]
+            rows = self.descriptors
+            raise DamagedEntryError(rows["id"][np.isin(rows["shape"], lost)].tolist(), damages)
+        return found
+
+    def every(self) -> Iterator[Facts]:
+        """Yield what is known of all shapes; damage is noted, and the rest comes."""
+        for first in range(0, len(self.shape_ids), SHAPES_AT_ONCE):
+            some = self.shape_ids[first : first + SHAPES_AT_ONCE]
+            try:
+                yield from self.facts(some).values()
+            except DamagedEntryError as err:
+                self.damages += [each for each in err.damages if each not in self.damages]
+                damaged = np.isin(self.descriptors["id"], err.ids)
+                lost = self.descriptors["shape"][damaged]
+                yield from self.facts(some[~np.isin(some, lost)]).values()
+
+    @cached_property
+    def labels(self) -> tuple[list[str | None], Int[np.ndarray, " n"]]:
+        """Return the labels without duplicates, and which of them each shape has, or -1."""
+        codes: dict[str | None, int] = {}
+        found = np.full(len(self.shape_ids), -1, dtype=np.int32)
+        for facts in self.every():
+            place = np.searchsorted(self.shape_ids, facts.id)
+            found[place] = codes.setdefault(facts.label, len(codes))
+        return list(codes), found
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Return the names of all shapes, sorted."""
+        return sorted(facts.name for facts in self.every())
+
+    def find(self, name: str) -> Facts | None:
+        """Return what is known of a shape by its name, or None if there is none.
+
+        Raises
+        ------
+        DamagedEntryError
+            If it is damaged.
+        """
+        query = "SELECT id FROM shape {} WHERE name = ?"
+        # The list of names of SQLite first; a damaged bit of that may hide a name.
+        for source in ("", "NOT INDEXED"):
+            with self.lock, explained(self.folder):
+                row = self.database.execute(query.format(source), (name,)).fetchone()
+            if row is not None:
+                facts = self.facts(row)[row[0]]
+                if facts.name == name:
+                    return facts
+        return None
+
+    def shape(self, facts: Facts) -> StoredShape:
+        """Return all that the index holds of a shape, checked.
+
+        Raises
+        ------
+        DamagedEntryError
+            If anything of it is damaged.
+        """
+        descriptors = self.stored(self.descriptor_ids(facts))
+        return StoredShape(*facts[1:7], self.picture(facts), descriptors)
+
+    def descriptor_ids(self, facts: Facts) -> list[int]:
+        """Return the numbers of the descriptors of a shape.
+
+        Raises
+        ------
+        DamagedEntryError
+            If some are lost.
+        """
+        query = "SELECT id FROM descriptor WHERE shape = ? ORDER BY id"
+        ids: list[int] = []
+        with self.lock, suppress(*DAMAGE):
+            ids = [number for (number,) in self.database.execute(query, (facts.id,))]
+        rows = self.read("descriptor", "shape", ids).values()
+        # A damaged bit of that index of SQLite may hide descriptors, or lead to others.
+        if [shape for _, shape in rows] != [facts.id] * facts.n_descriptors:
+            ids = self.descriptors["id"][self.descriptors["shape"] == facts.id].tolist()
+        if len(ids) != facts.n_descriptors:
+            what = f"{facts.n_descriptors - len(ids)} of its descriptors are lost"
+            raise DamagedEntryError(ids, [Damage(DATABASE, what, facts.name)])
+        return ids
+
+    def stored(self, ids: Sequence[int]) -> list[StoredDescriptor]:
+        """Return descriptors by their numbers, checked.
+
+        Raises
+        ------
+        DamagedEntryError
+            If one of them is damaged.
+        """
+        rows = self.read("descriptor", DESCRIPTOR, ids)
+        found = []
+        for number in ids:
+            row = rows.get(number)
+            what = "its row cannot be read" if row is None else _difference(row)
+            if row is None or what:
+                raise self.damaged([number], what)
+            if row[2] not in self.recipes:
+                raise self.damaged([number], "its recipe is lost")
+            # id, shape, recipe, view, n_rows, n_columns, three checksums, rows, details
+            found.append(StoredDescriptor(self.recipes[row[2]], *row[3:6], *row[9:]))
+        return found
+
+    def damaged(self, ids: Sequence[int], what: str) -> DamagedEntryError:
+        """Return the error of damaged descriptors, which names their shapes as far as it can."""
+        shapes = self.descriptors["shape"][np.isin(self.descriptors["id"], ids)]
+        names: dict[int, str] = {}
+        with suppress(DamagedEntryError):
+            names = {key: facts.name for key, facts in self.facts(np.unique(shapes)).items()}
+        damages = [Damage(DATABASE, what, names.get(shape)) for shape in shapes.tolist()]
+        return DamagedEntryError(ids, damages or [Damage(DATABASE, what)])
+
+    def picture(self, facts: Facts) -> bytes | None:
+        """Return the picture of a shape, or None if it has none.
+
+        Raises
+        ------
+        DamagedEntryError
+            If it is damaged.
+        """
+        if not facts.n_pictures:
+            return None
+        row = self.read("picture", "data, checksum", [facts.id]).get(facts.id)
+        if row is None or checksum(*row[:2]) != row[2]:
+            what = "its picture is lost or differs from its checksum"
+            raise DamagedEntryError([], [Damage(DATABASE, what, facts.name)])
+        return bytes(row[1])
+
+    def snapshot(self, recipe: AnyRecipe) -> "Snapshot":
+        """Return all descriptors by a recipe.
+
+        Raises
+        ------
+        StoreError
+            If there are none.
+        """
+        rows = self.descriptors
+        numbers = [number for number, other in self.recipes.items() if other == recipe]
+        mask = np.isin(rows["recipe"], numbers)
+        if not mask.any():
+            used = set(np.unique(rows["recipe"]).tolist())
+            names = sorted(str(self.recipes[number].name) for number in used)
+            raise StoreError(
+                f"An index must hold descriptors of the requested recipe; {self.folder} holds "
+                f"{', '.join(names) or 'no shape'}, and {recipe} was requested."
+            )
+        return Snapshot(self, recipe, rows if mask.all() else rows[mask])
+
+
+def _difference(row: tuple[Any, ...]) -> str:
+    """Return how a row of the table of descriptors differs from its checksums; nothing if it does not."""
+    integers, expected, rows, details = row[:8], row[8], row[9], row[10]
+    if not all(isinstance(value, int) for value in integers):
+        return "its row differs from its checksum"
+    if integer_checksums(np.array([integers], dtype=np.int64))[0] != expected:
+        return "its row differs from its checksum"
+    if not isinstance(rows, bytes) or crc32(rows) != integers[6]:
+        return "its rows differ from their checksum"
+    if not isinstance(details, bytes) or crc32(details) != integers[7]:
+        return "its details differ from their checksum"
+    return ""
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """All descriptors of an index by one recipe, at one moment; any number of threads may use it.
+
+    A place is the number of a descriptor among them, in the order in which they were added. Shapes
+    that are described by patches have one place each.
+
+    Attributes
+    ----------
+    state : IndexState
+    recipe : HeatRecipe or PatchRecipe
+    columns : (k,) structured array
+        The integers of the descriptors.
+    """
+
+    state: IndexState
+    recipe: AnyRecipe
+    columns: np.ndarray
+
+    @property
+    def n_shapes(self) -> int:
+        """Return the number of places."""
+        return len(self.columns)
+
+    @property
+    def shape_of(self) -> Int[np.ndarray, " k"]:
+        """Return the number of the shape of each place."""
+        return np.asarray(self.columns["shape"])
+
+    @property
+    def row_checksums(self) -> Int[np.ndarray, " k"]:
+        """Return a number for the rows of each place that changes whenever they do."""
+        # With that of the details: of a million checksums of rows, a hundred pairs would be equal.
+        return (self.columns["rows_checksum"] << 31) ^ self.columns["details_checksum"]
+
+    def rows_of(self, places: Int[np.ndarray, " k"], *, checked: bool = False) -> list[np.ndarray]:
+        """Return the (m, q) rows of some places, compared with their checksums if that is wanted.
+
+        It takes 25 microseconds a shape with views, more than reading them.
+
+        Raises
+        ------
+        DamagedEntryError
+            If some cannot be read, or are damaged, with all of these.
+        """
+        kind, columns = kind_of(self.recipe), self.columns[places]
+        ids = columns["id"].tolist()
+        blobs = self.state.read("descriptor", "rows", ids)
+        found, lost = [], []
+        names = ("id", "n_rows", "n_columns", "rows_checksum")
+        for number, n_rows, n_columns, expected in columns[list(names)].tolist():
+            blob = blobs[number][1] if number in blobs else b""
+            is_whole = isinstance(blob, bytes) and (not checked or crc32(blob) == expected)
+            if is_whole and len(blob) == n_rows * n_columns * kind.row_type.itemsize:
+                found.append(np.frombuffer(blob, kind.row_type).reshape(n_rows, n_columns))
+            else:
+                lost.append(number)
+        if lost:
+            raise self.state.damaged(lost, "its rows cannot be read")
+        return found
+
+    def descriptor(self, place: int) -> Descriptor:
+        """Return the descriptor of a place, checked.
+
+        Raises
+        ------
+        DamagedEntryError
+            If it is damaged.
+        """
+        (stored,) = self.state.stored([int(self.columns["id"][place])])
+        return stored.restored()
+
+    def facts(self, places: Int[np.ndarray, " k"]) -> list[Facts]:
+        """Return what is known of the shapes of some places."""
+        shapes = self.columns["shape"][places]
+        found = self.state.facts(np.unique(shapes))
+        return [found[shape] for shape in shapes.tolist()]
+
+    def mask(self, shapes: Int[np.ndarray, " n"] | None) -> Bool[np.ndarray, " k"]:
+        """Return which places describe one of some shapes; without them, all do."""
+        if shapes is None:
+            return np.ones(self.n_shapes, dtype=bool)
+        return np.isin(self.columns["shape"], shapes)
+
+    def beside(self, name: str) -> Path:
+        """Return the path of a file of search that can be made again from the rows."""
+        return self.state.folder / name
+
+
+def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
+    """Read an index.
+
+    Parameters
+    ----------
+    folder : Path
+    before : IndexState, optional
+        Of the same index at an earlier moment: only what was added since is read, and nothing if
+        all is the same.
+
+    Raises
+    ------
+    StoreError
+        If the folder is not an index of this format, or its database cannot be read at all.
+    """
+    place, committed = str(folder / DATABASE), committed_changes(folder)
+    with explained(folder):
+        database = open_to_read(folder)
+        damages: list[Damage] = []
+        seals = read_seals(place, database, damages)
+        damages += [] if damages else lost_changes(committed, seals)
+        recipes = read_recipes(place, database, damages)
+    columns = None if before is None or before.damages else before.descriptors
+    state = IndexState(folder, database, seals, recipes, damages, columns)
+    # A connection refers to itself, so it would wait for the garbage collector.
+    weakref.finalize(state, database.close)
+    if before is not None and before.seals == seals:
+        for name in ("descriptors", "shape_ids", "labels", "names"):
+            if name in before.__dict__:
+                state.__dict__[name] = before.__dict__[name]
+    return state
+
+
+def tags_and_attributes(facts: Facts) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Return the tags and the attributes of a shape."""
+    return tuple(json.loads(facts.tags)), json.loads(facts.attributes)
