@@ -1,6 +1,7 @@
 """What every test may lean on: the real data where it is there, and shapes checked at run time."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,13 @@ def pytest_configure(config: pytest.Config) -> None:
     """Give each worker of pytest-xdist one thread of BLAS: two workers with two each fight for two cores."""
     if hasattr(config, "workerinput"):
         threadpool_limits(1, user_api="blas")
+    if config.getoption("--nightly"):
+        runtime_types.Limit.calls = sys.maxsize
+
+
+def pytest_runtest_setup() -> None:
+    """Begin to count the calls whose types are checked."""
+    runtime_types.Limit.test += 1
 
 
 @pytest.hookimpl(tryfirst=True)  # before long tests are left out
