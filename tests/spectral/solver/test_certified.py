@@ -57,12 +57,11 @@ def test_two_points_by_hand():
     "mesh",
     [
         tetrahedra(12),
-        tetrahedra(60),
         icosphere(2),
         torus(16, 12),
         disjoint_union(*[icosphere(1)] * 5),
     ],
-    ids=["12 tetrahedra", "60 tetrahedra", "icosphere", "torus", "5 icospheres"],
+    ids=["12 tetrahedra", "icosphere", "torus", "5 icospheres"],
 )
 def test_no_eigenvalue_is_missing_or_extra(always_lanczos, mesh, mass):
     assert require_lowest(cotangent_laplacian(mesh, mass), [1, 2, 4, 7, 12, 15]) == 6
