@@ -11,6 +11,7 @@ tenths of its time in checks of the same types, so each test checks the first ca
 import dataclasses
 import functools
 import inspect
+from collections import Counter
 from typing import Any
 
 import jaxtyping
@@ -23,10 +24,15 @@ _with_types = beartype(conf=BeartypeConf(is_pep484_tower=True))
 
 
 class Limit:
-    """How many calls of each function are checked in a test, and the number of the test."""
+    """How many calls of each function are checked in a test, and the number and file of the test."""
 
     calls = 20
     test = 0
+    file = ""
+
+
+# How many tests of each file call a function: `tests/house/mutants.py` asks which.
+callers: dict[str, Counter[str]] = {}
 
 
 def install() -> None:
@@ -51,6 +57,7 @@ def checked(thing: Any) -> Any:
     if not getattr(thing, "__annotations__", None):
         return thing
 
+    name = f"{thing.__module__}:{thing.__qualname__}"
     typed = None  # many functions are loaded and never called
     test, left = 0, Limit.calls
 
@@ -59,6 +66,7 @@ def checked(thing: Any) -> Any:
         nonlocal typed, test, left
         if test != Limit.test:
             test, left = Limit.test, Limit.calls
+            callers.setdefault(name, Counter())[Limit.file] += 1
         if left <= 0:
             return thing(*args, **kwargs)
         left -= 1
