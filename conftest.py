@@ -20,7 +20,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("eigenshape")
     group.addoption("--nightly", action="store_true", help="run every part of the broad sweeps")
     group.addoption("--turn", type=int, choices=range(TURNS), help="the part of sweeps to run")
-    group.addoption("--cpu", type=int, metavar="N", help="print the CPU time of folders and N tests")
+    group.addoption(
+        "--cpu", type=int, metavar="N", help="print the CPU time of folders and N tests"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -96,7 +98,9 @@ def _measure(item: pytest.Item) -> Generator[None, object, object]:
 pytest_runtest_setup = pytest_runtest_call = pytest_runtest_teardown = _measure
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
     """Print where the CPU time went."""
     n_dearest = config.getoption("--cpu")
     if n_dearest is None:
@@ -110,5 +114,9 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
                 costs[report.nodeid] = cost
                 folders["/".join(report.nodeid.split("::")[0].split("/")[:-1])] += cost
     terminalreporter.section("CPU seconds, those of processes that were started included")
-    for place, cost in [("all", costs.total()), *folders.most_common(), *costs.most_common(n_dearest)]:
+    for place, cost in [
+        ("all", costs.total()),
+        *folders.most_common(),
+        *costs.most_common(n_dearest),
+    ]:
         terminalreporter.write_line(f"{cost:9.2f}  {place}")

@@ -1,4 +1,4 @@
-"""Quick forms of experiments: each is run once in a session, for all of its tests and all workers, when it has its turn."""
+"""Quick forms of experiments: each that has its turn is run once in a session, for all tests and all workers."""
 
 import json
 import subprocess

@@ -193,7 +193,9 @@ def files_for(mutant: Mutant, calls: dict[str, Counter[str]]) -> list[str]:
     """Return the test files that call the mutant's function, those of its own module and those that call most first."""
     module = "eigenshape." + mutant.module.removesuffix(".py").replace("/", ".")
     found = calls.get(f"{module}:{mutant.function}", Counter())
-    if not found:  # a compiled loop, a constant or a class: the files of its module, or of what imports it
+    if (
+        not found
+    ):  # a compiled loop, a constant or a class: the files of its module, or of what imports it
         name = module.rsplit(".", 1)[1]
         users = {
             "eigenshape." + str(path.relative_to(ROOT / "src/eigenshape"))[:-3].replace("/", ".")
@@ -217,7 +219,9 @@ def main() -> None:
     parser.add_argument("--calls", type=Path, help="a file that keeps which tests call what")
     parser.add_argument("--only", help="mutants whose text holds this")
     options = parser.parse_args()
-    mutants = [each for each in sample(options.seed, options.count) if (options.only or "") in str(each)]
+    mutants = [
+        each for each in sample(options.seed, options.count) if (options.only or "") in str(each)
+    ]
     if options.list:
         sys.stdout.writelines(f"{mutant}\n" for mutant in mutants)
         return
@@ -227,7 +231,10 @@ def main() -> None:
         tree = Path(folder, "tree")
         shutil.copytree(ROOT, tree, symlinks=True, ignore=shutil.ignore_patterns(*NOT_COPIED))
         if options.calls and options.calls.exists():
-            calls = {name: Counter(files) for name, files in json.loads(options.calls.read_text()).items()}
+            calls = {
+                name: Counter(files)
+                for name, files in json.loads(options.calls.read_text()).items()
+            }
         else:
             calls = record_calls(tree, [*chosen, "--ignore", "tests/house"])
             if options.calls:

@@ -1,7 +1,7 @@
 """Ask every public function for a billion of whatever it counts, each in a process of its own.
 
-Run as a script with names of `counts`, or without for all, it prints what went wrong as JSON. An answer is right, and so is an error that names the number; a
-function that runs on, that fills the memory, or that ends in another error is not.
+Run as a script with names of `counts`, or without for all, it prints what went wrong as JSON. An answer is right, and so
+is an error that names the number; a function that runs on, that fills the memory, or that ends in another error is not.
 """
 
 import inspect
@@ -110,7 +110,11 @@ def counts() -> list[str]:
     """Return the name of everything that is counted, as `grid(n)`."""
     return [
         *CARRIED,
-        *(f"{name}({count})" for name, (code, _) in callables().items() for count in count_names(code)),
+        *(
+            f"{name}({count})"
+            for name, (code, _) in callables().items()
+            for count in count_names(code)
+        ),
     ]
 
 

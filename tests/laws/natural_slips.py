@@ -1,7 +1,8 @@
 """Hand every public function what people hand over by mistake, as they see it: without the type checks of the tests.
 
-Run as a script with names of functions, or without for all, it prints what went wrong as JSON. A new public function that takes one of our values needs nothing
-here as long as its other arguments have a type or a name that is known below.
+Run as a script with names of functions, or without for all, it prints what went wrong as JSON. A new public function
+that takes one of our values needs nothing here as long as its other arguments have a type or a name that is known
+below.
 """
 
 import inspect
