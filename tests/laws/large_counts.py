@@ -1,7 +1,8 @@
 """Ask every public function for a billion of whatever it counts, each in a process of its own.
 
-Run as a script with names of `counts`, or without for all, it prints what went wrong as JSON. An answer is right, and so
-is an error that names the number; a function that runs on, that fills the memory, or that ends in another error is not.
+Run as a script with names of `counts`, or without for all, it prints what went wrong as JSON. An answer is right, and
+so is an error that names the number; a function that runs on, that fills the memory, or that ends in another error is
+not.
 """
 
 import inspect
