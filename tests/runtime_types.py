@@ -31,6 +31,7 @@ class Limit:
     file = ""
 
 
+_inner: set[object] = set()
 # How many tests of each file call a function: `tests/house/mutants.py` asks which.
 callers: dict[str, Counter[str]] = {}
 
@@ -54,8 +55,12 @@ def checked(thing: Any) -> Any:
     if inspect.isgeneratorfunction(thing):
         # It runs after the call, and beartype would check its arguments then, in the axes of another function.
         return _jaxtyped(thing, typechecker=_with_types)
-    if not getattr(thing, "__annotations__", None):
+    # A function inside another is made anew in each call. One of them is checked, as that takes 2 ms.
+    inner = thing.__code__ if "<locals>" in thing.__qualname__ else None
+    if inner in _inner or not getattr(thing, "__annotations__", None):
         return thing
+    if inner:
+        _inner.add(inner)
 
     name = f"{thing.__module__}:{thing.__qualname__}"
     typed = None  # many functions are loaded and never called
