@@ -26,7 +26,7 @@ _with_types = beartype(conf=BeartypeConf(is_pep484_tower=True))
 class Limit:
     """How many calls of each function are checked in a test, and the number and file of the test."""
 
-    calls = 20
+    calls = 10
     test = 0
     file = ""
 

@@ -109,6 +109,7 @@ def test_operators_of_any_kind(always_coarsen, laplacian, k):
     require_near(laplacian, k, 1e-3, every)
 
 
+@pytest.mark.long
 def test_what_aggregates_cannot_see_is_found_by_a_last_look(always_coarsen, monkeypatch):
     laplacian = graph(hypercube(10))  # bits that change within aggregates only
     require_near(laplacian, 12, 1e-3)
