@@ -46,6 +46,7 @@ SWAPS: dict[type[ast.AST], str] = {
     ast.And: "or",
     ast.Or: "and",
 }
+SYMMETRIC = ("min", "max", "minimum", "maximum")  # in their first two arguments
 SIGNS: dict[type[ast.AST], str] = {ast.USub: "-", ast.Not: "not ", ast.Invert: "~"}
 
 
@@ -113,7 +114,9 @@ def mutants_of(module: str) -> Iterator[Mutant]:
                 yield first(node), first(node) + len(SIGNS[type(op)]), ""
             case ast.Constant(value=bool()):
                 yield first(node), last(node), str(not node.value)
-            case ast.Call(args=[ast.Name() as one, ast.Name() as other, *_]) if one.id != other.id:
+            case ast.Call(func=func, args=[ast.Name() as one, ast.Name() as other, *_]) if (
+                one.id != other.id and written(func).split(".")[-1] not in SYMMETRIC
+            ):
                 yield first(one), last(other), f"{written(other)}, {written(one)}"
             case ast.Call(keywords=[_, *_]):
                 for keyword in (each for each in node.keywords if each.arg):
