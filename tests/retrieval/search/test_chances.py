@@ -62,7 +62,7 @@ def test_matches_by_patches_carry_the_chance_of_their_score():
     for name, mesh in {"ball": es.icosphere(2), "ring": es.shapes.torus(24, 12)}.items():
         patches = es.retrieval.extract_patches(mesh, n_samples=40, n_views=0)
         query = es.retrieval.patch_descriptor(patches, recipe)
-        index.add_descriptors(name, [query])
+        index.add_many([es.retrieval.DescribedShape(name, [query])])
     found = index.query(query)
     assert [match.name for match in found] == ["ring", "ball"]
     scores = np.array([match.score for match in found])
