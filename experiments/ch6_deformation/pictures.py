@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from methods import METHODS
+from bends import METHODS
 from run import bound
 from scenes import SCENES, Scene, real
 

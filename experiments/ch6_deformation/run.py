@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from methods import METHODS
+from bends import METHODS
 from peers import as_rigid_as_possible
 from scenes import QUICK, SCENES, Scene
 

@@ -70,7 +70,7 @@ MADE: dict[str, Callable[[Shared], Any]] = {
     "BatchReport": lambda v: es.retrieval.BatchReport(("a",), (), (("b", "no mesh"),), ()),
     "BoxRegion": lambda v: es.deformation.BoxRegion([-1, -1, -1], [1, 1, 1]),
     "BrushRegion": lambda v: es.deformation.BrushRegion([0, 0, 1], 0.5),
-    "Damage": lambda v: es.retrieval.Damage("rows", "cut", None, 0, 8),
+    "Damage": lambda v: es.retrieval.Damage("rows", "cut"),
     "DeformationSession": lambda v: es.deformation.replay(v.rig, [v.edit]),
     "DepthCamera": lambda v: es.scans.DepthCamera(resolution=40),
     "DescribedShape": lambda v: es.retrieval.DescribedShape("a", [v.by_heat[0]]),
