@@ -333,12 +333,7 @@ def choose_recipe(recipes: list[AnyRecipe]) -> AnyRecipe:
 
 
 def require_maker(engine: object) -> None:
-    """Raise an error unless an argument can be called, and is no class of something else.
-
-    Raises
-    ------
-    InvalidParameterError
-    """
+    """Raise an error unless an argument can be called, and is no class of something else."""
     if not callable(engine) or (isinstance(engine, type) and not issubclass(engine, Engine)):
         raise InvalidParameterError(
             "engine must be a function that takes CoarseRows and returns an engine; it is "

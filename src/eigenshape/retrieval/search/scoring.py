@@ -29,6 +29,8 @@ def search_candidates(
 
     Checksums are verified of the shapes that are returned, and of those whose points are matched.
 
+    Raise DamagedEntryError if shapes are damaged: leave them out, and search again.
+
     Parameters
     ----------
     snapshot : Snapshot
@@ -43,11 +45,6 @@ def search_candidates(
     -------
     Matches
         Lowest score first, each shape once; equal scores are sorted by name.
-
-    Raises
-    ------
-    DamagedEntryError
-        If shapes are damaged: leave them out, and search again.
     """
     kind, columns = kind_of(descriptor.recipe), snapshot.columns
     (rows,) = rows_of_each("the query", [descriptor])

@@ -45,16 +45,14 @@ def convert_index(old: Path, new: Path) -> int:
 
     Shapes whose numbers differ from their checksums are left out, with a warning.
 
+    Raise StoreError if `old` is no index of these formats, `new` holds anything, or the disk is
+    full.
+
     Parameters
     ----------
     old : Path
     new : Path
         An empty folder, or one that does not exist.
-
-    Raises
-    ------
-    StoreError
-        If `old` is no index of these formats, `new` holds anything, or the disk is full.
     """
     require_database(old)
     damages: list[Damage] = []

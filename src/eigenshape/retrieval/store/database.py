@@ -147,17 +147,14 @@ def read_seals(
 ) -> dict[str, Seal]:
     """Read the seals of all tables.
 
+    Raise StoreError if one is damaged or missing, and no list is given.
+
     Parameters
     ----------
     place : str
     database : Connection
     damages : list of Damage, optional
         A seal that is damaged is noted there, and made of the rows that are found.
-
-    Raises
-    ------
-    StoreError
-        If one is damaged or missing, and no list is given.
     """
     seals = {}
     for name, *numbers, guard in database.execute("SELECT * FROM seal NOT INDEXED").fetchall():
@@ -185,10 +182,8 @@ def read_seals(
 def create(folder: Path, *, exist_ok: bool = False) -> None:
     """Make an empty index. If the process dies meanwhile, the same call can be repeated.
 
-    Raises
-    ------
-    StoreError
-        If the folder holds anything, an index also unless `exist_ok`, or cannot be made.
+    Raise StoreError if the folder holds anything, an index also unless `exist_ok`, or cannot be
+    made.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -238,11 +233,8 @@ def _not_empty(folder: Path) -> StoreError:
 def writing(folder: Path) -> Iterator[sqlite3.Connection]:
     """Open an index to change it. At the end of the block all changes are committed, or none.
 
-    Raises
-    ------
-    StoreError
-        If the folder is not an index of this format, changes were lost, another process is
-        writing, or the disk is full.
+    Raise StoreError if the folder is not an index of this format, changes were lost, another
+    process is writing, or the disk is full.
     """
     require_database(folder)
     with explained(folder), closing(_connect(folder, "mode=rw")) as database:
@@ -277,10 +269,8 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
     price: the log grows while a state is held, and processes of several machines must not write to
     one index on a network drive at the same time.
 
-    Raises
-    ------
-    StoreError
-        If the folder is not an index of this format, or its database cannot be read at all.
+    Raise StoreError if the folder is not an index of this format, or its database cannot be read at
+    all.
     """
     require_database(folder)
     with explained(folder):
@@ -350,12 +340,7 @@ def require_format(place: str, database: sqlite3.Connection) -> None:
 
 @contextmanager
 def explained(folder: Path) -> Iterator[None]:
-    """Turn errors of SQLite into a StoreError that says what to do.
-
-    Raises
-    ------
-    StoreError
-    """
+    """Turn errors of SQLite into a StoreError that says what to do."""
     try:
         yield
     except DAMAGE as err:
@@ -478,10 +463,7 @@ def read_recipes(
 ) -> dict[int, AnyRecipe]:
     """Return each recipe by its number; damage is appended to a list.
 
-    Raises
-    ------
-    StoreError
-        If a recipe is not known to this version.
+    Raise StoreError if a recipe is not known to this version.
     """
     recipes = {}
     query = "SELECT id, fields, n_columns, codebook, checksum FROM recipe NOT INDEXED"

@@ -19,15 +19,12 @@ NOT = "!="  # after a key: shapes that do not meet the condition
 def parse_filters(texts: Sequence[str] | None) -> dict[str, Any] | None:
     """Return the conditions of filters such as "label=cat,dog", "height=1.5..3" or "kind!=cat".
 
+    Raise InvalidParameterError if a text is no condition, or two are about the same key.
+
     Returns
     -------
     dict or None
         As of `ShapeIndex.query`; None if there are none.
-
-    Raises
-    ------
-    InvalidParameterError
-        If a text is no condition, or two are about the same key.
     """
     conditions: dict[str, Any] = {}
     for text in texts or ():
@@ -78,6 +75,8 @@ def choose_shapes(
 ) -> Int[np.ndarray, " k"] | None:
     """Return the numbers of the shapes that agree with all conditions of a filter.
 
+    Raise InvalidParameterError if a condition is none, or about an attribute that no shape has.
+
     Parameters
     ----------
     state : IndexState
@@ -85,11 +84,6 @@ def choose_shapes(
         As of `ShapeIndex.query`; without it all are chosen, and None is returned.
     must_know : bool
         Whether an attribute that no shape has is an error: it is often misspelled.
-
-    Raises
-    ------
-    InvalidParameterError
-        If a condition is none, or about an attribute that no shape has.
     """
     if where is None:
         return None

@@ -155,10 +155,7 @@ class IndexState:
     def facts(self, ids: Int[np.ndarray, " k"] | Sequence[int]) -> dict[int, Facts]:
         """Return what is known of some shapes, by their numbers.
 
-        Raises
-        ------
-        DamagedEntryError
-            If some cannot be read, with all that are damaged.
+        Raise DamagedEntryError if some cannot be read, with all that are damaged.
         """
         columns = ", ".join((*Facts._fields[1:], "checksum"))
         found: dict[int, Facts] = {}
@@ -203,10 +200,7 @@ class IndexState:
     def find(self, name: str) -> Facts | None:
         """Return what is known of a shape by its name, or None if there is none.
 
-        Raises
-        ------
-        DamagedEntryError
-            If it is damaged.
+        Raise DamagedEntryError if it is damaged.
         """
         query = "SELECT id FROM shape {} WHERE name = ?"
         # The list of names of SQLite first; a damaged bit of that may hide a name.
@@ -222,10 +216,7 @@ class IndexState:
     def shape(self, facts: Facts) -> StoredShape:
         """Return all that the index holds of a shape, checked.
 
-        Raises
-        ------
-        DamagedEntryError
-            If anything of it is damaged.
+        Raise DamagedEntryError if anything of it is damaged.
         """
         descriptors = self.stored(self.descriptor_ids(facts))
         return StoredShape(*facts[1:7], self.picture(facts), descriptors)
@@ -233,10 +224,7 @@ class IndexState:
     def descriptor_ids(self, facts: Facts) -> list[int]:
         """Return the numbers of the descriptors of a shape.
 
-        Raises
-        ------
-        DamagedEntryError
-            If some are lost.
+        Raise DamagedEntryError if some are lost.
         """
         query = "SELECT id FROM descriptor WHERE shape = ? ORDER BY id"
         ids: list[int] = []
@@ -254,10 +242,7 @@ class IndexState:
     def stored(self, ids: Sequence[int]) -> list[StoredDescriptor]:
         """Return descriptors by their numbers, checked.
 
-        Raises
-        ------
-        DamagedEntryError
-            If one of them is damaged.
+        Raise DamagedEntryError if one of them is damaged.
         """
         rows = self.read("descriptor", DESCRIPTOR, ids)
         found = []
@@ -284,10 +269,7 @@ class IndexState:
     def picture(self, facts: Facts) -> bytes | None:
         """Return the picture of a shape, or None if it has none.
 
-        Raises
-        ------
-        DamagedEntryError
-            If it is damaged.
+        Raise DamagedEntryError if it is damaged.
         """
         if not facts.n_pictures:
             return None
@@ -300,10 +282,7 @@ class IndexState:
     def snapshot(self, recipe: AnyRecipe) -> "Snapshot":
         """Return all descriptors by a recipe.
 
-        Raises
-        ------
-        StoreError
-            If there are none.
+        Raise StoreError if there are none.
         """
         rows = self.descriptors
         numbers = [number for number, other in self.recipes.items() if other == recipe]
@@ -372,10 +351,7 @@ class Snapshot:
 
         It takes 25 microseconds a shape with views, more than reading them.
 
-        Raises
-        ------
-        DamagedEntryError
-            If some cannot be read, or are damaged, with all of these.
+        Raise DamagedEntryError if some cannot be read, or are damaged, with all of these.
         """
         kind, columns = kind_of(self.recipe), self.columns[places]
         ids = columns["id"].tolist()
@@ -396,10 +372,7 @@ class Snapshot:
     def descriptor(self, place: int) -> Descriptor:
         """Return the descriptor of a place, checked.
 
-        Raises
-        ------
-        DamagedEntryError
-            If it is damaged.
+        Raise DamagedEntryError if it is damaged.
         """
         (stored,) = self.state.stored([int(self.columns["id"][place])])
         return stored.restored()
@@ -424,17 +397,15 @@ class Snapshot:
 def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
     """Read an index.
 
+    Raise StoreError if the folder is not an index of this format, or its database cannot be read at
+    all.
+
     Parameters
     ----------
     folder : Path
     before : IndexState, optional
         Of the same index at an earlier moment: only what was added since is read, and nothing if
         all is the same.
-
-    Raises
-    ------
-    StoreError
-        If the folder is not an index of this format, or its database cannot be read at all.
     """
     place, committed = str(folder / DATABASE), committed_changes(folder)
     with explained(folder):

@@ -106,10 +106,7 @@ def compact_index(folder: Path) -> int:
 
     SQLite moves the last pages into free ones, so it costs as much as was removed.
 
-    Raises
-    ------
-    StoreError
-        If another process is writing, the disk is full, or pages are damaged.
+    Raise StoreError if another process is writing, the disk is full, or pages are damaged.
     """
     before = _n_pages(folder)
     with writing(folder) as database:
@@ -155,10 +152,7 @@ def merge_indexes(folder: Path, others: Sequence[Path], *, replace: bool = False
 def export_index(state: IndexState, records: Sequence[Record], folder: Path) -> None:
     """Write records as JSON and descriptors as NPZ into a new folder.
 
-    Raises
-    ------
-    StoreError
-        If the folder holds anything, or something that is exported is damaged.
+    Raise StoreError if the folder holds anything, or something that is exported is damaged.
     """
     folder.mkdir(parents=True, exist_ok=True)
     if any(folder.iterdir()):

@@ -191,16 +191,13 @@ def described(shape: DescribedShape) -> StoredShape:
 class Writer:
     """Writes shapes in an open transaction. What it costs does not grow with the index.
 
+    Raise StoreError if a recipe of the index is damaged.
+
     Parameters
     ----------
     folder : Path
     database : Connection
         In a transaction of `writing`.
-
-    Raises
-    ------
-    StoreError
-        If a recipe of the index is damaged.
     """
 
     def __init__(self, folder: Path, database: sqlite3.Connection) -> None:
@@ -223,12 +220,8 @@ class Writer:
         One of the same name and digest gains the recipes that it lacks. It is written anew if it is
         damaged: what has the same digest is the same.
 
-        Raises
-        ------
-        StoreError
-            If the name is in the index with another digest and `replace` is False.
-        InvalidParameterError
-            If rows are longer or shorter than those of others by the same recipe.
+        Raise StoreError if the name is in the index with another digest and `replace` is False;
+        InvalidParameterError if rows are longer or shorter than those of others by the same recipe.
         """
         old = self.find(shape.name)
         same = old is not None and old.digest is not None and old.digest == shape.digest
