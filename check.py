@@ -1,49 +1,87 @@
 """Run the checks: format, lint, types, layers, tests. CI runs this same file.
 
-python check.py           all of it but the long tests; under three minutes on two cores
-python check.py --all     the long tests, the docs site and the studio in a browser, too
-python check.py --fast    without the tests
+python check.py            all of it but the long tests; two minutes on two cores
+python check.py --all      the long tests, the docs site and the studio in a browser, too; twelve minutes
+python check.py --nightly  as --all, with every part of the broad sweeps; a commit runs a fifth of these
+python check.py --fast     without the tests
 """
 
+import os
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 
-CHECKS = {
+FIRST = {
     "format": ["-m", "ruff", "format", "--check", "."],
     "lint": ["-m", "ruff", "check", "."],
+}
+TYPES_AND_LAYERS = {
     "types": ["-m", "mypy"],
     "layers": ["-c", "from importlinter.cli import lint_imports_command as main; main()"],
 }
 # Each process takes half of the files in a row, so that tests of one file share what they make.
 TESTS = ["-m", "pytest", "-n", "2", "--dist", "worksteal"]
-STUDIO = ["-m", "pytest", "studio/tests"]  # in one process: a browser takes both cores
+STUDIO = [
+    "-m",
+    "pytest",
+    "studio/tests",
+]  # in one process, which waits for a browser most of the time
 DOCS = ["-m", "sphinx", "-q", "-W", "--keep-going", "docs"]
+OPTIONS = {"--all", "--nightly", "--fast"}
 
 
 def main() -> int:
-    """Run the checks one after the other and print which failed."""
-    options, checks = set(sys.argv[1:]), dict(CHECKS)
-    if unknown := options - {"--all", "--fast"}:
-        sys.exit(f"check.py takes --all or --fast; it was given {', '.join(sorted(unknown))}.")
+    """Run the checks and print which failed."""
+    options = set(sys.argv[1:])
+    if unknown := options - OPTIONS:
+        sys.exit(
+            f"check.py takes --all, --nightly or --fast; it was given {', '.join(sorted(unknown))}."
+        )
+    everything = options & {"--all", "--nightly"}
+    nightly = sorted(options & {"--nightly"})  # an option of pytest, too
+    # Tests start hundreds of processes, each of which would compile the whole package anew.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     with tempfile.TemporaryDirectory() as site:
-        if "--all" in options:
-            checks["docs"] = [*DOCS, site]
-            checks["studio"] = STUDIO
-            checks["all tests"] = TESTS
+        beside, tests = dict(TYPES_AND_LAYERS), {}
+        if everything:
+            beside |= {"docs": [*DOCS, site], "studio": [*STUDIO, *nightly]}
+            tests["all tests"] = [*TESTS, *nightly]
         elif "--fast" not in options:
-            checks["tests"] = [*TESTS, "-m", "not long"]
-        failed = []
-        for name, command in checks.items():
-            print(f"== {name}", flush=True)
-            if subprocess.run([sys.executable, *command], check=False).returncode:
-                failed.append(name)
+            tests["tests"] = [*TESTS, "-m", "not long"]
+        failed = run_checks(FIRST)
+        # Beside the tests, so that no core waits: types take one, and the studio half of one.
+        with ThreadPoolExecutor(2) as pool:
+            for found in pool.map(run_checks, [tests, beside]):
+                failed += found
     print("== readability, for looking and not for enforcing", flush=True)
     subprocess.run([sys.executable, "tests/house/readability.py"], check=True)
     print("== figures that are older than what they time, for looking", flush=True)
     subprocess.run([sys.executable, "benchmarks/figures.py", "--stale"], check=True)
-    print(f"failed: {', '.join(failed)}" if failed else f"passed: {', '.join(checks)}")
+    names = [*FIRST, *beside, *tests]
+    print(f"failed: {', '.join(failed)}" if failed else f"passed: {', '.join(names)}")
     return 1 if failed else 0
+
+
+def run_checks(checks: dict[str, list[str]]) -> list[str]:
+    """Run checks one after the other, and return which failed.
+
+    The tests show how far they are. What the others print is shown when they end, each in one piece.
+    """
+    failed = []
+    for name, command in checks.items():
+        output = None if "tests" in name else subprocess.PIPE
+        done = subprocess.run(
+            [sys.executable, *command],
+            check=False,
+            stdout=output,
+            stderr=output and subprocess.STDOUT,
+            text=True,
+        )
+        print(f"== {name}\n{done.stdout or ''}", end="", flush=True)
+        if done.returncode:
+            failed.append(name)
+    return failed
 
 
 if __name__ == "__main__":

@@ -32,7 +32,12 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = Path(__file__).with_name("figures")
 PAGES = [
     ROOT / "README.md",
-    *sorted((ROOT / "docs").rglob("*.md")),
+    *(
+        page
+        for page in sorted((ROOT / "docs").rglob("*.md"))
+        if not {"api", "experiments", "_build"}
+        & {*page.parts[len(ROOT.parts) :]}  # made by a build
+    ),
     *sorted((ROOT / "experiments").rglob("*.md")),
 ]
 MEASURED = re.compile(r"<!-- figures: (\w+) -->\n(.*?)<!-- end -->\n", re.DOTALL)

@@ -1,6 +1,8 @@
 """What every test may lean on: the real data where it is there, and shapes checked at run time."""
 
+import json
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -20,6 +22,21 @@ def pytest_configure(config: pytest.Config) -> None:
     """Give each worker of pytest-xdist one thread of BLAS: two workers with two each fight for two cores."""
     if hasattr(config, "workerinput"):
         threadpool_limits(1, user_api="blas")
+    if config.getoption("--nightly"):
+        runtime_types.Limit.calls = sys.maxsize
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Begin to count the calls whose types are checked."""
+    runtime_types.Limit.test += 1
+    runtime_types.Limit.file = item.nodeid.split("::")[0]
+
+
+def pytest_sessionfinish() -> None:
+    """Write which functions were called by which files, if a folder is named for that."""
+    if folder := os.environ.get("EIGENSHAPE_CALLS"):
+        path = Path(folder, f"{os.getpid()}.json")
+        path.write_text(json.dumps(runtime_types.callers))
 
 
 @pytest.hookimpl(tryfirst=True)  # before long tests are left out

@@ -3,11 +3,15 @@
 jaxtyping's own decorator binds the arguments by name, checks them, calls the function, then checks the arguments
 again beside the result. On short functions that takes ten times as long as the call. Here beartype checks both in one
 wrapper, within a context of jaxtyping, so that an axis has one length in all of a signature.
+
+A check still takes as long as ten lines of NumPy. A loop that calls a function ten thousand times would spend nine
+tenths of its time in checks of the same types, so each test checks the first calls of each function and no more.
 """
 
 import dataclasses
 import functools
 import inspect
+from collections import Counter
 from typing import Any
 
 import jaxtyping
@@ -17,6 +21,19 @@ _jaxtyped: Any = jaxtyping.jaxtyped
 # Without state: each `with` opens a context of its own, in its own thread.
 _AXES = _jaxtyped("context")
 _with_types = beartype(conf=BeartypeConf(is_pep484_tower=True))
+
+
+class Limit:
+    """How many calls of each function are checked in a test, and the number and file of the test."""
+
+    calls = 10
+    test = 0
+    file = ""
+
+
+_inner: set[object] = set()
+# How many tests of each file call a function: `tests/house/mutants.py` asks which.
+callers: dict[str, Counter[str]] = {}
 
 
 def install() -> None:
@@ -38,12 +55,27 @@ def checked(thing: Any) -> Any:
     if inspect.isgeneratorfunction(thing):
         # It runs after the call, and beartype would check its arguments then, in the axes of another function.
         return _jaxtyped(thing, typechecker=_with_types)
-    typed = _with_types(thing)
-    if typed is thing:  # nothing is annotated
+    # A function inside another is made anew in each call. One of them is checked, as that takes 2 ms.
+    inner = thing.__code__ if "<locals>" in thing.__qualname__ else None
+    if inner in _inner or not getattr(thing, "__annotations__", None):
         return thing
+    if inner:
+        _inner.add(inner)
+
+    name = f"{thing.__module__}:{thing.__qualname__}"
+    typed = None  # many functions are loaded and never called
+    test, left = 0, Limit.calls
 
     @functools.wraps(thing)
     def call(*args: Any, **kwargs: Any) -> Any:
+        nonlocal typed, test, left
+        if test != Limit.test:
+            test, left = Limit.test, Limit.calls
+            callers.setdefault(name, Counter())[Limit.file] += 1
+        if left <= 0:
+            return thing(*args, **kwargs)
+        left -= 1
+        typed = typed or _with_types(thing)
         with _AXES:
             return typed(*args, **kwargs)
 

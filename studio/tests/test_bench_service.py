@@ -11,6 +11,7 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "bench_service.py"
 
 
 @pytest.mark.long
+@pytest.mark.sweep
 def test_the_script_runs(tmp_path):
     command = [sys.executable, SCRIPT, "--quick", "--json", tmp_path / "figures.json"]
     subprocess.run(command, check=True)

@@ -11,6 +11,7 @@ SCRIPT = Path(__file__).parents[2] / "benchmarks" / "bench_studio.py"
 
 
 @pytest.mark.long
+@pytest.mark.sweep
 def test_the_script_runs(tmp_path):
     command = [sys.executable, SCRIPT, "--quick", "--only", "drag", "--repeats", "1"]
     subprocess.run([*command, "--json", tmp_path / "figures.json"], check=True)

@@ -45,6 +45,7 @@ def test_inner_points_alone_count_where_the_boundary_is_held(tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.sweep
 def test_other_verbs_take_a_tiny_shape(tiny, tmp_path):
     run("info", tiny)
     run("features", tiny)

@@ -102,6 +102,17 @@ def test_part_tree_merges_the_cheapest_pair_each_time():
     np.testing.assert_allclose(tree.persistence[1:], expected[::-1], rtol=1e-9)
 
 
+@pytest.mark.parametrize("first", [0, 1])
+def test_parts_of_several_components_stand_by_their_height(first):
+    ball = icosphere(2)
+    both = TriangleMesh(3 + 2 * ball.vertices, ball.faces), ball
+    mesh = disjoint_union(both[first], both[1 - first])
+    tree = part_tree(mesh, part_spectrum(mesh, n_modes=40))
+    assert (tree.parent[:2] == -1).all()
+    assert tree.values[0] > tree.values[1]
+    assert sorted(tree.maxima[:2] < ball.n_vertices) == [False, True]
+
+
 @pytest.mark.long
 def test_a_part_splits_from_one_that_stands_before_it_and_is_higher(human):
     tree = human.tree

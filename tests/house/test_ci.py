@@ -28,4 +28,4 @@ def test_an_unknown_option_of_check_is_refused():
         [sys.executable, ROOT / "check.py", "--al"], capture_output=True, text=True, check=False
     )
     assert done.returncode == 1
-    assert "takes --all or --fast; it was given --al." in done.stderr
+    assert "takes --all, --nightly or --fast; it was given --al." in done.stderr

@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.long
+@pytest.mark.sweep
 def test_main_road_finds_the_octopus(tmp_path):
     example = runpy.run_path(str(ROOT / "examples" / "main_road.py"))
     matches = example["main"](tmp_path, n_vertices=1000)
@@ -116,6 +117,7 @@ def test_noise_moves_points_little_and_a_pose_eigenvalues_little(tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.sweep
 def test_the_pictures_of_the_front_page_can_be_drawn(tmp_path):
     drawn = runpy.run_path(str(ROOT / "examples" / "front_page.py"))["main"](
         tmp_path, n_vertices=800

@@ -1,7 +1,8 @@
 """Ask every public function for a billion of whatever it counts, each in a process of its own.
 
-Run as a script, it prints what went wrong as JSON. An answer is right, and so is an error that names the number; a
-function that runs on, that fills the memory, or that ends in another error is not.
+Run as a script with names of `counts`, or without for all, it prints what went wrong as JSON. An answer is right, and
+so is an error that names the number; a function that runs on, that fills the memory, or that ends in another error is
+not.
 """
 
 import inspect
@@ -10,7 +11,7 @@ import multiprocessing
 import resource
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from queue import Empty
@@ -101,14 +102,30 @@ def arguments_of(
     return given
 
 
-def calls() -> Iterator[tuple[str, Callable[[], Any]]]:
-    """Yield all calls with a billion of something, each with what it is of."""
-    yield from CARRIED.items()
-    for function, code, owner in public_callables():
-        if owner not in ENGINES:
-            for name in count_names(code):
-                arguments = arguments_of(function, code, owner, name)
-                yield f"{function}({name})", partial(code, **arguments)
+def callables() -> dict[str, tuple[Callable[..., Any], type | None]]:
+    """Return the public functions and methods that are asked, each with its class."""
+    return {name: (code, owner) for name, code, owner in public_callables() if owner not in ENGINES}
+
+
+def counts() -> list[str]:
+    """Return the name of everything that is counted, as `grid(n)`."""
+    return [
+        *CARRIED,
+        *(
+            f"{name}({count})"
+            for name, (code, _) in callables().items()
+            for count in count_names(code)
+        ),
+    ]
+
+
+def call_of(where: str) -> Callable[[], Any]:
+    """Return the call with a billion of what is counted."""
+    if where in CARRIED:
+        return CARRIED[where]
+    function, counted = where.removesuffix(")").split("(")
+    code, owner = callables()[function]
+    return partial(code, **arguments_of(function, code, owner, counted))
 
 
 def run(call: Callable[[], Any], answers: Any) -> None:
@@ -143,9 +160,9 @@ def main() -> None:
     warnings.simplefilter("ignore")
     stand_in_for_the_studio()
     np.set_printoptions(threshold=10)
-    found = [(where, outcome(call)) for where, call in calls()]
-    complaints = [(where, what) for where, what in found if what]
-    sys.stdout.write(json.dumps({"calls": len(found), "complaints": complaints}))
+    chosen = sys.argv[1:] or counts()
+    complaints = [(where, what) for where in chosen if (what := outcome(call_of(where)))]
+    sys.stdout.write(json.dumps({"complaints": complaints}))
 
 
 if __name__ == "__main__":

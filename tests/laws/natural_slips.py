@@ -1,7 +1,8 @@
 """Hand every public function what people hand over by mistake, as they see it: without the type checks of the tests.
 
-Run as a script, it prints what went wrong as JSON. A new public function that takes one of our values needs nothing
-here as long as its other arguments have a type or a name that is known below.
+Run as a script with names of functions, or without for all, it prints what went wrong as JSON. A new public function
+that takes one of our values needs nothing here as long as its other arguments have a type or a name that is known
+below.
 """
 
 import inspect
@@ -530,13 +531,15 @@ def main() -> None:
     warnings.simplefilter("ignore")
     render.FINER = 1  # pictures without smooth edges, in a quarter of the time
     stand_in_for_the_studio()
-    chosen = sys.argv[1:]
-    found, n_functions = [], 0
-    for name, code, owner in public_callables():
-        if not chosen or name in chosen:
-            n_functions += 1
-            found += list(complaints_about(name, code, owner))
-    sys.stdout.write(json.dumps({"functions": n_functions, "complaints": found}))
+    functions = list(public_callables())
+    chosen = set(sys.argv[1:]) or {name for name, _, _ in functions}
+    found = [
+        complaint
+        for name, code, owner in functions
+        if name in chosen
+        for complaint in complaints_about(name, code, owner)
+    ]
+    sys.stdout.write(json.dumps({"functions": len(functions), "complaints": found}))
 
 
 if __name__ == "__main__":

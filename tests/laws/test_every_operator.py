@@ -328,6 +328,7 @@ HELD = [
 pytestmark = pytest.mark.filterwarnings("ignore:With the heat time t", "ignore:A kernel of width")
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("row", "draw"), FREE)
 @few
 @given(seed=seeds)
@@ -335,6 +336,7 @@ def test_a_free_operator_keeps_what_it_promises(row, draw, seed):
     judge(row.build, draw, row.promises, seed)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(("row", "draw"), HELD)
 @few
 @given(seed=seeds)

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from public_names import public_things
-from thread_calls import CALLS, LEFT_OUT, Shared
+from thread_calls import CALLS, LEFT_OUT
 from threadpoolctl import threadpool_limits
 
 import eigenshape as es
@@ -124,23 +124,22 @@ def test_every_method_that_takes_something_is_called():
     assert {name.split(".")[1] for name in left} <= {"explain"}
 
 
-def test_four_threads_get_what_one_gets_bit_for_bit(tmp_path, monkeypatch):
+def test_four_threads_get_what_one_gets_bit_for_bit(shared, monkeypatch, in_turn):
     monkeypatch.setattr(
         "eigenshape.plot.render.FINER", 1
     )  # pictures without smooth edges, in a quarter of the time
-    values = Shared(tmp_path)
-    before = {name: digest(value) for name, value in vars(values).items()}
+    before = {name: digest(value) for name, value in vars(shared).items()}
+    names, wrong = in_turn(CALLS), set()
     with threadpool_limits(1, user_api="blas"):
-        alone = {name: digest(call(values)) for name, call in CALLS.items()}
-    names, wrong = list(CALLS), set()
+        alone = {name: digest(CALLS[name](shared)) for name in names}
     with many_threads():
         # Two threads do one thing, and two what comes next in the table.
         for place in range(0, len(names), N_THREADS // 2):
             chosen = [names[(place + thread // 2) % len(names)] for thread in range(N_THREADS)]
-            found = in_threads([lambda name=name: digest(CALLS[name](values)) for name in chosen])
+            found = in_threads([lambda name=name: digest(CALLS[name](shared)) for name in chosen])
             wrong |= {name for name, seen in zip(chosen, found, strict=True) if seen != alone[name]}
     assert not wrong
-    assert {name: digest(value) for name, value in vars(values).items()} == before
+    assert {name: digest(value) for name, value in vars(shared).items()} == before
 
 
 # What decides whether work is worth threads; with these small values it is for every small shape.
@@ -154,30 +153,29 @@ SMALL_WORK = {
 }
 
 
-def test_the_number_of_threads_changes_no_digit(tmp_path, monkeypatch):
+def test_the_number_of_threads_changes_no_digit(shared, monkeypatch, in_turn):
     monkeypatch.setattr("eigenshape.plot.render.FINER", 1)
     for place, value in SMALL_WORK.items():
         monkeypatch.setattr(place, value)
-    values, found = Shared(tmp_path), []
+    names, found = in_turn(CALLS), []
     try:
         for n in (1, 2, 4):
             es.set_threads(n)
-            found.append({name: digest(call(values)) for name, call in CALLS.items()})
+            found.append({name: digest(CALLS[name](shared)) for name in names})
     finally:
         es.set_threads(None)
-    wrong = [name for name in CALLS if len({each[name] for each in found}) > 1]
+    wrong = [name for name in names if len({each[name] for each in found}) > 1]
     assert not wrong
 
 
-def test_two_threads_bend_one_binding(tmp_path):
-    values = Shared(tmp_path)
+def test_two_threads_bend_one_binding(shared):
     handles = [
-        es.Rotation(values.handle.pivot, [0, 0, 1], 0.05 * number) for number in range(1, 21)
+        es.Rotation(shared.handle.pivot, [0, 0, 1], 0.05 * number) for number in range(1, 21)
     ]
-    alone = [es.deformation.bend(values.binding, [handle]).vertices for handle in handles]
+    alone = [es.deformation.bend(shared.binding, [handle]).vertices for handle in handles]
     with many_threads(), ThreadPoolExecutor(2) as pool:
         together = list(
-            pool.map(lambda handle: es.deformation.bend(values.binding, [handle]).vertices, handles)
+            pool.map(lambda handle: es.deformation.bend(shared.binding, [handle]).vertices, handles)
         )
     np.testing.assert_array_equal(together, alone)
 
@@ -253,12 +251,12 @@ def test_a_computation_that_fails_gives_blas_its_threads_back():
         assert blas_threads() == {3}
 
 
-def test_threads_that_read_files_leave_the_streams_alone(tmp_path, capsys):
-    values, streams = Shared(tmp_path), (sys.stdout, sys.stderr)
+def test_threads_that_read_files_leave_the_streams_alone(shared, capsys):
+    streams = sys.stdout, sys.stderr
 
     def print_and_read(number: int) -> None:
         sys.stdout.write(f"line {number}\n")
-        es.read_shape(values.folder / "square.mesh")
+        es.read_shape(shared.folder / "square.mesh")
 
     with many_threads(), ThreadPoolExecutor(N_THREADS) as pool:
         list(pool.map(print_and_read, range(60)))
@@ -269,10 +267,9 @@ def test_threads_that_read_files_leave_the_streams_alone(tmp_path, capsys):
     )
 
 
-def test_no_comparison_silences_the_warnings_of_another_thread(tmp_path, monkeypatch):
+def test_no_comparison_silences_the_warnings_of_another_thread(shared, monkeypatch):
     changed = []
     monkeypatch.setattr(warnings, "simplefilter", lambda *args, **kwargs: changed.append(args))
     monkeypatch.setattr(warnings, "filterwarnings", lambda *args, **kwargs: changed.append(args))
-    values = Shared(tmp_path)
-    CALLS["compare_shapes"](values)
+    CALLS["compare_shapes"](shared)
     assert [args for args in changed if args[0] != "error"] == []

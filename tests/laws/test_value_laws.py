@@ -134,9 +134,8 @@ def arrays(entry: Any) -> Iterator[np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def values(shared: Shared) -> dict[str, Any]:
     """Return one value of each public class, by its name."""
-    shared = Shared(Path(tmp_path_factory.mktemp("values")))
     made = {name: make(shared) for name, make in MADE.items()}
     found: dict[str, Any] = {}
     for source in [*vars(shared).values(), *(CALLS[name](shared) for name in CALLED)]:

@@ -8,8 +8,6 @@ import eigenshape as es
 from eigenshape.matching.fusion import LEAST_SCORE, _meshes_of
 from eigenshape.matching.registration import Registration
 
-pytestmark = pytest.mark.long
-
 VIEWS = ([0, 0, 1], [0.6, 0, 1], [1, 0.1, 0.6])
 
 
@@ -48,6 +46,7 @@ def test_a_frame_is_placed_on_the_next(frames, motions, whole):
     assert there_and_back == pytest.approx(frames[0].vertices)
 
 
+@pytest.mark.long
 def test_motions_do_not_depend_on_unit_or_place(frames):
     small = [es.TriangleMesh(1e-6 * mesh.vertices + 3e-3, mesh.faces) for mesh in frames[:2]]
     one, two = es.matching.register_scans(*frames[:2]), es.matching.register_scans(*small)
@@ -85,6 +84,7 @@ def test_frames_become_one_surface_and_what_fits_nowhere_is_left_out(frames, mot
         assert np.median(gaps) < 0.02 * size
 
 
+@pytest.mark.long
 def test_one_scan_is_its_own_surface_and_none_is_refused(frames):
     fused = es.matching.fuse_scans(frames[:1])
     assert fused.joined.tolist() == [True]

@@ -9,8 +9,6 @@ from eigenshape.geometry.topology import submesh
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.target import prepare_target
 
-pytestmark = pytest.mark.long
-
 N_VERTICES = 800
 
 
@@ -67,6 +65,7 @@ def test_weights_and_corners_give_the_place_of_each_vertex(match, target):
     assert ((match.confidence >= 0) & (match.confidence <= 1)).all()
 
 
+@pytest.mark.long
 def test_the_same_input_gives_the_same_digits(match, target, cut):
     one, two = match, match_shapes(moved(cut.mesh), target.mesh)
     for name in ("vertices", "faces", "weights", "confidence"):
@@ -74,12 +73,14 @@ def test_the_same_input_gives_the_same_digits(match, target, cut):
     assert one.score == two.score
 
 
+@pytest.mark.long
 def test_a_part_whose_faces_look_inward_is_turned_over(target, cut):
     inward = es.TriangleMesh(cut.mesh.vertices, cut.mesh.faces[:, ::-1])
     match = match_shapes(inward, target)
     assert errors(match, target, cut.source_vertices).mean() < 5
 
 
+@pytest.mark.long
 def test_a_mirrored_part_of_a_shape_without_left_and_right_is_not_handed():
     bumps = es.shapes.grid(20, 20)
     match = match_shapes(bumps, bumps)
@@ -90,6 +91,7 @@ def test_an_animal_is_handed(match):
     assert match.handed
 
 
+@pytest.mark.long
 def test_each_piece_is_matched_by_itself(target):
     mesh = creature(0)
     low, high = np.quantile(mesh.vertices[:, 0], [0.45, 0.55])
@@ -113,11 +115,13 @@ def test_a_speck_beside_a_part_goes_where_its_neighbors_go_and_is_not_sure(targe
     assert np.array_equal(match.faces[n:], np.full(3, match.faces[0]))
 
 
+@pytest.mark.long
 def test_a_whole_in_another_pose_is_matched(target):
     match = match_shapes(creature(0), target)
     assert np.median(errors(match, target, np.arange(target.mesh.n_vertices))) < 3
 
 
+@pytest.mark.long
 def test_another_unit_of_length_is_given_or_found(target, cut):
     part = moved(cut.mesh, 40.0)
     given = match_shapes(part, target, scale=1 / 40)
@@ -127,6 +131,7 @@ def test_another_unit_of_length_is_given_or_found(target, cut):
     assert errors(found, target, cut.source_vertices).mean() < 8
 
 
+@pytest.mark.long
 def test_a_part_of_something_else_is_less_sure(match, target):
     chair = es.shapes.torus(40, 20)
     size = np.sqrt(es.geometry.surface_area(target.mesh) / es.geometry.surface_area(chair))
@@ -155,6 +160,7 @@ def test_sure_vertices_are_those_above_a_confidence(match):
     assert np.array_equal(match.sure(0.7), match.confidence >= 0.7)
 
 
+@pytest.mark.long
 def test_a_match_is_a_list_of_vertices_for_other_functions(match, target, cut):
     plan = es.stability.StabilityPlan(k=5, n_samples=100)
     one = es.compare_shapes(cut.mesh, target.mesh, plan, partners=match)
@@ -162,6 +168,7 @@ def test_a_match_is_a_list_of_vertices_for_other_functions(match, target, cut):
     assert one.closeness.displacement.max() == two.closeness.displacement.max()
 
 
+@pytest.mark.long
 def test_a_whole_of_two_pieces_is_matched_piece_by_piece(target):
     """An animal and a ring, matched to another pose of the animal and the same ring."""
     ring = es.shapes.torus(30, 15)
@@ -177,6 +184,7 @@ def test_a_whole_of_two_pieces_is_matched_piece_by_piece(target):
     assert "piece 0 of the part was placed on piece 0 of the whole" in match.report
 
 
+@pytest.mark.long
 def test_a_speck_beside_a_whole_is_left_out_by_name(target, cut):
     speck = es.TriangleMesh(1e-3 * np.eye(3), [[0, 1, 2]])
     whole = prepare_target(es.geometry.disjoint_union(speck, target.mesh))
@@ -188,12 +196,14 @@ def test_a_speck_beside_a_whole_is_left_out_by_name(target, cut):
     assert beside.report == whole.report
 
 
+@pytest.mark.long
 def test_a_whole_whose_faces_look_inward_gives_the_same_places(target, cut):
     inward = es.TriangleMesh(target.mesh.vertices, target.mesh.faces[:, ::-1])
     one, two = match_shapes(cut.mesh, target), match_shapes(cut.mesh, inward)
     assert np.allclose(one.pull(target.mesh.vertices), two.pull(target.mesh.vertices))
 
 
+@pytest.mark.long
 def test_a_surface_with_needles_is_matched_as_if_it_had_none(target, cut):
     """Smoothing shrinks faces at needles until no operator can be solved."""
     mesh = target.mesh
@@ -213,6 +223,7 @@ def test_a_surface_with_needles_is_matched_as_if_it_had_none(target, cut):
     assert np.median(np.linalg.norm(gaps, axis=1)) < 0.03 * unit
 
 
+@pytest.mark.long
 def test_another_individual_is_scaled_by_the_root_of_the_ratio_of_areas(target):
     match = match_shapes(moved(creature(0), 2.0), target)
     assert match.scale == pytest.approx(0.5, rel=0.05)
@@ -220,19 +231,21 @@ def test_another_individual_is_scaled_by_the_root_of_the_ratio_of_areas(target):
     assert np.median(errors(match, target, np.arange(N_VERTICES))) < 3
 
 
+@pytest.mark.long
 def test_a_part_in_another_unit_is_searched_for_by_itself(target, cut):
     match = match_shapes(moved(cut.mesh, 1000.0), target)
     assert match.scale == pytest.approx(1e-3, rel=0.15)
     assert "which fits best" in match.report[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("part", "whole"),
     [
         (es.icosphere(3), es.icosphere(3)),
         (es.shapes.torus(40, 20), es.shapes.torus(40, 20)),
         (es.shapes.fibonacci_sphere(1000), es.icosphere(3)),
-        pytest.param(es.icosphere(4), es.icosphere(4), marks=pytest.mark.long),
+        (es.icosphere(4), es.icosphere(4)),
     ],
     ids=["ball", "ring", "ball with other triangles", "large ball"],
 )
@@ -242,6 +255,7 @@ def test_a_shape_that_turns_into_itself_has_several_maps(part, whole):
     assert match.confidence.mean() < 0.3
 
 
+@pytest.mark.long
 def test_an_animal_has_one_map(match, target):
     assert match.n_equally_good == 1
     assert match_shapes(moved(target.mesh), target).n_equally_good == 1
@@ -252,6 +266,7 @@ def test_a_part_that_is_larger_than_the_whole_is_refused(target):
         match_shapes(moved(creature(0), 2.0), target, scale="known")
 
 
+@pytest.mark.long
 def test_a_part_whose_noise_adds_to_its_area_is_not_refused(target):
     """The area counts without the noise."""
     area = es.geometry.surface_area
@@ -279,6 +294,7 @@ def test_a_scale_that_is_none_is_refused(target, cut, scale):
         match_shapes(cut.mesh, target, scale=scale)
 
 
+@pytest.mark.long
 def test_progress_ends_at_one(target, cut):
     seen = []
     match_shapes(cut.mesh, target, progress=lambda share, _: seen.append(share))

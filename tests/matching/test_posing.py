@@ -7,8 +7,6 @@ from eigenshape.deformation.transfer import transfer_deformation
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.posing import take_pose
 
-pytestmark = pytest.mark.long
-
 
 def creature(pose):
     return es.make_creature("quadruped", pose, n_vertices=800)
@@ -30,6 +28,7 @@ def test_a_creature_takes_the_pose_of_itself():
     assert aligned_error(bent, posed) < 0.5 * aligned_error(rest, posed)
 
 
+@pytest.mark.long
 def test_a_match_that_is_known_is_taken():
     rest, posed = creature(0), creature(1)
     areas = [es.geometry.surface_area(mesh) for mesh in (rest, posed)]
@@ -38,6 +37,7 @@ def test_a_match_that_is_known_is_taken():
     assert np.allclose(one.vertices, two.vertices, atol=1e-6)
 
 
+@pytest.mark.long
 def test_a_match_of_another_mesh_is_refused():
     rest, posed = creature(0), creature(1)
     match = match_shapes(es.partial_scan(rest, [0, 0, 1]).mesh, posed)

@@ -51,6 +51,7 @@ def outward(mesh):
 
 
 @pytest.mark.long
+@pytest.mark.sweep
 @each_kind
 @pytest.mark.parametrize(("n_vertices", "individual"), [(500, 1), (N, 0), (2500, 0)])
 def test_the_skin_is_one_closed_sphere_that_faces_outward(kind, n_vertices, individual):

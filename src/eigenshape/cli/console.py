@@ -16,6 +16,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from eigenshape._progress import Callback
 from eigenshape._text import printable
 
 out = Console(highlight=False, soft_wrap=True)
@@ -142,7 +143,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
 
 def batch_reporter(
     progress: Callable[[float, str], None],
-) -> Callable[[int, int, str, str | None], None]:
+) -> Callback:
     """Return what a batch calls after each file: it moves the bar, and names a file that failed."""
 
     def report(n_done: int, n_items: int, name: str, error: str | None) -> None:

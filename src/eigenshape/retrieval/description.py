@@ -1,8 +1,7 @@
 """Describe a mesh by any recipe, to search an index or to be kept in one."""
 
-from typing import SupportsIndex
-
 from eigenshape._arguments import require_type
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
@@ -57,7 +56,7 @@ def describe(mesh: MeshLike, recipe: AnyRecipe | None = None) -> Descriptor:
 
 
 def describe_to_store(
-    mesh: TriangleMesh, recipe: AnyRecipe, n_views: SupportsIndex | None = None
+    mesh: TriangleMesh, recipe: AnyRecipe, n_views: Integer | None = None
 ) -> list[Descriptor]:
     """Describe a mesh as an index keeps it: the whole, and what viewpoints see if it is closed."""
     kind = kind_of(recipe)

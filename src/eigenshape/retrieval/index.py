@@ -6,12 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shutil import rmtree
-from typing import Any, SupportsIndex
+from typing import Any
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import StoreError
 from eigenshape._files import as_path
 from eigenshape._text import html_repr
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.description import describe_to_store
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
@@ -276,7 +277,7 @@ class ShapeIndex:
         tags: Sequence[str] = (),
         attributes: Mapping[str, Any] | None = None,
         recipe: AnyRecipe | None = None,
-        n_views: SupportsIndex | None = None,
+        n_views: Integer | None = None,
         replace: bool = False,
     ) -> None:
         """Describe a mesh and add it to the index, with a small picture.
@@ -428,7 +429,7 @@ class ShapeIndex:
         self,
         shape: MeshLike | Descriptor,
         *,
-        n_matches: SupportsIndex = 5,
+        n_matches: Integer = 5,
         where: Mapping[str, Any] | None = None,
         without: str | None = None,
         exact: bool = False,

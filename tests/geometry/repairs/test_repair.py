@@ -305,10 +305,14 @@ def test_specks_and_holes_are_suggested_up_to_a_share_of_the_area():
     assert suggest_repairs(grid(4, 4)) == ()
 
 
-def test_a_face_without_area_leaves_no_slit():
-    # The middle vertex 3 lies on the edge (0, 1); the face below is split there.
+@pytest.mark.parametrize(
+    ("more", "removed"), [([], "1 face"), ([[0, 0, 1]], "2 faces")], ids=["alone", "twice"]
+)
+def test_a_face_without_area_leaves_no_slit(more, removed):
+    # The middle vertex 3 lies on the edge (0, 1); the face below is split there. A face with a
+    # vertex twice, on the same edge, changes nothing.
     points = [[0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0]]
-    mesh = TriangleMesh(points, [[0, 3, 2], [3, 1, 2], [0, 1, 3], [1, 0, 4]])
+    mesh = TriangleMesh(points, [[0, 3, 2], [3, 1, 2], [0, 1, 3], [1, 0, 4], *more])
     done = drop_degenerate(mesh)
     assert sorted(map(sorted, done.mesh.faces.tolist())) == [
         [0, 2, 3],
@@ -318,7 +322,9 @@ def test_a_face_without_area_leaves_no_slit():
     ]
     assert inconsistent_edges(done.mesh).size == 0
     assert len(boundary_edges(done.mesh)) == 4
-    report = "drop_degenerate removed 1 face without area, and split 1 neighbor at their vertices"
+    report = (
+        f"drop_degenerate removed {removed} without area, and split 1 neighbor at their vertices"
+    )
     assert done.report == (report,)
 
 

@@ -53,6 +53,7 @@ def sphere_error(points, **options):
 THESIS = {"edge_factor": 2, "correct": None, "form": "literal"}
 
 
+@pytest.mark.long
 def test_the_defaults_are_more_accurate_than_the_thesis_form():
     even = fibonacci_sphere(1500).vertices
     random = random_sphere(1500, rng=np.random.default_rng(1)).vertices

@@ -170,6 +170,7 @@ def test_vertices_are_sorted_by_distance_and_equals_by_index():
         np.testing.assert_array_equal(order[:total], expected)
 
 
+@pytest.mark.long
 def test_a_large_surface_is_described_by_a_thin_one(monkeypatch):
     coarse = es.make_creature("giraffe", n_vertices=2000)
     fine = es.geometry.subdivide(es.geometry.subdivide(coarse))  # 32,000 vertices

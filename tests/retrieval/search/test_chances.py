@@ -55,3 +55,16 @@ def test_classes_are_not_known_for_heat():
         es.InvalidParameterError, match="known for patches; 'fish' was found by heat"
     ):
         index.query(heat).classify()
+
+
+def test_matches_by_patches_carry_the_chance_of_their_score():
+    index, recipe = es.ShapeIndex.create(None), es.retrieval.PatchRecipe()
+    for name, mesh in {"ball": es.icosphere(2), "ring": es.shapes.torus(24, 12)}.items():
+        patches = es.retrieval.extract_patches(mesh, n_samples=40, n_views=0)
+        query = es.retrieval.patch_descriptor(patches, recipe)
+        index.add_many([es.retrieval.DescribedShape(name, [query])])
+    found = index.query(query)
+    assert [match.name for match in found] == ["ring", "ball"]
+    scores = np.array([match.score for match in found])
+    assert [match.chance for match in found] == pytest.approx(chances(scores))
+    assert found[0].chance < found[1].chance

@@ -109,6 +109,7 @@ def annulus(n_rings, n_around, inner=0.4):
 
 
 @pytest.mark.long
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("mesh", "boundary", "characteristic", "whole"),
     [

@@ -205,6 +205,7 @@ def test_what_is_refused():
 
 @pytest.mark.data
 @pytest.mark.long
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", ["dragon", "armadillo"])
 def test_scans(data, name):
     path = next((data / "classics").glob(f"{name}.*"))

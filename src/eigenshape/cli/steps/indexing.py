@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from eigenshape._errors import InvalidParameterError, MissingExtraError
+from eigenshape._progress import Callback
 from eigenshape._threads import thread_count
 from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, err, progress_bar
@@ -14,7 +15,6 @@ from eigenshape.cli.inputs import memory_bytes
 from eigenshape.io.surfaces import read_surface
 from eigenshape.retrieval.building.batch import (
     BatchReport,
-    Callback,
     announce_learning,
     build_index,
     read_stage,

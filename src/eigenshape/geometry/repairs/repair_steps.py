@@ -124,6 +124,11 @@ def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     An edge is left alone if it does not have exactly two faces, if the edge (m, d) exists already,
     or if the flip would create another face without area, as where m coincides with a.
     """
+    # A face that has a vertex twice touches an edge twice, so that it closes nothing; with it the
+    # edge would have three faces, and would be left alone.
+    folded = (mesh.faces == np.roll(mesh.faces, 1, axis=1)).any(axis=1)
+    if folded.any() and not folded.all():
+        mesh = TriangleMesh(mesh.vertices, mesh.faces[~folded])
     n_flips = 0
     while True:
         table = edge_table(mesh)

@@ -10,13 +10,14 @@ from hashlib import file_digest, sha256
 from itertools import chain
 from pathlib import Path
 from time import monotonic, time
-from typing import SupportsIndex
 
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
+from eigenshape._progress import Callback
 from eigenshape._text import html_repr, short_repr
+from eigenshape._typing import Integer
 from eigenshape._workers import Item as Item  # noqa: PLC0414 - the room lists it from here
 from eigenshape._workers import Outcome, run_in_workers
 from eigenshape._workers import Workers as Workers  # noqa: PLC0414 - and this
@@ -42,7 +43,6 @@ from eigenshape.scans.partial import view_number
 Recipes = TypeAliasType("Recipes", Sequence[AnyRecipe])
 Read = TypeAliasType("Read", Callable[[Path], MeshLike | RepairedMesh[TriangleMesh]])
 ReadRepaired = Callable[[Path], tuple[TriangleMesh, tuple[str, ...]]]
-Callback = TypeAliasType("Callback", Callable[[int, int, str, str | None], None])
 # Shapes that a codebook is learned from. A hundred closed ones have 45,000 patches for its 32
 # Gaussians, and take some minutes; fewer than 40 leave it to the codebook of the library.
 FEWEST_TO_TRAIN, MOST_TO_TRAIN = 40, 100
@@ -114,7 +114,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     recipes: Recipes | None = None,
     learn: bool = False,
     repairs: Sequence[str] = (),
-    n_views: SupportsIndex | None = None,
+    n_views: Integer | None = None,
     workers: Workers = Workers(),
     callback: Callback | None = None,
 ) -> BatchReport:

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from threading import RLock
 from types import TracebackType
-from typing import Any, SupportsIndex
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -14,6 +14,7 @@ from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._text import html_repr
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe
@@ -155,7 +156,7 @@ class IndexReader:
         self,
         shape: MeshLike | Descriptor,
         *,
-        n_matches: SupportsIndex = 5,
+        n_matches: Integer = 5,
         where: Mapping[str, Any] | None = None,
         without: str | None = None,
         exact: bool = False,

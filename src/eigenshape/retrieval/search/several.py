@@ -6,13 +6,14 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, SupportsIndex
+from typing import Any
 
 import numpy as np
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import Descriptor, kind_of
 from eigenshape.retrieval.patches.verification import N_VERIFIED
@@ -29,7 +30,7 @@ def query_indexes(
     shape: MeshLike | Descriptor,
     folders: Sequence[str | PathLike[str]],
     *,
-    n_matches: SupportsIndex = 5,
+    n_matches: Integer = 5,
     where: Mapping[str, Any] | None = None,
     exact: bool = False,
     executor: Executor | None = None,

@@ -280,10 +280,7 @@ class IndexState:
         return bytes(row[1])
 
     def snapshot(self, recipe: AnyRecipe) -> "Snapshot":
-        """Return all descriptors by a recipe.
-
-        Raise StoreError if there are none.
-        """
+        """Return all descriptors by a recipe; raise StoreError if there are none."""
         rows = self.descriptors
         numbers = [number for number, other in self.recipes.items() if other == recipe]
         mask = np.isin(rows["recipe"], numbers)
@@ -370,10 +367,7 @@ class Snapshot:
         return found
 
     def descriptor(self, place: int) -> Descriptor:
-        """Return the descriptor of a place, checked.
-
-        Raise DamagedEntryError if it is damaged.
-        """
+        """Return the descriptor of a place, checked; raise DamagedEntryError if it is damaged."""
         (stored,) = self.state.stored([int(self.columns["id"][place])])
         return stored.restored()
 

@@ -220,7 +220,7 @@ class Writer:
         One of the same name and digest gains the recipes that it lacks. It is written anew if it is
         damaged: what has the same digest is the same.
 
-        Raise StoreError if the name is in the index with another digest and `replace` is False;
+        Raise StoreError if the name is in the index with another digest and `replace` is False, and
         InvalidParameterError if rows are longer or shorter than those of others by the same recipe.
         """
         old = self.find(shape.name)
