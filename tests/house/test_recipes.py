@@ -17,7 +17,8 @@ from eigenshape.cli import app
 from eigenshape.cli.verbs import INDEX_VERBS, VERBS, load_verb
 
 ROOT = Path(__file__).resolve().parents[2]
-RECIPES = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("## Recipes\n")[1]
+RECIPES = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("\n## Recipes\n")[1]
+RECIPES = RECIPES.split("\n## ")[0]
 KINDS = {
     es.TriangleMesh: "triangles",
     es.SimplicialMesh: "simplices",
@@ -95,7 +96,7 @@ def test_an_operator_is_tested_by_its_entry(halved):
 
 
 def test_an_operator_is_documented_by_its_entry(halved):
-    assert missing_rows() == ["| `halved` | triangles | `share` | half of the energy |"]
+    assert "| `halved` | triangles | `share` | half of the energy |" in missing_rows()
 
 
 # A default.
@@ -118,7 +119,12 @@ EVERYWHERE = {
     "view": (es.figure_field, "view"),
     "up": (es.figure_field, "up"),
 }
-# Options that no function has: what a verb is told in words, and what belongs to a server.
+# Functions that share a default of one argument.
+SHARED = {
+    "mode": (es.deform, es.deformation.bend, es.DeformationSession),
+    "n_matches": (es.ShapeIndex.query, es.retrieval.IndexReader.query, es.retrieval.query_indexes),
+}
+# Options that no function has: what a verb is given in words, and what belongs to a server.
 OF_THE_COMMAND_LINE = {
     "demo kind",
     "demo output",
@@ -147,6 +153,17 @@ def test_a_default_of_a_verb_is_that_of_the_library(verb):
             continue  # what is not given is left to the library; repairs of a verb have a name
         name = f"{verb} {option.name}"
         if name not in OF_THE_COMMAND_LINE:
-            function, argument = DEFAULTS.get(name) or EVERYWHERE[option.name]
+            place = DEFAULTS.get(name) or EVERYWHERE.get(option.name)
+            assert place, f"{name} has a default: name it in DEFAULTS or OF_THE_COMMAND_LINE."
+            function, argument = place
             default = inspect.signature(function).parameters[argument].default
             assert option.default == default, f"{name}; {function.__name__} has {default}"
+
+
+@pytest.mark.parametrize("argument", SHARED)
+def test_functions_that_share_an_argument_share_its_default(argument):
+    defaults = {
+        function.__qualname__: inspect.signature(function).parameters[argument].default
+        for function in SHARED[argument]
+    }
+    assert len(set(defaults.values())) == 1, defaults

@@ -24,8 +24,13 @@ from eigenshape.cli.inputs import SHARED_PARAMETERS, option_spellings, read_para
 
 # In the order in which help lists them. What each does is the first line of its docstring.
 VERBS = (
-    "info", "repair", "decimate", "spectrum", "operators", "features", "segment", "label", "match", "deform", "pose",
-    "stability", "index", "query", "fuse", "compress", "decompress", "studio", "serve", "report", "warm-up", "demo",
+    "info", "repair", "decimate",
+    "spectrum", "operators",
+    "features", "segment", "label",
+    "match", "deform", "pose", "stability",
+    "index", "query",
+    "fuse", "compress", "decompress",
+    "studio", "serve", "report", "warm-up", "demo",
 )  # fmt: skip
 INDEX_VERBS = (
     "add", "ls", "rm", "stats", "verify", "compact", "export", "merge", "convert", "duplicates", "learn",
