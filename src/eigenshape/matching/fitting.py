@@ -47,8 +47,10 @@ TINY = np.finfo(float).tiny
 class FitPlan:
     """What fits of one part on one whole share: samples, frames and the whole as a tree.
 
-    `frames` are vertices of the part, its first points. Row v of `carriers` holds the frames that
-    carry vertex v, and `portions` how far. Edges go from frame `one` to `two`, both ways. `arms` are
+    `frames` are vertices of the part, its first points, which turn and move; `samples` are vertices
+    that are pulled onto the whole, each by its share `pull` of their area. Row v of `carriers` holds the frames that
+    carry vertex v, and `portions` how far. Edges go from frame `one` to `two`, both ways, and `graph`
+    is their Laplacian, by which frames hold each other. `arms` are
     from frames to the samples that they carry, and `links` along edges, both before bending.
     Gaps are measured at the vertices `compared`, each of which stands for a share of the area.
     """

@@ -128,8 +128,10 @@ def grow_maps(plan: FitPlan, differences: Float[np.ndarray, "m k"]) -> list[Fitt
     def fit_roughly(pairs: Pairs) -> Fit:
         return fit_part(rough, place_points(part, whole, pairs, rough.frames)[0])
 
+    # Step 3 of `match_shapes`: assignments of far points, and those whose rough bends fit best
     fits = map_in_threads(fit_roughly, assign_far_points(part, whole, costs))
     fits = sorted(fits, key=lambda fit: fit.misfit)[:N_GROWN]
+    # Steps 4 and 5: grow all starts and bend the part by each; then once more from the best
     starts = grow_starts(part, whole, costs) + _grow_again(plan, costs, fits)
     maps = _fit_pairs(plan, starts)
     best = [one.fit.select(part.points) for one in maps[:N_GROWN_AGAIN]]

@@ -237,13 +237,15 @@ def _match_pieces(
 
 
 def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piece:
-    """Match a connected part to a connected whole."""
+    """Match a connected part to a connected whole; the steps are those of `match_shapes`."""
+    # Step 1: describe the part, and turn it over if it supports the whole better inside out.
     whole = target.surface
     part = describe_surface(copy.mesh, target.unit / factor, N_PART)
     upright, turned = (first_support(part, whole, turned=side) for side in (False, True))
     handed = min(upright, turned) < AS_HANDED * max(upright, turned)
     if handed and turned > upright and outward_vote(part.mesh) < CLEAR_VOTE:
         part = turn_over(part)
+    # Steps 2 to 5: pairs that support each other, starts, bends
     differences = patch_differences(part, whole)
     modes = modes_of_part(part.mesh, target.modes)
     plan = plan_fit(part, whole)
@@ -252,6 +254,7 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
         best = maps[0]
         quality = rate_map(part, whole, differences, best.pairs, best.fit.places)
         evidence = vertex_evidence(part, whole, differences, maps, quality)
+        # Step 6: make the best map smooth.
         faces, weights = refine_places(modes, target.modes, whole.mesh, best.fit.places)
         n_equally_good, n_places = equally_good_maps(plan, differences, maps)
         # Each of several equally good places is as likely as the others.

@@ -681,6 +681,6 @@ def _records(state: IndexState, chosen: set[int] | None = None) -> list[Record]:
     for facts in state.every():
         if chosen is None or facts.id in chosen:
             by = tuple(state.recipes[number] for number in sorted(used.get(facts.id, ())))
-            told = (facts.name, facts.label, facts.source, facts.digest)
-            records.append(Record(*told, *tags_and_attributes(facts), by))
+            texts = (facts.name, facts.label, facts.source, facts.digest)
+            records.append(Record(*texts, *tags_and_attributes(facts), by))
     return sorted(records, key=lambda record: record.name)

@@ -228,7 +228,7 @@ class IndexReader:
             Whether scores are scaled by how isolated each shape is; otherwise they depend on the two
             shapes alone.
         """
-        while True:
+        while True:  # again without what turns out to be damaged
             try:
                 scan = self._scan(state, descriptor.recipe)
                 snapshot = scan.snapshot
@@ -243,7 +243,7 @@ class IndexReader:
                     supplier = None
                     is_large = snapshot.n_shapes > FEWEST_TO_SCAN
                     if self._engine is not None and is_large and not exact:
-                        scan.coarse(descriptor.recipe)
+                        scan.coarse(descriptor.recipe)  # which makes the engine at the first query
                         supplier = scan.supplier
                     candidates = choose_candidates(
                         descriptor,

@@ -1,1 +1,1 @@
-"""The index on disk, and the workers that fill it."""
+"""The index on disk: one SQLite file, what it holds, and how that is changed."""

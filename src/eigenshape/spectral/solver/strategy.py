@@ -61,9 +61,10 @@ def solve_lowest(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certi
     Raises an InvalidParameterError if the memory is too small, and a ConvergenceError if no method
     converges.
     """
-    if not pencil.labels.any():
+    if not pencil.labels.any():  # one connected part, whose label is 0
         return _solve_connected(pencil, k, report)
 
+    # Each part is solved by itself, and one factor counts the eigenvalues of them all.
     require_memory_for_pairs(pencil, k)
     fallbacks: list[str] = []
 
@@ -74,13 +75,14 @@ def solve_lowest(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certi
 
     found = solve_parts(pencil, k, DENSE_POINTS, solve, report)
     report(0.9, "counting eigenvalues")
-    pairs, certificate = _complete(pencil, found)
+    pairs, certificate = _prove_complete(pencil, found)
     return pairs, replace(certificate, fallbacks=tuple(dict.fromkeys(fallbacks)))
 
 
 def _solve_connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     if dense_serves(pencil, k):
         return _solve_dense(pencil, k, report)
+    # Methods, the fastest first. If one does not converge, the next is tried, and the certificate names it.
     methods: list[tuple[str, Solve]] = []
     filled = pencil.stiffness.nnz >= FILTER_ENTRIES * pencil.n
     if filled and pencil.mass_floor == 1.0 and k <= ONE_SHIFT_PAIRS:
@@ -118,10 +120,10 @@ def _solve_dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certi
     _, vectors = sl.eigh(stiffness, mass)
     pairs = lowest_pairs(pencil, vectors[:, :k] / roots[:, None], k)
     report(0.8, "counting eigenvalues")
-    return _complete(pencil, pairs)
+    return _prove_complete(pencil, pairs)
 
 
-def _complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
+def _prove_complete(pencil: Pencil, pairs: Pairs) -> tuple[Pairs, Certificate]:
     certificate = prove(pencil, pairs)
     if not certificate.complete:
         raise ConvergenceError(in_user_units(pencil, certificate).explain())
