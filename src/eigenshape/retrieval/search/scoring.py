@@ -58,6 +58,7 @@ def search_candidates(
     parts = np.split(places, np.flatnonzero(np.diff(np.cumsum(sizes) // BYTES_AT_ONCE)) + 1)
     found = [kind.scores(query, snapshot.rows_of(some), isolations[some]) for some in parts]
     distances = np.concatenate(found)
+    # Only damaged rows have no finite distance; reading such a descriptor raises the error.
     for bad in places[~np.isfinite(distances)].tolist():
         snapshot.descriptor(bad)
     scores = kind.verify(query, lambda number: snapshot.descriptor(int(places[number])), distances)

@@ -337,6 +337,7 @@ class Writer:
         """
         numbers = [number for number, other in self.state.recipes.items() if other == recipe]
         number = numbers[0] if numbers else len(self._n_columns) + 1
+        # None if the recipe is new, and 0 if it was kept before any shape was described by it
         known = self._n_columns.get(number)
         if known and n_columns:
             require_columns(recipe, n_columns, known)
