@@ -68,5 +68,7 @@ def draw_bend(path: Path, n_vertices: int) -> None:
 
 
 if __name__ == "__main__":
-    for drawn in main(Path(sys.argv[1])):
+    target = Path(sys.argv[1])
+    target.mkdir(parents=True, exist_ok=True)
+    for drawn in main(target):
         print(drawn)
