@@ -19,7 +19,6 @@ from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import scaled_corners
-from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.operators.directions import require_oriented_manifold
@@ -144,7 +143,24 @@ def decompose_field(
     require_rim(boundary)
     require_sound(mesh)
     require_oriented_manifold(mesh)
-    field = _as_tangent_vectors(mesh, vectors)
+    field = real_numbers(vectors, "vectors").astype(np.float64)
+    if field.shape != (mesh.n_faces, 3):
+        raise InvalidParameterError(
+            f"vectors must hold one vector per face, shape ({mesh.n_faces}, 3); the shape is "
+            f"{field.shape}."
+        )
+    require_finite_rows(field, "vectors", "face")
+    normals, _ = _normals_and_areas(mesh)
+    along = np.einsum("fd,fd->f", field, normals)
+    bad = np.flatnonzero(np.abs(along) > TANGENT * np.linalg.norm(field, axis=1))
+    if bad.size:
+        raise InvalidParameterError(
+            f"vectors must be tangent to their faces; that of face {bad[0]} has the part "
+            f"{along[bad[0]]:.4g} along the normal ({bad.size} such). Subtract "
+            "(vectors * normals).sum(axis=1)[:, None] * normals, with normals = "
+            "es.geometry.face_normals(mesh)."
+        )
+    field = field - along[:, None] * normals  # what rounding leaves along the normal
     exact, coexact, potential, stream = _split_field(mesh, field[:, :, None], boundary)
     exact, coexact = exact[:, :, 0], coexact[:, :, 0]
     harmonic = field - exact - coexact
@@ -208,7 +224,7 @@ def harmonic_fields(
     weighted = (fields * np.sqrt(areas)[:, None, None]).reshape(3 * mesh.n_faces, -1)
     basis, _, _ = np.linalg.svd(weighted, full_matrices=False)
     found = basis[:, :dimension].T.reshape(dimension, mesh.n_faces, 3)
-    return found / np.sqrt(areas)[:, None] / _scale(mesh)
+    return found / np.sqrt(areas)[:, None] / scaled_corners(mesh)[1]
 
 
 def require_rim(boundary: str) -> None:
@@ -217,32 +233,6 @@ def require_rim(boundary: str) -> None:
         raise InvalidParameterError(
             f"boundary must be 'tangential' or 'normal'; it is {boundary!r}."
         )
-
-
-def _as_tangent_vectors(mesh: TriangleMesh, vectors: ArrayLike) -> Float[np.ndarray, "f 3"]:
-    """Return one tangent vector per face, without what rounding leaves along the normal."""
-    field = real_numbers(vectors, "vectors").astype(np.float64)
-    if field.shape != (mesh.n_faces, 3):
-        raise InvalidParameterError(
-            f"vectors must hold one vector per face, shape ({mesh.n_faces}, 3); the shape is "
-            f"{field.shape}."
-        )
-    require_finite_rows(field, "vectors", "face")
-    normals, _ = _normals_and_areas(mesh)
-    along = np.einsum("fd,fd->f", field, normals)
-    bad = np.flatnonzero(np.abs(along) > TANGENT * np.linalg.norm(field, axis=1))
-    if bad.size:
-        raise InvalidParameterError(
-            f"vectors must be tangent to their faces; that of face {bad[0]} has the part "
-            f"{along[bad[0]]:.4g} along the normal ({bad.size} such). Subtract "
-            "(vectors * normals).sum(axis=1)[:, None] * normals, with normals = "
-            "es.geometry.face_normals(mesh)."
-        )
-    return field - along[:, None] * normals
-
-
-def _scale(mesh: Mesh) -> float:
-    return scaled_corners(mesh)[1]
 
 
 def _normals_and_areas(
