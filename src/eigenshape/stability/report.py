@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, positive_values, whole_number, whole_numbers
@@ -13,10 +13,9 @@ from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
-from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.clouds.kernel import neighbor_distance
-from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
+from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.comparison.eigenvalues import SpectrumComparison, compare_spectra
 from eigenshape.spectral.solve import solve_spectrum
@@ -107,19 +106,34 @@ class StabilityReport(ReadOnly):
 
     def explain(self) -> str:
         """Describe the results in plain words, in one paragraph each."""
-        where = (
-            "from vertex to vertex"
-            if self.closeness
-            else f"between {self.n_samples} matched points of each"
-        )
-        lines = [self.spectra.explain(), self._explain_distance()]
+        lines = [
+            self.spectra.explain(),
+            f"In space, each point of one shape is within {self.distance:.3g} of the other. The "
+            f"best one-to-one correspondence of {self.n_samples} random points of each moves them "
+            f"by up to {self.matching_distance:.3g}; for two such samples of the first shape it is "
+            f"{self.sampling_distance:.3g}.",
+        ]
+        where = f"between {self.n_samples} matched points of each"
         if self.closeness:
             lines.append(self.closeness.explain())
-        lines += [
-            self.times.explain(),
-            self._explain_changes(),
-            f"Eigenspaces, {where}: {self.angles.explain()}",
-        ]
+            where = "from vertex to vertex"
+        lines.append(self.times.explain())
+        significant = [change for change in self.changes if change.significant]
+        if significant:
+            clearest = max(significant, key=lambda change: change.change / change.floor)
+            lines.append(
+                "Graph Laplacians of such samples distinguish the shapes at "
+                f"{len(significant)} of {len(self.changes)} heat times, most clearly at "
+                f"t = {clearest.t:.3g}: eigenvalues change by up to {clearest.change:.3g} of the "
+                f"last, those of two samples of the first shape by {clearest.floor:.3g}, and "
+                f"Weyl's bound is {clearest.weyl:.3g}."
+            )
+        else:
+            lines.append(
+                "Graph Laplacians of such samples do not distinguish the shapes at any heat time: "
+                "sampling alone changes them as much."
+            )
+        lines.append(f"Eigenspaces, {where}: {self.angles.explain()}")
         if not self.closeness and self.times.low_reason == "closeness":
             lines.append(
                 "Points were matched by their places in space, which says little about one shape "
@@ -127,30 +141,6 @@ class StabilityReport(ReadOnly):
                 "only."
             )
         return "\n\n".join(lines)
-
-    def _explain_distance(self) -> str:
-        return (
-            f"In space, each point of one shape is within {self.distance:.3g} of the other. The "
-            f"best one-to-one correspondence of {self.n_samples} random points of each moves them "
-            f"by up to {self.matching_distance:.3g}; for two such samples of the first shape it is "
-            f"{self.sampling_distance:.3g}."
-        )
-
-    def _explain_changes(self) -> str:
-        significant = [change for change in self.changes if change.significant]
-        if not significant:
-            return (
-                "Graph Laplacians of such samples do not distinguish the shapes at any heat time: "
-                "sampling alone changes them as much."
-            )
-        clearest = max(significant, key=lambda change: change.change / change.floor)
-        return (
-            "Graph Laplacians of such samples distinguish the shapes at "
-            f"{len(significant)} of {len(self.changes)} heat times, most clearly at "
-            f"t = {clearest.t:.3g}: eigenvalues change by up to {clearest.change:.3g} of the last, "
-            f"those of two samples of the first shape by {clearest.floor:.3g}, and Weyl's bound is "
-            f"{clearest.weyl:.3g}."
-        )
 
 
 def compare_shapes(
@@ -217,13 +207,30 @@ def compare_shapes(
     require_type(plan, StabilityPlan | None, "plan")
     chosen = plan or StabilityPlan()
     report_progress = progress or silent
-    meshes = _meshes(one, two, chosen, partners)
+    meshes, images = None, None
+    if not isinstance(one, PointCloud) and not isinstance(two, PointCloud):
+        meshes = one, two
+    elif chosen.brackets or partners is not None:
+        raise InvalidParameterError(
+            f"brackets and partners are for meshes; the shapes are {one!r} and {two!r}."
+        )
     n_samples, k = _check_plan(chosen, one, two)
-    images = _find_partners(*meshes, partners) if meshes else None
+    # The point of the second mesh for each point of the first; None if unknown.
+    if partners is not None:
+        images = whole_numbers(partners, "partners", 0, two.n_points - 1)
+        if len(images) != one.n_points:
+            raise InvalidParameterError(
+                "partners must have one entry per point of the first mesh; "
+                f"there are {len(images)} for {one.n_points}."
+            )
+    elif meshes and np.array_equal(meshes[0].simplices, meshes[1].simplices):
+        images = np.arange(one.n_points) if one.n_points == two.n_points else None
     report_progress(0.0, "spectra")
     laplacians = [build_laplacian(shape) for shape in (one, two)]
     spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
-    brackets = _brackets(*meshes, k) if meshes and chosen.brackets else None
+    brackets = None
+    if meshes and chosen.brackets:
+        brackets = (bracket_eigenvalues(meshes[0], k), bracket_eigenvalues(meshes[1], k))
     report_progress(0.3, "matching points")
     rng = np.random.default_rng(chosen.seed)
     samples = matched_samples(one, two, n_samples, rng)
@@ -289,36 +296,3 @@ def _check_plan(plan: StabilityPlan, one: Shape, two: Shape) -> tuple[int, int]:
     most = min(n_samples, len(one.points), len(two.points)) - 1
     k = min(USUAL_K, max(most, 2)) if plan.k is None else plan.k
     return n_samples, whole_number(k, "k", 2, most)
-
-
-def _meshes(
-    one: Shape, two: Shape, plan: StabilityPlan, partners: ArrayLike | None
-) -> tuple[Mesh, Mesh] | None:
-    if not isinstance(one, PointCloud) and not isinstance(two, PointCloud):
-        return one, two
-    if plan.brackets or partners is not None:
-        raise InvalidParameterError(
-            f"brackets and partners are for meshes; the shapes are {one!r} and {two!r}."
-        )
-    return None
-
-
-def _find_partners(
-    one: Mesh, two: Mesh, partners: ArrayLike | None
-) -> Int[np.ndarray, " n"] | None:
-    """Return, for each point of the first mesh, the point of the second; None if unknown."""
-    n = one.n_points
-    if partners is None:
-        same = n == two.n_points and np.array_equal(one.simplices, two.simplices)
-        return np.arange(n) if same else None
-    found = whole_numbers(partners, "partners", 0, two.n_points - 1)
-    if len(found) != n:
-        raise InvalidParameterError(
-            "partners must have one entry per point of the first mesh; "
-            f"there are {len(found)} for {n}."
-        )
-    return found
-
-
-def _brackets(one: Mesh, two: Mesh, k: int) -> tuple[Brackets, Brackets]:
-    return bracket_eigenvalues(one, k), bracket_eigenvalues(two, k)
