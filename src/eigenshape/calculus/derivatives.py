@@ -4,7 +4,7 @@ from typing import overload
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from eigenshape._arrays import point_functions, simplex_vectors
 from eigenshape._errors import InvalidShapeError
@@ -146,7 +146,9 @@ def divergence(
     if vectors is None:
         return _point_rows(mesh, -weighted)
     field = simplex_vectors(vectors, "vectors", len(mesh.simplices), mesh.points.shape[1])
-    return _sum_at_points(mesh, -np.einsum("sad,sd...->sa...", weighted, field))
+    return sum_at_nodes(
+        mesh.simplices, mesh.n_points, -np.einsum("sad,sd...->sa...", weighted, field)
+    )
 
 
 @overload
@@ -230,7 +232,7 @@ def curl(
         return _point_rows(mesh, weights)
     field = simplex_vectors(vectors, "vectors", len(mesh.simplices), ambient)
     rule = "sad,sd...->sa..." if weights.ndim == 3 else "said,sd...->sai..."
-    return _sum_at_points(mesh, np.einsum(rule, weights, field))
+    return sum_at_nodes(mesh.simplices, mesh.n_points, np.einsum(rule, weights, field))
 
 
 def _gradients(
@@ -260,13 +262,10 @@ def _point_rows(mesh: Mesh, weights: Float[np.ndarray, "s corners ..."]) -> sp.c
     return sp.coo_array((entries.ravel(), places), shape=shape).tocsr()
 
 
-def _sum_at_points(
-    mesh: Mesh, shares: Float[np.ndarray, "s corners ..."]
+def sum_at_nodes(
+    nodes: Int[np.ndarray, "s corners"], n: int, shares: Float[np.ndarray, "s corners ..."]
 ) -> Float[np.ndarray, "n ..."]:
-    """Add the shares of all corners at their points."""
-    columns = shares.reshape(mesh.simplices.size, -1)
-    sums = [
-        np.bincount(mesh.simplices.ravel(), weights=column, minlength=mesh.n_points)
-        for column in columns.T
-    ]
-    return np.stack(sums, axis=1).reshape(mesh.n_points, *shares.shape[2:])
+    """Add the shares of all corners at their nodes."""
+    columns = shares.reshape(nodes.size, -1).T
+    sums = [np.bincount(nodes.ravel(), weights=column, minlength=n) for column in columns]
+    return np.stack(sums, axis=1).reshape(n, *shares.shape[2:])

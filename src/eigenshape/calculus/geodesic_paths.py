@@ -163,11 +163,21 @@ def _strip_along(sides: Sides, path: list[int]) -> list[int]:
     strip: list[int] = []
     is_left: bool | None = None
     for before, vertex, after in zip(path[:-2], path[1:-1], path[2:], strict=True):
-        fans = [
-            fan
-            for fan in (_fan(sides, before, vertex, after, left) for left in (True, False))
-            if fan
-        ]
+        # Walk around the vertex on either side, and list what is crossed up to the next edge.
+        fans: list[tuple[float, bool, list[int]]] = []
+        for left in (True, False):
+            step = next_side if left else previous_side
+            side = sides.of_edge.get((before, vertex) if left else (vertex, before), -1)
+            crossed: list[int] = []
+            angle = 0.0
+            while side >= 0 and len(crossed) <= len(sides.tails):
+                out = step(side)
+                angle += float(sides.angles[out if left else side])
+                if (sides.heads[out] if left else sides.tails[out]) == after:
+                    fans.append((angle, left, crossed))
+                    break
+                crossed.append(out)
+                side = int(sides.twins[out])
         _, now_left, fan = min(fans, key=lambda found: found[0])
         if is_left is not None and is_left != now_left:
             # From the left of the edge to its right, or back.
@@ -176,26 +186,6 @@ def _strip_along(sides: Sides, path: list[int]) -> list[int]:
         strip += fan
         is_left = now_left
     return strip
-
-
-def _fan(
-    sides: Sides, before: int, vertex: int, after: int, left: bool
-) -> tuple[float, bool, list[int]] | None:
-    """Walk around a vertex on one side of a path; return angle, side and what is crossed."""
-    step = next_side if left else previous_side
-    side = sides.of_edge.get((before, vertex) if left else (vertex, before), -1)
-    crossed: list[int] = []
-    angle = 0.0
-    while side >= 0:
-        out = step(side)
-        angle += float(sides.angles[out if left else side])
-        if (sides.heads[out] if left else sides.tails[out]) == after:
-            return angle, left, crossed
-        if len(crossed) > len(sides.tails):
-            break
-        crossed.append(out)
-        side = int(sides.twins[out])
-    return None
 
 
 def _unfold(sides: Sides, strip: list[int]) -> Portals:

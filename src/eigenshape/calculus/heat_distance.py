@@ -243,7 +243,7 @@ def heat_distances(
     >>> bool(abs(distance - square.vertices[:, 0]).max() < 0.025)  # half an edge
     True
     """
-    solver = as_heat_geodesics(shape)
+    solver = shape if isinstance(shape, HeatGeodesics) else prepare_heat_geodesics(shape)
     wanted = source_sets(sources, solver.n_points)
     if not sum(len(points) for points in wanted):
         raise InvalidParameterError(NO_SOURCE)
@@ -287,11 +287,6 @@ def heat_distances(
                 shifts = np.where(counts > 0, -sums / counts, np.inf)
             rows[first + column] = found[:, column] + shifts[solver.components]
     return in_length(rows, solver.scale, 1)
-
-
-def as_heat_geodesics(shape: ShapeLike | HeatGeodesics) -> HeatGeodesics:
-    """Prepare a shape with the usual options, unless it is prepared."""
-    return shape if isinstance(shape, HeatGeodesics) else prepare_heat_geodesics(shape)
 
 
 def require_sources(sources: ArrayLike, n_points: int) -> Int[np.ndarray, " k"]:

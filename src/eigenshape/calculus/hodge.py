@@ -11,6 +11,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
+from eigenshape.calculus.derivatives import sum_at_nodes
 from eigenshape.calculus.grounded import factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facets import facet_table
@@ -270,13 +271,7 @@ def _split_field(
         (table.simplex_facets, across, crouzeix_raviart_laplacian(mesh).stiffness, fixed_edges),
     ):
         local = np.einsum("f,fad,fdk->fak", areas, gradients, fields)
-        loads = np.stack(
-            [
-                np.bincount(nodes.ravel(), load.ravel(), minlength=len(fixed))
-                for load in local.T.swapaxes(1, 2)
-            ],
-            axis=1,
-        )
+        loads = sum_at_nodes(nodes, len(fixed), local)
         found = factorize_grounded(stiffness, fixed).solve(loads)
         potentials.append(found * scale)
         parts.append(np.einsum("fad,fak->fdk", gradients, found[nodes]))

@@ -115,7 +115,32 @@ class LevelSet(ReadOnly):
                 "Only level sets on surfaces are lines; this one has "
                 f"{len(self.pieces)} triangles. Use surface()."
             )
-        return [self.points[line] for line in _chain(self.pieces)]
+        # Follow segments from point to point; lines from their ends first, then closed ones.
+        links: dict[int, list[int]] = {}
+        for number, (start, stop) in enumerate(self.pieces.tolist()):
+            links.setdefault(start, []).append(number)
+            links.setdefault(stop, []).append(number)
+        ends = {point for point, numbers in links.items() if len(numbers) != 2}
+        unused = np.ones(len(self.pieces), dtype=bool)
+        # Segments that leave an end come first, then those that arrive at one, then all others.
+        leaving = [row for row, (start, _) in enumerate(self.pieces.tolist()) if start in ends]
+        arriving = [row for row, (_, stop) in enumerate(self.pieces.tolist()) if stop in ends]
+        lines = []
+        for number in [*leaving, *arriving, *range(len(self.pieces))]:
+            if not unused[number]:
+                continue
+            line = self.pieces[number].tolist()
+            if line[1] in ends and line[0] not in ends:
+                line.reverse()
+            unused[number] = False
+            while line[-1] not in ends and line[-1] != line[0]:
+                following = next(each for each in links[line[-1]] if unused[each])
+                unused[following] = False
+                start, stop = self.pieces[following].tolist()
+                line.append(stop if start == line[-1] else start)
+            lines.append(np.array(line, dtype=np.int64))
+        lines.sort(key=lambda line: (-len(line), int(line[0])))
+        return [self.points[line] for line in lines]
 
     def surface(self) -> TriangleMesh:
         """Return a level set in a solid in R³ as a triangle mesh.
@@ -234,31 +259,3 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
         wrong = np.einsum("qi,qi->q", normals, place[upper] - place[lower]) < 0
         pieces = np.where(wrong[:, None], pieces[:, ::-1], pieces)
     return LevelSet(float(wanted), points, pieces, edges, shares)
-
-
-def _chain(segments: Int[np.ndarray, "q 2"]) -> list[Int[np.ndarray, " k"]]:
-    """Follow segments from point to point; lines from their ends first, then closed ones."""
-    links: dict[int, list[int]] = {}
-    for number, (start, stop) in enumerate(segments.tolist()):
-        links.setdefault(start, []).append(number)
-        links.setdefault(stop, []).append(number)
-    ends = {point for point, numbers in links.items() if len(numbers) != 2}
-    unused = np.ones(len(segments), dtype=bool)
-    # Segments that leave an end come first, then those that arrive at one, then all others.
-    leaving = [row for row, (start, _) in enumerate(segments.tolist()) if start in ends]
-    arriving = [row for row, (_, stop) in enumerate(segments.tolist()) if stop in ends]
-    lines = []
-    for number in [*leaving, *arriving, *range(len(segments))]:
-        if not unused[number]:
-            continue
-        line = segments[number].tolist()
-        if line[1] in ends and line[0] not in ends:
-            line.reverse()
-        unused[number] = False
-        while line[-1] not in ends and line[-1] != line[0]:
-            following = next(each for each in links[line[-1]] if unused[each])
-            unused[following] = False
-            start, stop = segments[following].tolist()
-            line.append(stop if start == line[-1] else start)
-        lines.append(np.array(line, dtype=np.int64))
-    return sorted(lines, key=lambda line: (-len(line), int(line[0])))

@@ -255,11 +255,11 @@ class Constraints:
             row, column = bad[0]
             if row >= n_rows:
                 solver._require_balanced(load)
+            target = targets[row, min(column, targets.shape[1] - 1)]
             raise InvalidParameterError(
                 "The constraints must not contradict each other or the fixed values; "
-                f"constraint {row} would hold with target "
-                f"{targets[row, min(column, targets.shape[1] - 1)] - left[row, column]:.6g} only, "
-                f"not {targets[row, min(column, targets.shape[1] - 1)]:.6g} ({len(bad)} such)."
+                f"constraint {row} would hold with target {target - left[row, column]:.6g} only, "
+                f"not {target:.6g} ({len(bad)} such)."
             )
         multipliers, constants = shares[:n_rows], self.scale * shares[n_rows:]
         found = start - self.response @ multipliers
@@ -267,9 +267,8 @@ class Constraints:
         inside = solver.floating >= 0
         untouched = np.flatnonzero(~self.constants.any(axis=0))
         free_mean = inside & np.isin(solver.floating, untouched)
-        kept = found[inside & ~free_mean]
-        if len(kept):
-            found[inside & ~free_mean] = kept + constants[solver.floating[inside & ~free_mean]]
+        shifted = inside & ~free_mean
+        found[shifted] += constants[solver.floating[shifted]]
         if free_mean.any():
             found[free_mean] = solver._without_means(found.copy())[free_mean]
         return found
@@ -353,7 +352,29 @@ def factor_equations(
     solver = factor_system(system, points, floating, weights, indefinite=indefinite)
     if constraints is None:
         return solver
-    return replace(solver, _constraints=_eliminate(solver, constraints))
+    # The small system of the multipliers and of the constants on floating components.
+    given = constraints if sp.issparse(constraints) else real_numbers(constraints, "constraints")
+    if len(np.shape(given)) != 2 or np.shape(given)[1] != solver.n_points:
+        raise InvalidParameterError(
+            f"constraints must have one column per point, shape (p, {solver.n_points}); "
+            f"the shape is {np.shape(given)}."
+        )
+    matrix = sp.csr_array(given, dtype=np.float64)
+    if not np.isfinite(matrix.data).all():
+        raise InvalidParameterError("constraints must be finite; they are not.")
+    rows = matrix.T.toarray()
+    with one_blas_thread():
+        zero = np.zeros((len(solver.fixed), 1))
+        response = solver._solve_pinned(rows, zero, rows.shape[1])
+        constants = solver.floating_sums(rows).T
+        schur = matrix @ response
+        unit = np.abs(constants).max(initial=0.0)
+        scale = float(np.abs(schur).max() / unit) if unit > 0 and schur.any() else 1.0
+        corner = np.zeros((constants.shape[1],) * 2)
+        multipliers = np.block([[schur, -scale * constants], [-scale * constants.T, corner]])
+        inverse = np.linalg.pinv(multipliers, rcond=DEPENDENT, hermitian=True)
+    eliminated = Constraints(matrix, response, constants, scale, multipliers, inverse)
+    return replace(solver, _constraints=eliminated)
 
 
 def factor_definite(
@@ -416,31 +437,6 @@ def factor_system(
         _factor=factor,
         _refined=indefinite,
     )
-
-
-def _eliminate(solver: LinearSolver, constraints: SparseMatrix | ArrayLike) -> Constraints:
-    """Prepare the small system of the multipliers and of the constants on floating components."""
-    given = constraints if sp.issparse(constraints) else real_numbers(constraints, "constraints")
-    if len(np.shape(given)) != 2 or np.shape(given)[1] != solver.n_points:
-        raise InvalidParameterError(
-            f"constraints must have one column per point, shape (p, {solver.n_points}); "
-            f"the shape is {np.shape(given)}."
-        )
-    matrix = sp.csr_array(given, dtype=np.float64)
-    if not np.isfinite(matrix.data).all():
-        raise InvalidParameterError("constraints must be finite; they are not.")
-    rows = matrix.T.toarray()
-    with one_blas_thread():
-        zero = np.zeros((len(solver.fixed), 1))
-        response = solver._solve_pinned(rows, zero, rows.shape[1])
-        constants = solver.floating_sums(rows).T
-        schur = matrix @ response
-        unit = np.abs(constants).max(initial=0.0)
-        scale = float(np.abs(schur).max() / unit) if unit > 0 and schur.any() else 1.0
-        corner = np.zeros((constants.shape[1],) * 2)
-        system = np.block([[schur, -scale * constants], [-scale * constants.T, corner]])
-        inverse = np.linalg.pinv(system, rcond=DEPENDENT, hermitian=True)
-    return Constraints(matrix, response, constants, scale, system, inverse)
 
 
 def _columns(value: ArrayLike, name: str, n_rows: int, noun: str) -> Float[np.ndarray, "r k"]:

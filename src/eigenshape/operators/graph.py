@@ -75,6 +75,7 @@ def graph_laplacian(
     if kind == "combinatorial":
         adjacency.data[:] = 1.0
     degrees = sp.diags_array(adjacency.sum(axis=1)).tocsr()
+    mass = sp.eye_array(adjacency.shape[0], format="csr")
     if kind == "normalized":
         alone = np.flatnonzero(np.diff(adjacency.indptr) == 0)
         if alone.size:
@@ -82,8 +83,8 @@ def graph_laplacian(
                 f"For a normalized Laplacian every point must have an edge; point {alone[0]} has none "
                 f"({alone.size} such). Choose combinatorial or weighted, or drop such points."
             )
-        return Laplacian((degrees - adjacency).tocsr(), degrees)
-    return Laplacian((degrees - adjacency).tocsr(), sp.eye_array(adjacency.shape[0], format="csr"))
+        mass = degrees
+    return Laplacian((degrees - adjacency).tocsr(), mass)
 
 
 def _as_adjacency(graph: sp.sparray | sp.spmatrix) -> sp.csr_array:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, positive_values, whole_number, whole_numbers
@@ -13,6 +14,7 @@ from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
+from eigenshape.geometry.samples.surface_points import sample_surface
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.clouds.kernel import neighbor_distance
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
@@ -26,13 +28,16 @@ from eigenshape.stability.plan import USUAL_K, StabilityPlan
 from eigenshape.stability.sampled import (
     ChangeAtTime,
     changes_over_times,
-    default_sample_times,
-    distances_between,
     matched_samples,
 )
 
 # Fewest matched points: the fewer points, the larger the effect of sampling.
 FEWEST_SAMPLES = 100
+# Heat times over the admissible range. Each costs three solves.
+N_TIMES = 4
+# Points of a shape to which distances are measured, as a multiple of the matched points. More of
+# them lower the distance of points to the surface that sampling adds.
+DENSER = 20
 # Most matched points: memory of the kernels and of the matching grows faster than their number.
 MOST_SAMPLES = 20_000
 
@@ -234,7 +239,15 @@ def compare_shapes(
     report_progress(0.3, "matching points")
     rng = np.random.default_rng(chosen.seed)
     samples = matched_samples(one, two, n_samples, rng)
-    distances = distances_between(one, two, n_samples, rng)
+    # The distance of each point of each shape to the other; a mesh is represented by its vertices
+    # and random points.
+    first, second = (
+        shape.points
+        if isinstance(shape, PointCloud)
+        else np.vstack([shape.points, sample_surface(shape, DENSER * n_samples, rng=rng).points])
+        for shape in (one, two)
+    )
+    distances = (cKDTree(second).query(one.points)[0], cKDTree(first).query(two.points)[0])
     distance = float(max(each.max() for each in distances))
     closeness = None
     if meshes is not None and images is not None:
@@ -248,10 +261,13 @@ def compare_shapes(
     times = admissible_times(
         delta=delta, spacing=spacing, eigenvalue=float(spectra[0].eigenvalues[-1])
     )
+    # Heat times over the admissible range; if it is empty, over the computable one.
+    low = times.reach if times.empty else times.low
+    spread = np.geomspace(low, times.high, N_TIMES).tolist() if low < times.high else [low]
     changes, angles = changes_over_times(
         samples,
         k,
-        chosen.times or default_sample_times(times),
+        chosen.times or tuple(spread),
         times,
         lambda share, what: report_progress(0.5 + share / 2, what),
     )

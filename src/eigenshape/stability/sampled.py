@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr
@@ -26,11 +25,6 @@ from eigenshape.stability.bounds import TimeRange, weyl_bound
 from eigenshape.stability.correspondence import BottleneckMatching, bottleneck_matching
 from eigenshape.stability.rates import theorem_rate
 
-# Heat times over the admissible range. Each costs three solves.
-N_TIMES = 4
-# Points of a shape to which distances are measured, as a multiple of the matched points. More of
-# them lower the distance of points to the surface that sampling adds.
-DENSER = 20
 # A change is significant if it exceeds that between two samples of one shape by this factor.
 ABOVE_SAMPLING = 2.0
 
@@ -126,30 +120,6 @@ def _draw_points(shape: Shape, n: int, rng: np.random.Generator) -> Points:
     if isinstance(shape, PointCloud):
         return shape.points[rng.choice(len(shape.points), n, replace=False)]
     return sample_surface(shape, n, rng=rng).points
-
-
-def distances_between(
-    one: Shape, two: Shape, n: int, rng: np.random.Generator
-) -> tuple[Float[np.ndarray, " n1"], Float[np.ndarray, " n2"]]:
-    """Return the distance of each point of each shape to the other shape.
-
-    A mesh is represented by its vertices and 20 n random points.
-    """
-    clouds = [
-        shape.points
-        if isinstance(shape, PointCloud)
-        else np.vstack([shape.points, sample_surface(shape, DENSER * n, rng=rng).points])
-        for shape in (one, two)
-    ]
-    pairs = zip((one, two), clouds[::-1], strict=True)
-    first, second = (cKDTree(cloud).query(shape.points)[0] for shape, cloud in pairs)
-    return first, second
-
-
-def default_sample_times(times: TimeRange) -> tuple[float, ...]:
-    """Return heat times over the admissible range; if it is empty, over the computable one."""
-    low = times.reach if times.empty else times.low
-    return tuple(np.geomspace(low, times.high, N_TIMES).tolist()) if low < times.high else (low,)
 
 
 def changes_over_times(

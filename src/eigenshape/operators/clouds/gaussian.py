@@ -22,7 +22,6 @@ from eigenshape.operators.clouds.cells import cell_grid, gaussian_differences
 from eigenshape.operators.clouds.kernel import (
     KernelOptions,
     choose_kernel,
-    geodesic_laplacian,
     kernel_laplacian,
     neighbor_distance,
     require_whole,
@@ -140,11 +139,7 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     warn_of_narrow(kernel)
     if t != "pointwise":
         warn_of_few(measure, kernel)
-    laplacian = (
-        geodesic_laplacian(shape, measure, kernel)
-        if distance == "geodesic"
-        else kernel_laplacian(measure, kernel)
-    )
+    laplacian = kernel_laplacian(measure, kernel, shape if distance == "geodesic" else None)
     require_whole(laplacian, vertex_components(shape)[1], kernel)
     return laplacian
 
