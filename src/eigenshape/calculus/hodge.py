@@ -1,7 +1,7 @@
 """Hodge decompositions: of vectors on faces, and of one-forms on edges."""
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -20,6 +20,7 @@ from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import scaled_corners
+from eigenshape.operators.choices import require_choice
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.operators.directions import require_oriented_manifold
@@ -141,7 +142,7 @@ def decompose_field(
     True
     """
     mesh = as_mesh(mesh)
-    require_rim(boundary)
+    require_choice(boundary, Rim, "boundary")
     require_sound(mesh)
     require_oriented_manifold(mesh)
     field = real_numbers(vectors, "vectors").astype(np.float64)
@@ -205,7 +206,7 @@ def harmonic_fields(
     (2, 192, 3)
     """
     mesh = as_mesh(mesh)
-    require_rim(boundary)
+    require_choice(boundary, Rim, "boundary")
     require_sound(mesh)
     require_oriented_manifold(mesh)
     dimension = betti_numbers(mesh)[1]
@@ -226,14 +227,6 @@ def harmonic_fields(
     basis, _, _ = np.linalg.svd(weighted, full_matrices=False)
     found = basis[:, :dimension].T.reshape(dimension, mesh.n_faces, 3)
     return found / np.sqrt(areas)[:, None] / scaled_corners(mesh)[1]
-
-
-def require_rim(boundary: str) -> None:
-    """Raise an error if a boundary condition is unknown."""
-    if boundary not in get_args(Rim):
-        raise InvalidParameterError(
-            f"boundary must be 'tangential' or 'normal'; it is {boundary!r}."
-        )
 
 
 def _normals_and_areas(

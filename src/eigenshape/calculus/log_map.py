@@ -1,12 +1,11 @@
 """The logarithmic map of a surface, by short heat flow."""
 
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Complex, Float
 
 from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape.calculus.vector_heat import (
     VectorHeat,
@@ -22,6 +21,7 @@ from eigenshape.calculus.vector_heat import (
 )
 from eigenshape.geometry.conversion import MeshLike
 from eigenshape.geometry.simplices import in_length
+from eigenshape.operators.choices import require_choice
 from eigenshape.operators.directions import corner_products
 from eigenshape.operators.tufted import side_ends
 
@@ -82,7 +82,7 @@ def logarithmic_map(
     >>> bool(np.allclose(found, exact))
     True
     """
-    require_log_method(method)
+    require_choice(method, LogMethod, "method")
     solver = as_vector_heat(mesh)
     start = whole_number(source, "source", 0, solver.n_points - 1)
     require_source_everywhere(solver, np.array([start]))
@@ -117,14 +117,6 @@ def logarithmic_map(
     else:
         found = diffuse(solver, time * sources) / weight / parallel
     return in_length(as_rows(found), solver.scale, 1)
-
-
-def require_log_method(method: str) -> None:
-    """Raise an error if a method of the logarithmic map is unknown."""
-    if method not in get_args(LogMethod):
-        raise InvalidParameterError(
-            f"method must be 'affine', 'adaptive' or 'radial'; it is {method!r}."
-        )
 
 
 def _outward_field(solver: VectorHeat, start: int) -> Complex[np.ndarray, " n"]:

@@ -8,13 +8,14 @@ from eigenshape._arrays import real_numbers, require_finite_rows
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.grounded import factorize_definite, factorize_grounded
-from eigenshape.calculus.hodge import HodgeDecomposition, Rim, require_rim
+from eigenshape.calculus.hodge import HodgeDecomposition, Rim
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
+from eigenshape.operators.choices import require_choice
 
 # Share of a face's weight in the penalty on d ω: small enough that a few rounds are exact, large
 # enough that rounding leaves half of the digits to each round.
@@ -108,7 +109,7 @@ def decompose_one_form(
     True
     """
     mesh = as_simplicial(mesh)
-    require_rim(boundary)
+    require_choice(boundary, Rim, "boundary")
     if mesh.dim not in (2, 3):
         raise InvalidShapeError(f"One-forms need triangles or tetrahedra; the mesh is a {mesh!r}.")
     require_sound(mesh)

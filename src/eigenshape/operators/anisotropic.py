@@ -9,8 +9,8 @@ from eigenshape.geometry.measure import surface_area, vertex_normals
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, triangular_sides
 from eigenshape.operators import elements
-from eigenshape.operators.choices import Mass
-from eigenshape.operators.cotangent import linear_mass, require_mass
+from eigenshape.operators.choices import Mass, require_choice
+from eigenshape.operators.cotangent import linear_mass
 from eigenshape.operators.laplacian import Laplacian
 
 # Asymmetry and negative eigenvalues up to this share of the largest entry count as rounding.
@@ -53,7 +53,7 @@ def anisotropic_laplacian(
     True
     """
     mesh = as_simplicial(mesh)
-    require_mass(mass)
+    require_choice(mass, Mass, "mass")
     wanted = (len(mesh.simplices), *(mesh.points.shape[1],) * 2)
     if tensors.shape != wanted:
         raise InvalidParameterError(

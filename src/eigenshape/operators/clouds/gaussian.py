@@ -17,7 +17,7 @@ from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components
-from eigenshape.operators.choices import Correction, Distance, Form
+from eigenshape.operators.choices import Correction, Distance, Form, require_choice
 from eigenshape.operators.clouds.cells import cell_grid, gaussian_differences
 from eigenshape.operators.clouds.kernel import (
     KernelOptions,
@@ -125,10 +125,7 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     2.0
     """
     shape = as_simplicial(shape, "shape")
-    if distance not in ("euclidean", "geodesic"):
-        raise InvalidParameterError(
-            f"distance must be 'euclidean' or 'geodesic'; it is {distance!r}."
-        )
+    require_choice(distance, Distance, "distance")
     if isinstance(t, str) and t != "pointwise":
         raise InvalidParameterError(f"t must be a heat time or 'pointwise'; it is {t!r}.")
     measure = shape_quadrature(shape)

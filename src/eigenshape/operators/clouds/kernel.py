@@ -20,7 +20,7 @@ from eigenshape.geometry.distances.geodesic import geodesic_balls
 from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.operators.choices import Correction, Form
+from eigenshape.operators.choices import Correction, Form, require_choice
 from eigenshape.operators.clouds.cells import cell_grid, count_partners, gaussian_rows
 from eigenshape.operators.clouds.pair_loops import component_labels
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
@@ -76,10 +76,7 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
         positive_values(value, name)
     if options.correct not in (None, "log"):
         raise InvalidParameterError(f"correct must be None or 'log'; it is {options.correct!r}.")
-    if options.form not in ("literal", "random-walk"):
-        raise InvalidParameterError(
-            f"form must be 'literal' or 'random-walk'; it is {options.form!r}."
-        )
+    require_choice(options.form, Form, "form")
     width = options.h or (options.edge_factor or EDGE_FACTOR) * edge
     t = options.t or width**2 / 4
     factor = 2 * t**0.5 / edge
