@@ -12,6 +12,7 @@ from eigenshape.geometry.measure import face_areas, face_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import edge_table, submesh
+from eigenshape.operators.choices import require_choice
 from eigenshape.shapes.domains import box, disc, interval
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
@@ -160,7 +161,7 @@ def test_bad_input_is_named(monkeypatch):
     with pytest.raises(InvalidParameterError, match="vectors must be finite; that of face 2"):
         decompose_field(ball, np.where(np.arange(80)[:, None] == 2, np.nan, field))
     with pytest.raises(InvalidParameterError, match="boundary must be 'tangential' or 'normal'"):
-        hodge.require_rim("free")
+        require_choice("free", hodge.Rim, "boundary")
     with pytest.raises(InvalidParameterError, match="values must hold one number per edge"):
         decompose_one_form(ball, [1.0])
     with pytest.raises(InvalidParameterError, match="values must be finite; that of edge 0"):

@@ -171,7 +171,7 @@ def test_wrong_arguments_are_named():
 
 
 def test_matrices_without_a_solution_are_named():
-    with pytest.raises(es.InvalidParameterError, match="must be sparse and square"):
+    with pytest.raises(es.InvalidParameterError, match="must be a square sparse matrix"):
         factor_equations(sp.csr_array(np.ones((2, 3))))
     with pytest.raises(es.InvalidParameterError, match="matrix of a system must be finite"):
         factor_equations(sp.csr_array([[np.inf]]))

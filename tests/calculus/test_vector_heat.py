@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.calculus.log_map import logarithmic_map, require_log_method
+from eigenshape.calculus.log_map import LogMethod, logarithmic_map
 from eigenshape.calculus.vector_heat import (
     extend_scalar,
     prepare_vector_heat,
@@ -11,6 +11,7 @@ from eigenshape.calculus.vector_heat import (
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.union import disjoint_union
+from eigenshape.operators.choices import require_choice
 from eigenshape.operators.connection import tangent_frames
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
@@ -104,7 +105,7 @@ def test_bad_input_is_named():
     with pytest.raises(InvalidParameterError, match="vectors must be finite; that of source 0"):
         transport_vectors(ball, [1], [[1.0, np.nan]])
     with pytest.raises(InvalidParameterError, match="method must be 'affine', 'adaptive'"):
-        require_log_method("exact")
+        require_choice("exact", LogMethod, "method")
     with pytest.raises(InvalidParameterError, match="source must lie in"):
         logarithmic_map(ball, 42)
     two = disjoint_union(ball, ball)

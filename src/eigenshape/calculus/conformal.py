@@ -106,7 +106,11 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
     points, scale = scale_to_unit(mesh)
     unit = TriangleMesh(points, mesh.faces)
     laplacian = cotangent_laplacian(unit)
-    energy = as_real(laplacian.stiffness - 2 * _area_form(mesh.n_vertices, rim))
+    # The Hermitian M with zᴴMz the signed area of z, from the boundary edges:
+    # Im(conj(z_tail) z_head) / 2 for each.
+    quarter = np.full(len(rim), -0.25j)
+    half = sp.coo_array((quarter, rim.T), shape=laplacian.mass.shape).tocsr()
+    energy = as_real(laplacian.stiffness - 2 * (half + half.conj().T))
     mass = sp.kron(laplacian.mass, sp.eye_array(2))
     shift = SHIFT * energy.diagonal().max() / mass.diagonal().max()
     solver = _factor(energy + shift * mass)
@@ -134,7 +138,9 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
             'Try repair(mesh, ["collapse_needles"]).'
         )
     plane = np.stack([found.real, found.imag], axis=1)
-    signed = _signed_areas(plane[mesh.faces]).sum()
+    corners = plane[mesh.faces]
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    signed = ((one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2).sum()
     return plane * (np.sqrt(face_areas(unit).sum() / abs(signed)) * scale)
 
 
@@ -367,18 +373,5 @@ def _factor(matrix: sp.csr_array) -> LinearSolver:
         ) from err
 
 
-def _area_form(n: int, rim: np.ndarray) -> sp.csr_array:
-    """Return the Hermitian M with zᴴMz the signed area of z, from the boundary edges."""
-    tails, heads = rim.T
-    quarter = np.full(len(rim), -0.25j)  # Im(conj(z_tail) z_head) / 2
-    half = sp.coo_array((quarter, (tails, heads)), shape=(n, n)).tocsr()
-    return (half + half.conj().T).tocsr()
-
-
 def _to_complex(pairs: Float[np.ndarray, " n2"]) -> Complex[np.ndarray, " n"]:
     return pairs[0::2] + 1j * pairs[1::2]
-
-
-def _signed_areas(corners: Float[np.ndarray, "f 3 2"]) -> Float[np.ndarray, " f"]:
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2

@@ -4,7 +4,7 @@ from typing import overload
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from eigenshape._arrays import point_functions, simplex_vectors
 from eigenshape._errors import InvalidShapeError
@@ -73,10 +73,10 @@ def gradient(
     """
     mesh = as_simplicial(mesh)
     require_sound(mesh)
-    if values is None:
-        return _gradient_rows(mesh, _gradients(mesh)[0])
-    functions = point_functions(values, "values", mesh.n_points)
     gradients, _ = _gradients(mesh)
+    if values is None:
+        return _point_rows(mesh, gradients).T.tocsr()
+    functions = point_functions(values, "values", mesh.n_points)
     return np.einsum("sad,sa...->sd...", gradients, functions[mesh.simplices])
 
 
@@ -144,9 +144,11 @@ def divergence(
     gradients, volumes = _gradients(mesh)
     weighted = gradients * volumes[:, None, None]
     if vectors is None:
-        return (-_gradient_rows(mesh, weighted)).T.tocsr()
+        return _point_rows(mesh, -weighted)
     field = simplex_vectors(vectors, "vectors", len(mesh.simplices), mesh.points.shape[1])
-    return _sum_at_points(mesh, -np.einsum("sad,sd...->sa...", weighted, field))
+    return sum_at_nodes(
+        mesh.simplices, mesh.n_points, -np.einsum("sad,sd...->sa...", weighted, field)
+    )
 
 
 @overload
@@ -208,12 +210,29 @@ def curl(
     """
     mesh = as_simplicial(mesh)
     require_sound(mesh)
-    weights = _curl_weights(mesh)
+    ambient = mesh.points.shape[1]
+    if (mesh.dim, ambient) not in ((2, 2), (2, 3), (3, 3)):
+        raise InvalidShapeError(
+            f"The curl needs triangles in R^2 or R^3, or tetrahedra in R^3; the mesh is a {mesh!r}."
+        )
+    gradients, volumes = _gradients(mesh)
+    weighted = gradients * volumes[:, None, None]
+    # What the curl at each corner of each simplex takes from the vector there.
+    if mesh.dim == 3:
+        # Row i of the matrix of X -> X × g is e_i · (X × g) = (g × e_i) · X.
+        weights = np.cross(weighted[:, :, None, :], np.eye(3))
+    elif ambient == 2:
+        weights = weighted[:, :, ::-1] * [1.0, -1.0]
+    else:
+        surface = TriangleMesh(mesh.points, mesh.simplices)
+        require_oriented(surface)
+        # N · (X × g) = (g × N) · X.
+        weights = np.cross(weighted, face_normals(surface)[:, None, :])
     if vectors is None:
-        return _curl_rows(mesh, weights)
-    field = simplex_vectors(vectors, "vectors", len(mesh.simplices), mesh.points.shape[1])
+        return _point_rows(mesh, weights)
+    field = simplex_vectors(vectors, "vectors", len(mesh.simplices), ambient)
     rule = "sad,sd...->sa..." if weights.ndim == 3 else "said,sd...->sai..."
-    return _sum_at_points(mesh, np.einsum(rule, weights, field))
+    return sum_at_nodes(mesh.simplices, mesh.n_points, np.einsum(rule, weights, field))
 
 
 def _gradients(
@@ -227,57 +246,26 @@ def _gradients(
     return in_length(gradients, scale, -1), volumes
 
 
-def _gradient_rows(mesh: Mesh, gradients: Float[np.ndarray, "s corners d"]) -> sp.csr_array:
-    """Return the matrix with one row for each component of the gradient on each simplex."""
-    s, corners, ambient = gradients.shape
-    columns = np.broadcast_to(mesh.simplices[:, None, :], (s, ambient, corners))
-    starts = np.arange(0, s * ambient * corners + 1, corners)
-    data = gradients.transpose(0, 2, 1)
-    rows = sp.csr_array((data.ravel(), columns.ravel(), starts), shape=(s * ambient, mesh.n_points))
-    rows.sort_indices()
-    return rows
+def _point_rows(mesh: Mesh, weights: Float[np.ndarray, "s corners ..."]) -> sp.csr_array:
+    """Return the matrix with one row for each point, or three, and one column for each component.
 
-
-def _curl_rows(mesh: Mesh, weights: Float[np.ndarray, "s corners ..."]) -> sp.csr_array:
-    """Return the matrix with one row for each point, or three on tetrahedra."""
-    n, s = mesh.n_points, len(mesh.simplices)
-    ambient, corners = weights.shape[-1], weights.shape[1]
+    A row takes the weights of its point in all simplices, one vector or three for each.
+    """
+    s, corners, *_, ambient = weights.shape
     width = 1 if weights.ndim == 3 else 3
     entries = weights.reshape(s, corners, width, ambient)
     points = np.broadcast_to(mesh.simplices[:, :, None, None], entries.shape)
     rows = width * points + np.arange(width)[:, None]
     columns = ambient * np.arange(s)[:, None, None, None] + np.arange(ambient)
     places = (rows.ravel(), np.broadcast_to(columns, entries.shape).ravel())
-    return sp.coo_array((entries.ravel(), places), shape=(width * n, ambient * s)).tocsr()
+    shape = (width * mesh.n_points, ambient * s)
+    return sp.coo_array((entries.ravel(), places), shape=shape).tocsr()
 
 
-def _curl_weights(mesh: Mesh) -> Float[np.ndarray, "s corners ..."]:
-    """Return, for each corner of each simplex, what the curl there takes from the vector."""
-    ambient = mesh.points.shape[1]
-    if (mesh.dim, ambient) not in ((2, 2), (2, 3), (3, 3)):
-        raise InvalidShapeError(
-            f"The curl needs triangles in R^2 or R^3, or tetrahedra in R^3; the mesh is a {mesh!r}."
-        )
-    gradients, volumes = _gradients(mesh)
-    weighted = gradients * volumes[:, None, None]
-    if mesh.dim == 3:
-        # Row i of the matrix of X -> X × g is e_i · (X × g) = (g × e_i) · X.
-        return np.cross(weighted[:, :, None, :], np.eye(3))
-    if ambient == 2:
-        return weighted[:, :, ::-1] * [1.0, -1.0]
-    surface = TriangleMesh(mesh.points, mesh.simplices)
-    require_oriented(surface)
-    # N · (X × g) = (g × N) · X.
-    return np.cross(weighted, face_normals(surface)[:, None, :])
-
-
-def _sum_at_points(
-    mesh: Mesh, shares: Float[np.ndarray, "s corners ..."]
+def sum_at_nodes(
+    nodes: Int[np.ndarray, "s corners"], n: int, shares: Float[np.ndarray, "s corners ..."]
 ) -> Float[np.ndarray, "n ..."]:
-    """Add the shares of all corners at their points."""
-    columns = shares.reshape(mesh.simplices.size, -1)
-    sums = [
-        np.bincount(mesh.simplices.ravel(), weights=column, minlength=mesh.n_points)
-        for column in columns.T
-    ]
-    return np.stack(sums, axis=1).reshape(mesh.n_points, *shares.shape[2:])
+    """Add the shares of all corners at their nodes."""
+    columns = shares.reshape(nodes.size, -1).T
+    sums = [np.bincount(nodes.ravel(), weights=column, minlength=n) for column in columns]
+    return np.stack(sums, axis=1).reshape(n, *shares.shape[2:])

@@ -328,8 +328,6 @@ def _right_hand_side(
 
 def _add(one: Float[np.ndarray, "n ..."], two: Float[np.ndarray, "n ..."]) -> np.ndarray:
     """Add functions; one function is added to each of several."""
-    if one.ndim < two.ndim:
-        one = one[:, None]
-    if two.ndim < one.ndim:
-        two = two[:, None]
+    if one.ndim != two.ndim:
+        one, two = one.reshape(len(one), -1), two.reshape(len(two), -1)
     return np.asarray(one + two)

@@ -11,7 +11,7 @@ from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
-from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
+from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.graph import edge_graph
@@ -201,6 +201,4 @@ def taubin_smooth(
         for factor in (weight, back):
             step = factor * (mean @ points - points)
             points[moving] += step[moving]
-    if isinstance(mesh, TriangleMesh):
-        return TriangleMesh(points, mesh.faces)
-    return SimplicialMesh(points, mesh.simplices)
+    return type(mesh)(points, mesh.simplices)

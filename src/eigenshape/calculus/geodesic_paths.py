@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 from scipy.sparse.csgraph import dijkstra
 
 from eigenshape._arrays import whole_number, whole_numbers
@@ -100,36 +99,17 @@ def geodesic_path(
         *(whole_numbers(via, "A vertex of via", 0, last).tolist() if np.size(via) else ()),
         whole_number(end, "end", 0, last),
     ]
+    # The shortest path along edges through all stops.
+    graph = sp.coo_array(
+        (edge_lengths(mesh), edge_table(mesh).edges.T), shape=(mesh.n_vertices,) * 2
+    ).tocsr()
+    path = stops[:1]
     for one, two in pairwise(stops):
         if one == two:
             raise InvalidParameterError(
                 f"Each stop of a path must differ from the one before; vertex {one} is followed by "
                 "itself."
             )
-    points, _ = scale_to_unit(mesh)
-    sides = walkable_sides(TriangleMesh(points, mesh.faces))
-    strip = _strip_along(sides, _edge_path(mesh, stops))
-    first, final = stops[0], stops[-1]
-    for _ in range(ROUNDS):
-        strip = _without_ends(sides, strip, first, final)
-        if not strip:
-            return as_path(mesh.vertices[[first, final]])
-        portals = _unfold(sides, strip)
-        corners = _pull_taut(portals)
-        moved = _pass_pivots(sides, strip, portals, corners)
-        if moved is None:
-            return as_path(_points_of(mesh, sides, strip, portals, corners, (first, final)))
-        strip = moved
-    raise ConvergenceError(f"A path must become straight; {ROUNDS} rounds were not enough.")
-
-
-def _edge_path(mesh: TriangleMesh, stops: list[int]) -> list[int]:
-    """Return the vertices of the shortest path along edges through all stops."""
-    table = edge_table(mesh)
-    n = mesh.n_vertices
-    graph = sp.coo_array((edge_lengths(mesh), table.edges.T), shape=(n, n)).tocsr()
-    path = [stops[0]]
-    for one, two in pairwise(stops):
         _, before = dijkstra(graph, directed=False, indices=one, return_predecessors=True)
         if before[two] < 0:
             raise InvalidParameterError(
@@ -140,7 +120,39 @@ def _edge_path(mesh: TriangleMesh, stops: list[int]) -> list[int]:
         while back[-1] != one:
             back.append(int(before[back[-1]]))
         path += back[-2::-1]
-    return path
+    unit = TriangleMesh(scale_to_unit(mesh)[0], mesh.faces)
+    sides = walkable_sides(unit)
+    strip = _strip_along(sides, path)
+    first, final = stops[0], stops[-1]
+    for _ in range(ROUNDS):
+        # Drop what the strip crosses before it leaves the first vertex and after it meets the last.
+        starts = [place for place, side in enumerate(strip) if _touches(sides, side, first)]
+        strip = strip[starts[-1] + 1 :] if starts else strip
+        stops = [place for place, side in enumerate(strip) if _touches(sides, side, final)]
+        strip = strip[: stops[0]] if stops else strip
+        if not strip:
+            return as_path(mesh.vertices[[first, final]])
+        portals = _unfold(sides, strip)
+        corners = _pull_taut(portals)
+        moved = _pass_pivots(sides, strip, portals, corners)
+        if moved is None:
+            break
+        strip = moved
+    else:
+        raise ConvergenceError(f"A path must become straight; {ROUNDS} rounds were not enough.")
+    # Where the path starts, crosses edges, passes vertices, and ends.
+    points = [mesh.vertices[first]]
+    for (begin, first_end), (stop, last_end) in pairwise(corners):
+        origin = portals[begin][first_end]
+        way = portals[stop][last_end] - origin
+        for number in range(begin + 1, stop):
+            left, right = (cross(way, end - origin) for end in portals[number])
+            share = left / (left - right) if left > right else 0.0
+            share = 1 - min(max(share, 0.0), 1.0)
+            points.append(point_on_side(mesh, sides, strip[number - 1], share))
+        if stop < len(portals) - 1:
+            points.append(point_on_side(mesh, sides, strip[stop - 1], 1.0 - last_end))
+    return as_path(np.array([*points, mesh.vertices[final]]))
 
 
 def _strip_along(sides: Sides, path: list[int]) -> list[int]:
@@ -151,11 +163,21 @@ def _strip_along(sides: Sides, path: list[int]) -> list[int]:
     strip: list[int] = []
     is_left: bool | None = None
     for before, vertex, after in zip(path[:-2], path[1:-1], path[2:], strict=True):
-        fans = [
-            fan
-            for fan in (_fan(sides, before, vertex, after, left) for left in (True, False))
-            if fan
-        ]
+        # Walk around the vertex on either side, and list what is crossed up to the next edge.
+        fans: list[tuple[float, bool, list[int]]] = []
+        for left in (True, False):
+            step = next_side if left else previous_side
+            side = sides.of_edge.get((before, vertex) if left else (vertex, before), -1)
+            crossed: list[int] = []
+            angle = 0.0
+            while side >= 0 and len(crossed) <= len(sides.tails):
+                out = step(side)
+                angle += float(sides.angles[out if left else side])
+                if (sides.heads[out] if left else sides.tails[out]) == after:
+                    fans.append((angle, left, crossed))
+                    break
+                crossed.append(out)
+                side = int(sides.twins[out])
         _, now_left, fan = min(fans, key=lambda found: found[0])
         if is_left is not None and is_left != now_left:
             # From the left of the edge to its right, or back.
@@ -163,38 +185,6 @@ def _strip_along(sides: Sides, path: list[int]) -> list[int]:
             strip.append(sides.of_edge[ends])
         strip += fan
         is_left = now_left
-    return strip
-
-
-def _fan(
-    sides: Sides, before: int, vertex: int, after: int, left: bool
-) -> tuple[float, bool, list[int]] | None:
-    """Walk around a vertex on one side of a path; return angle, side and what is crossed."""
-    step = next_side if left else previous_side
-    side = sides.of_edge.get((before, vertex) if left else (vertex, before), -1)
-    crossed: list[int] = []
-    angle = 0.0
-    while side >= 0:
-        out = step(side)
-        angle += float(sides.angles[out if left else side])
-        if (sides.heads[out] if left else sides.tails[out]) == after:
-            return angle, left, crossed
-        if len(crossed) > len(sides.tails):
-            break
-        crossed.append(out)
-        side = int(sides.twins[out])
-    return None
-
-
-def _without_ends(sides: Sides, strip: list[int], first: int, final: int) -> list[int]:
-    """Drop what a strip crosses before it leaves the first vertex and after it meets the last."""
-    for number in range(len(strip) - 1, -1, -1):
-        if first in (sides.tails[strip[number]], sides.heads[strip[number]]):
-            strip = strip[number + 1 :]
-            break
-    for number, side in enumerate(strip):
-        if final in (sides.tails[side], sides.heads[side]):
-            return strip[:number]
     return strip
 
 
@@ -266,69 +256,28 @@ def _pass_pivots(
         bend = abs(phase(into.conjugate() * out))
         if sides.around[vertex] - (np.pi + bend) >= np.pi - STRAIGHT:
             continue
-        begin, stop = _run(sides, strip, number - 1, vertex)
+        # The range of sides around this one that all have the vertex.
+        begin, stop = number - 1, number
+        while begin > 0 and _touches(sides, strip[begin - 1], vertex):
+            begin -= 1
+        while stop < len(strip) and _touches(sides, strip[stop], vertex):
+            stop += 1
         if begin < done:
             continue
-        other = _other_fan(sides, strip[begin], strip[stop - 1], vertex)
-        if other is None:
+        # Walk around the vertex the other way, from the face of the first to beyond the last.
+        # Across, a side ends (or starts) at the vertex, and the one after starts (or ends) there.
+        side, target = strip[begin], int(sides.twins[strip[stop - 1]]) // 3
+        step = previous_side if sides.tails[side] == vertex else next_side
+        crossed: list[int] = []
+        while side >= 0 and side // 3 != target and len(crossed) < len(sides.tails):
+            crossed.append(step(side))
+            side = int(sides.twins[crossed[-1]])
+        if side < 0 or side // 3 != target:
             continue
-        moved += strip[done:begin] + other
+        moved += strip[done:begin] + crossed
         done, any_moved = stop, True
     return moved + strip[done:] if any_moved else None
 
 
-def _run(sides: Sides, strip: list[int], number: int, vertex: int) -> tuple[int, int]:
-    """Return the range of sides around one of them that all have a vertex."""
-
-    def touches(side: int) -> bool:
-        return vertex in (sides.tails[side], sides.heads[side])
-
-    begin, stop = number, number + 1
-    while begin > 0 and touches(strip[begin - 1]):
-        begin -= 1
-    while stop < len(strip) and touches(strip[stop]):
-        stop += 1
-    return begin, stop
-
-
-def _other_fan(sides: Sides, enter: int, leave: int, vertex: int) -> list[int] | None:
-    """Walk around a vertex the other way, from the face of one side to beyond the other."""
-    is_tail = sides.tails[enter] == vertex
-    step = previous_side if is_tail else next_side
-    target = int(sides.twins[leave]) // 3
-    side = enter
-    crossed: list[int] = []
-    for _ in range(len(sides.tails)):
-        if side // 3 == target:
-            return crossed
-        out = step(side)
-        crossed.append(out)
-        # Across, the side ends (or starts) at the vertex, and the one after starts (or ends) there.
-        side = int(sides.twins[out])
-        if side < 0:
-            return None
-    return None
-
-
-def _points_of(
-    mesh: TriangleMesh,
-    sides: Sides,
-    strip: list[int],
-    portals: Portals,
-    corners: list[tuple[int, int]],
-    ends: tuple[int, int],
-) -> Float[np.ndarray, "p 3"]:
-    """Return where a taut path starts, crosses edges, passes vertices, and ends."""
-    points = [mesh.vertices[ends[0]]]
-    for (begin, first_end), (stop, last_end) in pairwise(corners):
-        origin = portals[begin][first_end]
-        way = portals[stop][last_end] - origin
-        for number in range(begin + 1, stop):
-            left, right = (cross(way, end - origin) for end in portals[number])
-            share = left / (left - right) if left > right else 0.0
-            points.append(
-                point_on_side(mesh, sides, strip[number - 1], 1 - min(max(share, 0.0), 1.0))
-            )
-        if stop < len(portals) - 1:
-            points.append(point_on_side(mesh, sides, strip[stop - 1], 1.0 - last_end))
-    return np.array([*points, mesh.vertices[ends[1]]])
+def _touches(sides: Sides, side: int, vertex: int) -> bool:
+    return vertex in (sides.tails[side], sides.heads[side])

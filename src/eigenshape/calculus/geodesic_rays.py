@@ -1,7 +1,6 @@
 """Straight paths from a vertex: the exponential map."""
 
 import numpy as np
-from jaxtyping import Float
 
 from eigenshape._arrays import finite_values, whole_number
 from eigenshape._errors import InvalidParameterError
@@ -9,7 +8,6 @@ from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,
-    Sides,
     apex_of,
     as_path,
     cross,
@@ -78,68 +76,54 @@ def trace_geodesic(mesh: MeshLike, start: Integer, vector: ArrayLike) -> Geodesi
     directions = vertex_directions(mesh)
     points, scale = scale_to_unit(mesh)
     sides = walkable_sides(TriangleMesh(points, mesh.faces))
-    left = float(np.hypot(*given)) / scale
-    if not left > 0:
+    length = float(np.hypot(*given)) / scale
+    if not length > 0:
         return as_path(mesh.vertices[[vertex]])
-    angle = float(np.arctan2(given[1], given[0]))
-    side, angle = _wedge(sides, directions.at_tail, vertex, angle)
-    return as_path(np.array(_walk(mesh, sides, side, angle, left)))
-
-
-def _wedge(
-    sides: Sides, at_tail: Float[np.ndarray, " h"], vertex: int, angle: float
-) -> tuple[int, float]:
-    """Return the side after which a direction leaves a vertex, and its angle to that side."""
+    angle = float(np.arctan2(given[1], given[0])) % (2 * np.pi)
+    # The side after which the direction leaves the vertex, and its angle to that side.
     out = np.flatnonzero(sides.tails == vertex)
-    is_inner = (sides.twins[out] >= 0).all() and (
-        sides.twins[[previous_side(int(h)) for h in out]] >= 0
-    ).all()
+    before = [previous_side(int(each)) for each in out]
+    is_inner = (sides.twins[out] >= 0).all() and (sides.twins[before] >= 0).all()
     scale = 2 * np.pi / sides.around[vertex] if is_inner else 1.0
-    angle %= 2 * np.pi
-    offsets = (angle - at_tail[out]) / scale
-    inside = (offsets >= 0) & (offsets <= sides.angles[out])
+    offsets = (angle - directions.at_tail[out]) / scale
+    wedges = sides.angles[out]
+    inside = (offsets >= 0) & (offsets <= wedges)
+    chosen = int(np.argmax(inside))
     if not inside.any():
         # Rounding may leave a gap between two faces, at the last side or the first.
-        nearest = int(np.argmin(np.minimum(np.abs(offsets), np.abs(offsets - sides.angles[out]))))
-        gap = min(abs(offsets[nearest]), abs(offsets[nearest] - sides.angles[out[nearest]]))
-        if gap > STRAIGHT:
+        gaps = np.minimum(np.abs(offsets), np.abs(offsets - wedges))
+        chosen = int(np.argmin(gaps))
+        if gaps[chosen] > STRAIGHT:
             raise InvalidParameterError(
                 f"vector must point into the surface; at boundary vertex {vertex} it has the angle "
                 f"{angle:.4g}, and the faces end at {sides.around[vertex]:.4g}."
             )
-        return int(out[nearest]), float(np.clip(offsets[nearest], 0, sides.angles[out[nearest]]))
-    chosen = int(out[inside][0])
-    return chosen, float(offsets[inside][0])
-
-
-def _walk(
-    mesh: TriangleMesh, sides: Sides, side: int, angle: float, length: float
-) -> list[Float[np.ndarray, "3"]]:
-    """Walk straight through faces; return the start, where edges are crossed, and the end."""
-    path = [mesh.vertices[sides.tails[side]]]
+    side = int(out[chosen])
+    angle = float(np.clip(offsets[chosen], 0, wedges[chosen]))
     # The path starts at 0, and its first face lies on the left of a side along the axis.
-    head = complex(sides.lengths[side])
-    way = complex(np.cos(angle), np.sin(angle))
+    head, way = complex(sides.lengths[side]), complex(np.cos(angle), np.sin(angle))
     exits = [(next_side(side), head, apex_of(sides, side, 0j, head))]
-    walked = 0.0
+    path, walked = [mesh.vertices[vertex]], 0.0
     while True:
         # The path leaves between the ends of a side, the first on its right and the second on its
         # left. Of two sides at a vertex that the path meets, rounding chooses.
-        out, right, left = exits[0]
+        exit_side, right, left = exits[0]
         if len(exits) > 1 and cross(way, left) < 0:
-            out, right, left = exits[1]
+            exit_side, right, left = exits[1]
         below, above = cross(way, right), cross(way, left)
         share = min(max(-below / (above - below), 0.0), 1.0) if above > below else 0.0
         meeting = ((right + share * (left - right)) * way.conjugate()).real
-        crossing = point_on_side(mesh, sides, out, share)
+        crossing = point_on_side(mesh, sides, exit_side, share)
         if meeting >= length:
             part = (length - walked) / (meeting - walked) if meeting > walked else 0.0
-            return [*path, path[-1] + part * (crossing - path[-1])]
+            path.append(path[-1] + part * (crossing - path[-1]))
+            break
         path.append(crossing)
         walked = max(walked, meeting)
-        twin = int(sides.twins[out])
+        twin = int(sides.twins[exit_side])
         if twin < 0:
-            return path
+            break
         # Across, the side runs from `left` to `right`, and the next face lies on its left.
         apex = apex_of(sides, twin, left, right)
         exits = [(next_side(twin), right, apex), (previous_side(twin), apex, left)]
+    return as_path(np.array(path))

@@ -21,12 +21,11 @@ from eigenshape.geometry.distances.geodesic import source_sets
 from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, simplex_volumes, size_one
-from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators import elements, flip_loops
 from eigenshape.operators.clouds.cloud_triangles import cloud_cover
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import delaunay_cover
-from eigenshape.operators.tufted import Triangulation
 from eigenshape.sparse.symmetric_factor import SymmetricFactor
 
 # Sources that are solved for together: the lanes of a factor, and few enough that the gradients of
@@ -137,17 +136,50 @@ def prepare_heat_geodesics(
     """
     shape = as_shape(shape)
     factor = float(positive_values(time_factor, "time_factor")[0])
-    if isinstance(shape, PointCloud):
-        cover, scale = cloud_cover(shape)
-    elif robust:
-        if shape.dim != 2 or shape.points.shape[1] != 3:
+    if isinstance(shape, PointCloud) or robust:
+        if isinstance(shape, PointCloud):
+            cover, scale = cloud_cover(shape)
+        elif shape.dim != 2 or shape.points.shape[1] != 3:
             raise InvalidParameterError(
                 f"robust must be False unless the shape is a triangle mesh in R^3; it is {shape!r}."
             )
-        cover, scale = delaunay_cover(shape)
+        else:
+            cover, scale = delaunay_cover(shape)
+        nodes, volumes = cover.tails.reshape(-1, 3), flip_loops.areas(cover.lengths)
+        # A ∇λ_a·∇λ_b in each intrinsic triangle: -cot(angle opposite to the side) / 2.
+        weights = flip_loops.cotangents(cover.lengths).reshape(-1, 3) / 2
+        products = np.zeros((len(weights), 3, 3))
+        for corner in range(3):
+            following = (corner + 1) % 3
+            products[:, corner, following] = products[:, following, corner] = -weights[:, corner]
+        diagonal = np.arange(3)
+        products[:, diagonal, diagonal] = -products.sum(axis=2)
+        once = np.arange(len(cover.twins)) < cover.twins
+        length = float(cover.lengths[once].mean())
+        mass = np.bincount(cover.tails, np.repeat(volumes / 3, 3), minlength=shape.n_points)
+        stiffness = elements.stiffness(nodes, products, 1)
     else:
-        return _of_mesh(shape, factor)
-    return _of_triangulation(cover, shape.n_points, scale, factor)
+        require_sound(shape)
+        points, scale = size_one(shape.points)
+        unit = SimplicialMesh(points, shape.simplices)
+        laplacian = cotangent_laplacian(unit, "lumped")
+        stiffness, mass = laplacian.stiffness, laplacian.mass.diagonal()
+        tails, heads = edges_of(shape).T
+        length = float(np.linalg.norm(points[tails] - points[heads], axis=1).mean())
+        nodes, volumes = shape.simplices, simplex_volumes(unit)
+        products = elements.gradient_products(unit)
+    time = factor * length**2
+    poisson = factorize_grounded(stiffness)
+    return HeatGeodesics(
+        float(in_length(np.array([time]), scale, 2)[0]),
+        scale,
+        nodes,
+        products,
+        volumes,
+        poisson.components,
+        factorize_definite(sp.diags_array(mass) + time * stiffness),
+        poisson,
+    )
 
 
 def heat_distances(
@@ -211,12 +243,17 @@ def heat_distances(
     >>> bool(abs(distance - square.vertices[:, 0]).max() < 0.025)  # half an edge
     True
     """
-    solver = as_heat_geodesics(shape)
+    solver = shape if isinstance(shape, HeatGeodesics) else prepare_heat_geodesics(shape)
     wanted = source_sets(sources, solver.n_points)
     if not sum(len(points) for points in wanted):
         raise InvalidParameterError(NO_SOURCE)
     rows = np.empty((len(wanted), solver.n_points))
     n_components = int(solver.components.max()) + 1
+    corners = solver.nodes.ravel()
+    gather = sp.csr_array(
+        (np.ones(len(corners)), corners, np.arange(len(corners) + 1)),
+        shape=(len(corners), solver.n_points),
+    )
     report_progress = progress or silent
     for first in range(0, len(wanted), SOURCES_AT_ONCE):
         report_progress(first / len(wanted), f"source {first + 1} of {len(wanted)}")
@@ -224,7 +261,23 @@ def heat_distances(
         impulses = np.zeros((solver.n_points, len(chosen)))
         for column, points in enumerate(chosen):
             impulses[points, column] = 1.0
-        found = _distances_of(solver, impulses)
+        at_points = solver.heat.solve(impulses)
+        has_source = np.zeros((n_components, len(chosen)), dtype=bool)
+        points, columns = np.nonzero(impulses)
+        has_source[solver.components[points], columns] = True
+        require_heat(at_points, has_source[solver.components])
+        # Far away heat is as small as 1e-300, so each simplex gets a unit of its own.
+        heat = at_points[solver.nodes]
+        heat = heat - heat[:, :1]
+        largest = np.abs(heat).max(axis=1, keepdims=True)
+        heat /= np.where(largest > 0, largest, 1.0)
+        flow = np.einsum("sab,sbk->sak", solver.products, heat)
+        # |∇u|² V = Σ u_a V ∇λ_a·∇λ_b u_b; so gradients are never formed.
+        squares = np.einsum("sak,sak->sk", heat, flow)
+        slopes = np.sqrt(np.maximum(squares, 0.0) / solver.volumes[:, None])
+        flow /= np.where(slopes > 0, slopes, np.inf)[:, None]
+        divergence = gather.T @ flow.reshape(len(corners), -1)
+        found = solver.poisson.solve(-divergence)  # up to a constant on each component
         for column, points in enumerate(chosen):
             # The constant of each component makes the mean over its sources 0.
             at_sources = solver.components[points]
@@ -234,11 +287,6 @@ def heat_distances(
                 shifts = np.where(counts > 0, -sums / counts, np.inf)
             rows[first + column] = found[:, column] + shifts[solver.components]
     return in_length(rows, solver.scale, 1)
-
-
-def as_heat_geodesics(shape: ShapeLike | HeatGeodesics) -> HeatGeodesics:
-    """Prepare a shape with the usual options, unless it is prepared."""
-    return shape if isinstance(shape, HeatGeodesics) else prepare_heat_geodesics(shape)
 
 
 def require_sources(sources: ArrayLike, n_points: int) -> Int[np.ndarray, " k"]:
@@ -267,90 +315,3 @@ def require_heat(
             f"for a float ({len(np.unique(cold[:, 0]))} such). Choose a larger time_factor; four "
             "times as much reaches about twice as far."
         )
-
-
-def _of_mesh(mesh: Mesh, factor: float) -> HeatGeodesics:
-    require_sound(mesh)
-    points, scale = size_one(mesh.points)
-    unit = SimplicialMesh(points, mesh.simplices)
-    laplacian = cotangent_laplacian(unit, "lumped")
-    tails, heads = edges_of(mesh).T
-    length = float(np.linalg.norm(points[tails] - points[heads], axis=1).mean())
-    products = elements.gradient_products(unit)
-    volumes = simplex_volumes(unit)
-    return _solver(
-        (mesh.simplices, products, volumes),
-        laplacian.stiffness,
-        laplacian.mass.diagonal(),
-        factor * length**2,
-        scale,
-    )
-
-
-def _of_triangulation(cover: Triangulation, n: int, scale: float, factor: float) -> HeatGeodesics:
-    nodes = cover.tails.reshape(-1, 3)
-    products = intrinsic_products(cover)
-    areas = flip_loops.areas(cover.lengths)
-    once = np.arange(len(cover.twins)) < cover.twins
-    length = float(cover.lengths[once].mean())
-    mass = np.bincount(cover.tails, np.repeat(areas / 3, 3), minlength=n)
-    stiffness = elements.stiffness(nodes, products, 1)
-    return _solver((nodes, products, areas), stiffness, mass, factor * length**2, scale)
-
-
-def intrinsic_products(cover: Triangulation) -> Float[np.ndarray, "f 3 3"]:
-    """Return A ∇λ_a·∇λ_b in each intrinsic triangle: -cot(angle opposite to the side) / 2."""
-    weights = flip_loops.cotangents(cover.lengths).reshape(-1, 3) / 2
-    products = np.zeros((len(weights), 3, 3))
-    for corner in range(3):
-        following = (corner + 1) % 3
-        products[:, corner, following] = products[:, following, corner] = -weights[:, corner]
-    diagonal = np.arange(3)
-    products[:, diagonal, diagonal] = -products.sum(axis=2)
-    return products
-
-
-def _solver(
-    simplices: tuple[np.ndarray, np.ndarray, np.ndarray],
-    stiffness: sp.csr_array,
-    mass: Float[np.ndarray, " n"],
-    time: float,
-    scale: float,
-) -> HeatGeodesics:
-    poisson = factorize_grounded(stiffness)
-    return HeatGeodesics(
-        float(in_length(np.array([time]), scale, 2)[0]),
-        scale,
-        *simplices,
-        poisson.components,
-        factorize_definite(sp.diags_array(mass) + time * stiffness),
-        poisson,
-    )
-
-
-def _distances_of(
-    solver: HeatGeodesics, impulses: Float[np.ndarray, "n b"]
-) -> Float[np.ndarray, "n b"]:
-    """Return distances up to a constant on each component, in units of the scale."""
-    at_points = solver.heat.solve(impulses)
-    has_source = np.zeros((int(solver.components.max()) + 1, impulses.shape[1]), dtype=bool)
-    sources, columns = np.nonzero(impulses)
-    has_source[solver.components[sources], columns] = True
-    require_heat(at_points, has_source[solver.components])
-    heat = at_points[solver.nodes]
-    # Far away heat is as small as 1e-300, so each simplex gets a unit of its own.
-    heat = heat - heat[:, :1]
-    largest = np.abs(heat).max(axis=1, keepdims=True)
-    heat /= np.where(largest > 0, largest, 1.0)
-    flow = np.einsum("sab,sbk->sak", solver.products, heat)
-    # |∇u|² V = Σ u_a V ∇λ_a·∇λ_b u_b; so gradients are never formed.
-    squares = np.einsum("sak,sak->sk", heat, flow)
-    slopes = np.sqrt(np.maximum(squares, 0.0) / solver.volumes[:, None])
-    flow /= np.where(slopes > 0, slopes, np.inf)[:, None]
-    corners = solver.nodes.ravel()
-    gather = sp.csr_array(
-        (np.ones(len(corners)), corners, np.arange(len(corners) + 1)),
-        shape=(len(corners), solver.n_points),
-    )
-    divergence = gather.T @ flow.reshape(len(corners), -1)
-    return solver.poisson.solve(-divergence)

@@ -1,7 +1,7 @@
 """Hodge decompositions: of vectors on faces, and of one-forms on edges."""
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +11,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
+from eigenshape.calculus.derivatives import sum_at_nodes
 from eigenshape.calculus.grounded import factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facets import facet_table
@@ -19,7 +20,7 @@ from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import scaled_corners
-from eigenshape.geometry.simplicial import Mesh
+from eigenshape.operators.choices import require_choice
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.operators.directions import require_oriented_manifold
@@ -141,10 +142,27 @@ def decompose_field(
     True
     """
     mesh = as_mesh(mesh)
-    require_rim(boundary)
+    require_choice(boundary, Rim, "boundary")
     require_sound(mesh)
     require_oriented_manifold(mesh)
-    field = _as_tangent_vectors(mesh, vectors)
+    field = real_numbers(vectors, "vectors").astype(np.float64)
+    if field.shape != (mesh.n_faces, 3):
+        raise InvalidParameterError(
+            f"vectors must hold one vector per face, shape ({mesh.n_faces}, 3); the shape is "
+            f"{field.shape}."
+        )
+    require_finite_rows(field, "vectors", "face")
+    normals, _ = _normals_and_areas(mesh)
+    along = np.einsum("fd,fd->f", field, normals)
+    bad = np.flatnonzero(np.abs(along) > TANGENT * np.linalg.norm(field, axis=1))
+    if bad.size:
+        raise InvalidParameterError(
+            f"vectors must be tangent to their faces; that of face {bad[0]} has the part "
+            f"{along[bad[0]]:.4g} along the normal ({bad.size} such). Subtract "
+            "(vectors * normals).sum(axis=1)[:, None] * normals, with normals = "
+            "es.geometry.face_normals(mesh)."
+        )
+    field = field - along[:, None] * normals  # what rounding leaves along the normal
     exact, coexact, potential, stream = _split_field(mesh, field[:, :, None], boundary)
     exact, coexact = exact[:, :, 0], coexact[:, :, 0]
     harmonic = field - exact - coexact
@@ -188,7 +206,7 @@ def harmonic_fields(
     (2, 192, 3)
     """
     mesh = as_mesh(mesh)
-    require_rim(boundary)
+    require_choice(boundary, Rim, "boundary")
     require_sound(mesh)
     require_oriented_manifold(mesh)
     dimension = betti_numbers(mesh)[1]
@@ -208,41 +226,7 @@ def harmonic_fields(
     weighted = (fields * np.sqrt(areas)[:, None, None]).reshape(3 * mesh.n_faces, -1)
     basis, _, _ = np.linalg.svd(weighted, full_matrices=False)
     found = basis[:, :dimension].T.reshape(dimension, mesh.n_faces, 3)
-    return found / np.sqrt(areas)[:, None] / _scale(mesh)
-
-
-def require_rim(boundary: str) -> None:
-    """Raise an error if a boundary condition is unknown."""
-    if boundary not in get_args(Rim):
-        raise InvalidParameterError(
-            f"boundary must be 'tangential' or 'normal'; it is {boundary!r}."
-        )
-
-
-def _as_tangent_vectors(mesh: TriangleMesh, vectors: ArrayLike) -> Float[np.ndarray, "f 3"]:
-    """Return one tangent vector per face, without what rounding leaves along the normal."""
-    field = real_numbers(vectors, "vectors").astype(np.float64)
-    if field.shape != (mesh.n_faces, 3):
-        raise InvalidParameterError(
-            f"vectors must hold one vector per face, shape ({mesh.n_faces}, 3); the shape is "
-            f"{field.shape}."
-        )
-    require_finite_rows(field, "vectors", "face")
-    normals, _ = _normals_and_areas(mesh)
-    along = np.einsum("fd,fd->f", field, normals)
-    bad = np.flatnonzero(np.abs(along) > TANGENT * np.linalg.norm(field, axis=1))
-    if bad.size:
-        raise InvalidParameterError(
-            f"vectors must be tangent to their faces; that of face {bad[0]} has the part "
-            f"{along[bad[0]]:.4g} along the normal ({bad.size} such). Subtract "
-            "(vectors * normals).sum(axis=1)[:, None] * normals, with normals = "
-            "es.geometry.face_normals(mesh)."
-        )
-    return field - along[:, None] * normals
-
-
-def _scale(mesh: Mesh) -> float:
-    return scaled_corners(mesh)[1]
+    return found / np.sqrt(areas)[:, None] / scaled_corners(mesh)[1]
 
 
 def _normals_and_areas(
@@ -280,13 +264,7 @@ def _split_field(
         (table.simplex_facets, across, crouzeix_raviart_laplacian(mesh).stiffness, fixed_edges),
     ):
         local = np.einsum("f,fad,fdk->fak", areas, gradients, fields)
-        loads = np.stack(
-            [
-                np.bincount(nodes.ravel(), load.ravel(), minlength=len(fixed))
-                for load in local.T.swapaxes(1, 2)
-            ],
-            axis=1,
-        )
+        loads = sum_at_nodes(nodes, len(fixed), local)
         found = factorize_grounded(stiffness, fixed).solve(loads)
         potentials.append(found * scale)
         parts.append(np.einsum("fad,fak->fdk", gradients, found[nodes]))

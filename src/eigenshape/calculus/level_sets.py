@@ -3,16 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, finite_values, freeze, point_functions, vertex_values
+from eigenshape._arrays import ReadOnly, finite_values, point_functions, vertex_values
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import in_length, size_one, volumes
-from eigenshape.geometry.simplicial import Mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +115,32 @@ class LevelSet(ReadOnly):
                 "Only level sets on surfaces are lines; this one has "
                 f"{len(self.pieces)} triangles. Use surface()."
             )
-        return [self.points[line] for line in _chain(self.pieces)]
+        # Follow segments from point to point; lines from their ends first, then closed ones.
+        links: dict[int, list[int]] = {}
+        for number, (start, stop) in enumerate(self.pieces.tolist()):
+            links.setdefault(start, []).append(number)
+            links.setdefault(stop, []).append(number)
+        ends = {point for point, numbers in links.items() if len(numbers) != 2}
+        unused = np.ones(len(self.pieces), dtype=bool)
+        # Segments that leave an end come first, then those that arrive at one, then all others.
+        leaving = [row for row, (start, _) in enumerate(self.pieces.tolist()) if start in ends]
+        arriving = [row for row, (_, stop) in enumerate(self.pieces.tolist()) if stop in ends]
+        lines = []
+        for number in [*leaving, *arriving, *range(len(self.pieces))]:
+            if not unused[number]:
+                continue
+            line = self.pieces[number].tolist()
+            if line[1] in ends and line[0] not in ends:
+                line.reverse()
+            unused[number] = False
+            while line[-1] not in ends and line[-1] != line[0]:
+                following = next(each for each in links[line[-1]] if unused[each])
+                unused[following] = False
+                start, stop = self.pieces[following].tolist()
+                line.append(stop if start == line[-1] else start)
+            lines.append(np.array(line, dtype=np.int64))
+        lines.sort(key=lambda line: (-len(line), int(line[0])))
+        return [self.points[line] for line in lines]
 
     def surface(self) -> TriangleMesh:
         """Return a level set in a solid in R³ as a triangle mesh.
@@ -189,8 +213,30 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
     above = heights >= wanted
     crossed = np.flatnonzero(above[mesh.simplices].any(axis=1) & ~above[mesh.simplices].all(axis=1))
     corners = mesh.simplices[crossed]
-    cut = _cut_triangles if mesh.dim == 2 else _cut_tetrahedra
-    ends = cut(corners, above[corners])  # (q, m, 2): the edge of each corner of each piece
+    inside = above[corners]
+    n_inside = inside.sum(axis=1)
+    # (q, m, 2): the crossed edge of each corner of each piece.
+    if mesh.dim == 2:
+        # From the lone corner to the two others, with larger values left of the segment.
+        is_above = (n_inside == 1)[:, None]
+        lone = np.argmax(inside == is_above, axis=1)
+        rows = np.arange(len(corners))
+        tip, following, before = (corners[rows, (lone + turn) % 3] for turn in range(3))
+        first, second = np.stack([tip, following], axis=1), np.stack([tip, before], axis=1)
+        ends = np.stack([first, second], axis=1)
+        ends = np.where(is_above[:, None], ends, ends[:, ::-1])
+    else:
+        # Corners above come first, in each tetrahedron. A lone corner is cut off by a triangle; two
+        # above and two below are parted by a quadrilateral, cut along a diagonal.
+        order = np.argsort(~inside, axis=1, kind="stable")
+        ordered = np.take_along_axis(corners, order, axis=1)
+        cuts = [
+            (1, [(0, 1), (0, 2), (0, 3)]),
+            (3, [(0, 3), (1, 3), (2, 3)]),
+            (2, [(0, 2), (0, 3), (1, 3)]),
+            (2, [(0, 2), (1, 3), (1, 2)]),
+        ]
+        ends = np.concatenate([ordered[n_inside == count][:, cut] for count, cut in cuts])
 
     # Points are numbered by their edges, the lower vertex first, so that neighbors share them.
     ends = np.sort(ends, axis=2)
@@ -203,87 +249,13 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
     one, two = mesh.points[edges[:, 0]], mesh.points[edges[:, 1]]
     points = (1 - shares)[:, None] * one + shares[:, None] * two
     if mesh.dim == 3 and mesh.points.shape[1] == 3:
-        pieces = _facing_up(mesh, heights, points, pieces, edges)
-    return LevelSet(float(wanted), freeze(points), freeze(pieces), freeze(edges), freeze(shares))
-
-
-def _cut_triangles(
-    corners: Int[np.ndarray, "q 3"], above: Bool[np.ndarray, "q 3"]
-) -> Int[np.ndarray, "q 2 2"]:
-    """Return the two crossed edges of each triangle, with larger values left of the segment."""
-    n_above = above.sum(axis=1)
-    lone = np.argmax(above == (n_above == 1)[:, None], axis=1)
-    rows = np.arange(len(corners))
-    tip, following, before = (corners[rows, (lone + turn) % 3] for turn in range(3))
-    first, second = np.stack([tip, following], axis=1), np.stack([tip, before], axis=1)
-    ends = np.stack([first, second], axis=1)
-    return np.where((n_above == 1)[:, None, None], ends, ends[:, ::-1])
-
-
-def _cut_tetrahedra(
-    corners: Int[np.ndarray, "q 4"], above: Bool[np.ndarray, "q 4"]
-) -> Int[np.ndarray, "r 3 2"]:
-    """Return three crossed edges per triangle: one in a tetrahedron with a lone corner, or two."""
-    n_above = above.sum(axis=1)
-    # Corners above come first, in each tetrahedron.
-    ordered = np.take_along_axis(corners, np.argsort(~above, axis=1, kind="stable"), axis=1)
-    one, three, two = (ordered[n_above == count] for count in (1, 3, 2))
-    found = [
-        np.stack([one[:, [0, other]] for other in (1, 2, 3)], axis=1),
-        np.stack([three[:, [other, 3]] for other in (0, 1, 2)], axis=1),
-    ]
-    # Two above, two below: a quadrilateral, cut along a diagonal.
-    quad = [two[:, [0, 2]], two[:, [0, 3]], two[:, [1, 3]], two[:, [1, 2]]]
-    found += [np.stack([quad[0], quad[1], quad[2]], axis=1)]
-    found += [np.stack([quad[0], quad[2], quad[3]], axis=1)]
-    return np.concatenate(found)
-
-
-def _facing_up(
-    mesh: Mesh,
-    heights: Float[np.ndarray, " n"],
-    points: Float[np.ndarray, "p 3"],
-    pieces: Int[np.ndarray, "q 3"],
-    edges: Int[np.ndarray, "p 2"],
-) -> Int[np.ndarray, "q 3"]:
-    """Turn triangles over so that values grow along their normals."""
-    scaled, _ = size_one(points)
-    a, b, c = scaled[pieces].transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    # The upper end of the first corner's edge lies on the side of larger values.
-    ends = edges[pieces[:, 0]]
-    upper = np.where(heights[ends[:, 0]] > heights[ends[:, 1]], ends[:, 0], ends[:, 1])
-    lower = np.where(upper == ends[:, 0], ends[:, 1], ends[:, 0])
-    place, _ = size_one(mesh.points)
-    wrong = np.einsum("qi,qi->q", normals, place[upper] - place[lower]) < 0
-    turned = pieces.copy()
-    turned[wrong] = pieces[wrong][:, ::-1]
-    return turned
-
-
-def _chain(segments: Int[np.ndarray, "q 2"]) -> list[Int[np.ndarray, " k"]]:
-    """Follow segments from point to point; lines from their ends first, then closed ones."""
-    links: dict[int, list[int]] = {}
-    for number, (start, stop) in enumerate(segments.tolist()):
-        links.setdefault(start, []).append(number)
-        links.setdefault(stop, []).append(number)
-    ends = {point for point, numbers in links.items() if len(numbers) != 2}
-    unused = np.ones(len(segments), dtype=bool)
-    # Segments that leave an end come first, then those that arrive at one, then all others.
-    leaving = [row for row, (start, _) in enumerate(segments.tolist()) if start in ends]
-    arriving = [row for row, (_, stop) in enumerate(segments.tolist()) if stop in ends]
-    lines = []
-    for number in [*leaving, *arriving, *range(len(segments))]:
-        if not unused[number]:
-            continue
-        line = segments[number].tolist()
-        if line[1] in ends and line[0] not in ends:
-            line.reverse()
-        unused[number] = False
-        while line[-1] not in ends and line[-1] != line[0]:
-            following = next(each for each in links[line[-1]] if unused[each])
-            unused[following] = False
-            start, stop = segments[following].tolist()
-            line.append(stop if start == line[-1] else start)
-        lines.append(np.array(line, dtype=np.int64))
-    return sorted(lines, key=lambda line: (-len(line), int(line[0])))
+        # Values grow along the normals: the upper end of the first corner's edge is ahead.
+        a, b, c = size_one(points)[0][pieces].transpose(1, 0, 2)
+        normals = np.cross(b - a, c - a)
+        one, two = edges[pieces[:, 0]].T
+        is_upper = heights[one] > heights[two]
+        upper, lower = np.where(is_upper, one, two), np.where(is_upper, two, one)
+        place, _ = size_one(mesh.points)
+        wrong = np.einsum("qi,qi->q", normals, place[upper] - place[lower]) < 0
+        pieces = np.where(wrong[:, None], pieces[:, ::-1], pieces)
+    return LevelSet(float(wanted), points, pieces, edges, shares)

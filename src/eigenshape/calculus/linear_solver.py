@@ -8,11 +8,11 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import ReadOnly, freeze, point_functions, real_numbers, require_finite_rows
+from eigenshape._arrays import ReadOnly, point_functions, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.operators.laplacian import ASYMMETRY, find_zero_row_sums, require_points
+from eigenshape.operators.laplacian import as_symmetric, find_zero_row_sums, require_points
 from eigenshape.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 
 # Loads on a component where nothing is fixed may sum to this share of their absolute sum. Sums of a
@@ -121,7 +121,16 @@ class LinearSolver(ReadOnly):
                 f"they have {load.shape[1]}, {given.shape[1]} and {wanted.shape[1]}."
             )
         width = max(widths, default=1)
-        at_fixed = self._values_at_fixed(given)
+        # Values at `fixed`, where each point stands once.
+        _, first, inverse = np.unique(self._given, return_index=True, return_inverse=True)
+        at_fixed = given[first]
+        clash = np.argwhere(at_fixed[inverse] != given)
+        if len(clash):
+            entry, column = clash[0]
+            raise InvalidParameterError(
+                f"A point can be fixed at one value only; point {self._given[entry]} is fixed at "
+                f"{at_fixed[inverse[entry], column]} and at {given[entry, column]}."
+            )
         with one_blas_thread():
             found = self._solve_pinned(load, at_fixed, width)
             if self._constraints is None:
@@ -137,19 +146,6 @@ class LinearSolver(ReadOnly):
             )
         flat = max(np.ndim(each) for each in (right, values, targets)) < 2
         return found[:, 0] if flat else found
-
-    def _values_at_fixed(self, given: Float[np.ndarray, "g k"]) -> Float[np.ndarray, "c k"]:
-        """Return the values at `fixed`; raise an error if a point has two."""
-        _, first, inverse = np.unique(self._given, return_index=True, return_inverse=True)
-        at_fixed = given[first]
-        clash = np.argwhere(at_fixed[inverse] != given)
-        if len(clash):
-            entry, column = clash[0]
-            raise InvalidParameterError(
-                f"A point can be fixed at one value only; point {self._given[entry]} is fixed at "
-                f"{at_fixed[inverse[entry], column]} and at {given[entry, column]}."
-            )
-        return at_fixed
 
     def _solve_pinned(
         self, load: Float[np.ndarray, "n w"], at_fixed: Float[np.ndarray, "c v"], width: int
@@ -259,11 +255,11 @@ class Constraints:
             row, column = bad[0]
             if row >= n_rows:
                 solver._require_balanced(load)
+            target = targets[row, min(column, targets.shape[1] - 1)]
             raise InvalidParameterError(
                 "The constraints must not contradict each other or the fixed values; "
-                f"constraint {row} would hold with target "
-                f"{targets[row, min(column, targets.shape[1] - 1)] - left[row, column]:.6g} only, "
-                f"not {targets[row, min(column, targets.shape[1] - 1)]:.6g} ({len(bad)} such)."
+                f"constraint {row} would hold with target {target - left[row, column]:.6g} only, "
+                f"not {target:.6g} ({len(bad)} such)."
             )
         multipliers, constants = shares[:n_rows], self.scale * shares[n_rows:]
         found = start - self.response @ multipliers
@@ -271,9 +267,8 @@ class Constraints:
         inside = solver.floating >= 0
         untouched = np.flatnonzero(~self.constants.any(axis=0))
         free_mean = inside & np.isin(solver.floating, untouched)
-        kept = found[inside & ~free_mean]
-        if len(kept):
-            found[inside & ~free_mean] = kept + constants[solver.floating[inside & ~free_mean]]
+        shifted = inside & ~free_mean
+        found[shifted] += constants[solver.floating[shifted]]
         if free_mean.any():
             found[free_mean] = solver._without_means(found.copy())[free_mean]
         return found
@@ -347,13 +342,39 @@ def factor_equations(
     >>> solver.solve(laplacian.mass @ sources).shape
     (162, 100)
     """
-    system = _require_symmetric(matrix)
+    system = as_symmetric("The matrix of a system", matrix)
     points = require_points([] if fixed is None else fixed, system.shape[0])
-    floating = _floating_components(system, np.unique(points))
+    # Components without a fixed point where constants have no energy float; they are numbered.
+    count, labels = connected_components(system, directed=False)
+    rigid = np.bincount(labels, weights=~find_zero_row_sums(system), minlength=count) > 0
+    rigid[labels[points]] = True
+    floating = np.where(rigid, -1, np.cumsum(~rigid) - 1)[labels].astype(np.int64)
     solver = factor_system(system, points, floating, weights, indefinite=indefinite)
     if constraints is None:
         return solver
-    return replace(solver, _constraints=_eliminate(solver, constraints))
+    # The small system of the multipliers and of the constants on floating components.
+    given = constraints if sp.issparse(constraints) else real_numbers(constraints, "constraints")
+    if len(np.shape(given)) != 2 or np.shape(given)[1] != solver.n_points:
+        raise InvalidParameterError(
+            f"constraints must have one column per point, shape (p, {solver.n_points}); "
+            f"the shape is {np.shape(given)}."
+        )
+    matrix = sp.csr_array(given, dtype=np.float64)
+    if not np.isfinite(matrix.data).all():
+        raise InvalidParameterError("constraints must be finite; they are not.")
+    rows = matrix.T.toarray()
+    with one_blas_thread():
+        zero = np.zeros((len(solver.fixed), 1))
+        response = solver._solve_pinned(rows, zero, rows.shape[1])
+        constants = solver.floating_sums(rows).T
+        schur = matrix @ response
+        unit = np.abs(constants).max(initial=0.0)
+        scale = float(np.abs(schur).max() / unit) if unit > 0 and schur.any() else 1.0
+        corner = np.zeros((constants.shape[1],) * 2)
+        multipliers = np.block([[schur, -scale * constants], [-scale * constants.T, corner]])
+        inverse = np.linalg.pinv(multipliers, rcond=DEPENDENT, hermitian=True)
+    eliminated = Constraints(matrix, response, constants, scale, multipliers, inverse)
+    return replace(solver, _constraints=eliminated)
 
 
 def factor_definite(
@@ -387,109 +408,35 @@ def factor_system(
     free = np.setdiff1d(np.arange(n), np.concatenate([held, pins]))
     rows = system[free]
     block, coupling = rows[:, free], rows[:, held]
-    factor = _factor(block, free, indefinite=indefinite)
+    factor = factor_matrix(block) if len(free) else None
+    if len(free) and factor is None:
+        raise InvalidParameterError(SINGULAR.format("a pivot is 0"))
+    if factor is not None:
+        order = factor.elimination.order
+        small = np.flatnonzero(np.abs(factor.pivots) <= factor.rounding()[order])
+        if small.size:
+            point = free[order[small[0]]]
+            raise InvalidParameterError(
+                SINGULAR.format(f"the pivot of point {point} is zero up to rounding")
+            )
+        n_negative = np.count_nonzero(factor.pivots < 0)
+        if n_negative and not indefinite:
+            raise InvalidParameterError(
+                "A minimum exists only if the matrix is positive semidefinite; it has "
+                f"{n_negative} negative eigenvalues. Pass indefinite=True for a stationary point."
+            )
     return LinearSolver(
         n_points=n,
-        free=freeze(free),
-        fixed=freeze(held),
-        floating=freeze(floating),
-        _given=freeze(points),
-        _weights=freeze(means),
+        free=free,
+        fixed=held,
+        floating=floating,
+        _given=points,
+        _weights=means,
         _block=block,
         _coupling=coupling,
         _factor=factor,
         _refined=indefinite,
     )
-
-
-def _require_symmetric(matrix: SparseMatrix) -> sp.csr_array:
-    if not sp.issparse(matrix) or matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
-        raise InvalidParameterError(
-            "The matrix of a system must be sparse and square; it is "
-            f"a {type(matrix).__name__} of shape {np.shape(matrix)}."
-        )
-    system = sp.csr_array(matrix, dtype=np.float64, copy=True)
-    system.sum_duplicates()
-    largest = abs(system).max() if system.nnz else 0.0
-    if not np.isfinite(largest):
-        raise InvalidParameterError("The matrix of a system must be finite; it is not.")
-    asymmetry = abs(system - system.T)
-    if asymmetry.nnz and asymmetry.max() > ASYMMETRY * largest:
-        worst = asymmetry.tocoo()
-        at = int(worst.data.argmax())
-        i, j = worst.coords[0][at], worst.coords[1][at]
-        raise InvalidParameterError(
-            f"The matrix of a system must be symmetric; entry ({i}, {j}) is {system[i, j]} and "
-            f"entry ({j}, {i}) is {system[j, i]}."
-        )
-    return system
-
-
-def _floating_components(
-    system: sp.csr_array, fixed: Int[np.ndarray, " c"]
-) -> Int[np.ndarray, " n"]:
-    """Return numbers of components without fixed point where constants have no energy, else -1."""
-    count, labels = connected_components(system, directed=False)
-    rigid = np.bincount(labels, weights=~find_zero_row_sums(system), minlength=count) > 0
-    rigid[labels[fixed]] = True
-    numbers = np.where(rigid, -1, np.cumsum(~rigid) - 1)
-    return numbers[labels].astype(np.int64)
-
-
-def _factor(
-    block: sp.csr_array, free: Int[np.ndarray, " f"], *, indefinite: bool
-) -> SymmetricFactor | None:
-    """Factor the equations of the free points; None if there are none.
-
-    Raise InvalidParameterError if they are singular up to rounding, or have negative pivots that
-    are not expected.
-    """
-    if not len(free):
-        return None
-    factor = factor_matrix(block)
-    if factor is None:
-        raise InvalidParameterError(SINGULAR.format("a pivot is 0"))
-    pivots, bounds = factor.pivots, factor.rounding()[factor.elimination.order]
-    small = np.flatnonzero(np.abs(pivots) <= bounds)
-    if small.size:
-        point = free[factor.elimination.order[small[0]]]
-        raise InvalidParameterError(
-            SINGULAR.format(f"the pivot of point {point} is zero up to rounding")
-        )
-    negative = np.flatnonzero(pivots < 0)
-    if negative.size and not indefinite:
-        raise InvalidParameterError(
-            "A minimum exists only if the matrix is positive semidefinite; it has "
-            f"{negative.size} negative eigenvalues. Pass indefinite=True for a stationary point."
-        )
-    return factor
-
-
-def _eliminate(solver: LinearSolver, constraints: SparseMatrix | ArrayLike) -> Constraints:
-    """Prepare the small system of the multipliers and of the constants on floating components."""
-    given = constraints if sp.issparse(constraints) else real_numbers(constraints, "constraints")
-    matrix = (
-        sp.csr_array(given, dtype=np.float64) if np.ndim(given) == 2 or sp.issparse(given) else None
-    )
-    if matrix is None or matrix.shape[1] != solver.n_points:
-        raise InvalidParameterError(
-            f"constraints must have one column per point, shape (p, {solver.n_points}); "
-            f"the shape is {np.shape(given)}."
-        )
-    if not np.isfinite(matrix.data).all():
-        raise InvalidParameterError("constraints must be finite; they are not.")
-    rows = matrix.T.toarray()
-    with one_blas_thread():
-        zero = np.zeros((len(solver.fixed), 1))
-        response = solver._solve_pinned(rows, zero, rows.shape[1])
-        constants = solver.floating_sums(rows).T
-        schur = matrix @ response
-        unit = np.abs(constants).max(initial=0.0)
-        scale = float(np.abs(schur).max() / unit) if unit > 0 and schur.any() else 1.0
-        corner = np.zeros((constants.shape[1],) * 2)
-        system = np.block([[schur, -scale * constants], [-scale * constants.T, corner]])
-        inverse = np.linalg.pinv(system, rcond=DEPENDENT, hermitian=True)
-    return Constraints(matrix, response, constants, scale, system, inverse)
 
 
 def _columns(value: ArrayLike, name: str, n_rows: int, noun: str) -> Float[np.ndarray, "r k"]:

@@ -1,12 +1,11 @@
 """The logarithmic map of a surface, by short heat flow."""
 
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Complex, Float
 
 from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape.calculus.vector_heat import (
     VectorHeat,
@@ -22,6 +21,7 @@ from eigenshape.calculus.vector_heat import (
 )
 from eigenshape.geometry.conversion import MeshLike
 from eigenshape.geometry.simplices import in_length
+from eigenshape.operators.choices import require_choice
 from eigenshape.operators.directions import corner_products
 from eigenshape.operators.tufted import side_ends
 
@@ -82,7 +82,7 @@ def logarithmic_map(
     >>> bool(np.allclose(found, exact))
     True
     """
-    require_log_method(method)
+    require_choice(method, LogMethod, "method")
     solver = as_vector_heat(mesh)
     start = whole_number(source, "source", 0, solver.n_points - 1)
     require_source_everywhere(solver, np.array([start]))
@@ -92,61 +92,31 @@ def logarithmic_map(
     parallel = normalize(diffuse(solver, impulse))
     parallel[parallel == 0] = 1.0  # opposite to the source any direction will do
     if method == "radial":
-        found = _radial(solver, start, parallel)
-    else:
-        compute = _affine if method == "affine" else _adaptive
-        found = compute(solver, weight, parallel)
-    return in_length(as_rows(found), solver.scale, 1)
-
-
-def require_log_method(method: str) -> None:
-    """Raise an error if a method of the logarithmic map is unknown."""
-    if method not in get_args(LogMethod):
-        raise InvalidParameterError(
-            f"method must be 'affine', 'adaptive' or 'radial'; it is {method!r}."
-        )
-
-
-def _adaptive(
-    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
-) -> Complex[np.ndarray, " n"]:
-    """Diffuse affine coordinates (z, w) in the transported frame, where an edge is a translation.
-
-    Heat takes (z, w) at j to (z - w e, w) at i, with the edge e from i to j in the frame at i. So
-    w is the heat of functions, and z that with a source of translations: two solves by one factor.
-    """
+        # The field that points away from the source, integrated to distances.
+        radial = normalize(diffuse(solver, _outward_field(solver, start)))
+        radial[start] = 0.0
+        distance = integrate_along_edges(solver, edge_sums(solver, radial) / 2)
+        found = radial / parallel * (distance - distance[start])
+        return in_length(as_rows(found), solver.scale, 1)
+    # Affine coordinates (z, w), in which an edge is a translation: heat takes (z, w) at j to
+    # (z - w e, w) at i, with the edge e from i to j in the frame at i. So w is the heat of
+    # functions, and z that with a source of translations. Each side counts from both of its ends.
     tails, heads = side_ends(solver.mesh.faces)
     at_tail, at_head, _, weights = side_vectors(solver)
-    # Each side counts from both of its ends.
+    forth = -weights * weight[heads] * at_tail
+    back = weights * weight[tails] * at_head
+    if method == "adaptive":  # in the transported frame
+        forth, back = forth / parallel[tails], back / parallel[heads]
     sources = np.zeros(solver.n_points, dtype=complex)
-    np.add.at(sources, tails, -weights * weight[heads] * at_tail / parallel[tails])
-    np.add.at(sources, heads, weights * weight[tails] * at_head / parallel[heads])
+    np.add.at(sources, tails, forth)
+    np.add.at(sources, heads, back)
     time = solver.time / solver.scale**2
-    moved = solver.scalar_heat.solve(time * as_rows(sources))
-    return (moved[:, 0] + 1j * moved[:, 1]) / weight
-
-
-def _affine(
-    solver: VectorHeat, weight: Float[np.ndarray, " n"], parallel: Complex[np.ndarray, " n"]
-) -> Complex[np.ndarray, " n"]:
-    """Diffuse affine coordinates in the frames of all vertices, and turn them to the source's."""
-    tails, heads = side_ends(solver.mesh.faces)
-    at_tail, at_head, _, weights = side_vectors(solver)
-    sources = np.zeros(solver.n_points, dtype=complex)
-    np.add.at(sources, tails, -weights * weight[heads] * at_tail)
-    np.add.at(sources, heads, weights * weight[tails] * at_head)
-    moved = diffuse(solver, solver.time / solver.scale**2 * sources)
-    return moved / weight / parallel
-
-
-def _radial(
-    solver: VectorHeat, start: int, parallel: Complex[np.ndarray, " n"]
-) -> Complex[np.ndarray, " n"]:
-    """Diffuse the field that points away from the source, and integrate it to distances."""
-    radial = normalize(diffuse(solver, _outward_field(solver, start)))
-    radial[start] = 0.0
-    distance = integrate_along_edges(solver, edge_sums(solver, radial) / 2)
-    return radial / parallel * (distance - distance[start])
+    if method == "adaptive":
+        moved = solver.scalar_heat.solve(time * as_rows(sources))
+        found = (moved[:, 0] + 1j * moved[:, 1]) / weight
+    else:
+        found = diffuse(solver, time * sources) / weight / parallel
+    return in_length(as_rows(found), solver.scale, 1)
 
 
 def _outward_field(solver: VectorHeat, start: int) -> Complex[np.ndarray, " n"]:

@@ -2,19 +2,20 @@
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Int
 
 from eigenshape._arrays import real_numbers, require_finite_rows
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.grounded import factorize_definite, factorize_grounded
-from eigenshape.calculus.hodge import HodgeDecomposition, Rim, require_rim
+from eigenshape.calculus.hodge import HodgeDecomposition, Rim
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
+from eigenshape.operators.choices import require_choice
 
 # Share of a face's weight in the penalty on d ω: small enough that a few rounds are exact, large
 # enough that rounding leaves half of the digits to each round.
@@ -108,7 +109,7 @@ def decompose_one_form(
     True
     """
     mesh = as_simplicial(mesh)
-    require_rim(boundary)
+    require_choice(boundary, Rim, "boundary")
     if mesh.dim not in (2, 3):
         raise InvalidShapeError(f"One-forms need triangles or tetrahedra; the mesh is a {mesh!r}.")
     require_sound(mesh)
@@ -135,8 +136,34 @@ def decompose_one_form(
     poisson = factorize_grounded(stiffness, fixed)
     potential = poisson.solve((d0.T @ (mass @ form))[:, None])[:, 0]
     exact = d0 @ potential
-    closed, stream = _closed_part(form - exact, mass, d1, free)
-    # The closed part of what is left is harmonic up to rounding, which is projected away.
+    # What is left has a nearest closed one-form that is 0 off the free edges: least squares under
+    # d z = 0, by the method of multipliers. Each round is one solve with M + dᵀPd/ε, which is
+    # definite, whereas the saddle point system is singular on tetrahedra.
+    rest = form - exact
+    inner = np.flatnonzero(free)
+    matrix, differential = mass[inner][:, inner], d1[:, inner].tocsr()
+    # The penalty has the size of the mass, so that ε is a share in any unit.
+    penalty = float(matrix.diagonal().mean()) / PENALTY
+    factor = factorize_definite(matrix + penalty * (differential.T @ differential))
+    loads = (mass @ rest)[inner]
+    closed, stream = np.zeros(len(edges)), np.zeros(d1.shape[0])
+    size = float(np.abs(rest).max(initial=0.0))
+    for _ in range(ROUNDS):
+        # Rounding of the penalty must stay in the range of dᵀ, or it would enter the closed part.
+        turning = stream + penalty * (differential @ closed[inner])
+        residual = loads - matrix @ closed[inner] - differential.T @ turning
+        step = factor.solve(residual[:, None])[:, 0]
+        closed[inner] += step
+        stream = stream + penalty * (differential @ closed[inner])
+        if np.abs(step).max(initial=0.0) <= CLOSED * size:
+            break
+    else:
+        raise ConvergenceError(
+            f"The closed part of a one-form must have no circulation; after {ROUNDS} rounds it "
+            f"still changes by {np.abs(step).max() / size:.2g} of the largest value. Simplices may "
+            'be too thin; try repair(mesh, ["collapse_needles"]).'
+        )
+    # The closed part is harmonic up to rounding, which is projected away.
     rounding = poisson.solve((d0.T @ (mass @ closed))[:, None])[:, 0]
     harmonic = closed - d0 @ rounding
     return HodgeDecomposition(exact, form - exact - harmonic, harmonic, potential, stream)
@@ -163,12 +190,11 @@ def _whitney_mass(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> sp.csr_array:
     # ∫ λ_i λ_k over a simplex of volume 1.
     means = (1 + np.eye(m + 1)) / ((m + 1) * (m + 2))
     i, j = np.triu_indices(m + 1, 1)
-    k, last = i, j
     local = (
-        means[np.ix_(i, k)] * products[:, j[:, None], last]
-        - means[np.ix_(i, last)] * products[:, j[:, None], k]
-        - means[np.ix_(j, k)] * products[:, i[:, None], last]
-        + means[np.ix_(j, last)] * products[:, i[:, None], k]
+        means[np.ix_(i, i)] * products[:, j[:, None], j]
+        - means[np.ix_(i, j)] * products[:, j[:, None], i]
+        - means[np.ix_(j, i)] * products[:, i[:, None], j]
+        + means[np.ix_(j, j)] * products[:, i[:, None], i]
     )
     keys = _edge_keys(edges, mesh.n_points)
     numbers = np.searchsorted(keys, corners[:, i] * mesh.n_points + corners[:, j])
@@ -183,14 +209,9 @@ def _whitney_mass(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> sp.csr_array:
 def _differentials(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> tuple[sp.csr_array, sp.csr_array]:
     """Return the matrices of d on functions and on one-forms; triangles run from low to high."""
     n, number = mesh.n_points, np.arange(len(edges))
-    ones = np.ones(len(edges))
-    d0 = sp.coo_array(
-        (
-            np.concatenate([-ones, ones]),
-            (np.concatenate([number, number]), edges.T.ravel()),
-        ),
-        shape=(len(edges), n),
-    ).tocsr()
+    ends = (np.tile(number, 2), edges.T.ravel())
+    signs = np.repeat([-1.0, 1.0], len(edges))
+    d0 = sp.coo_array((signs, ends), shape=(len(edges), n)).tocsr()
     rows = np.sort(mesh.simplices, axis=1) if mesh.dim == 2 else facet_table(mesh).facets
     keys = _edge_keys(edges, n)
     sides = [
@@ -200,42 +221,3 @@ def _differentials(mesh: Mesh, edges: Int[np.ndarray, "e 2"]) -> tuple[sp.csr_ar
     places = (np.tile(np.arange(len(rows)), 3), np.concatenate(sides))
     d1 = sp.coo_array((signs, places), shape=(len(rows), len(edges))).tocsr()
     return d0, d1
-
-
-def _closed_part(
-    form: Float[np.ndarray, " e"],
-    mass: sp.csr_array,
-    d1: sp.csr_array,
-    free: Bool[np.ndarray, " e"],
-) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, " q"]]:
-    """Return the nearest closed one-form that is 0 off the free edges, and the multipliers.
-
-    Least squares under d z = 0, by the method of multipliers: each round is one solve with
-    M + dᵀPd/ε, which is definite, whereas the saddle point system is singular on tetrahedra.
-    """
-    inner = np.flatnonzero(free)
-    matrix, differential = mass[inner][:, inner], d1[:, inner].tocsr()
-    # The penalty has the size of the mass, so that ε is a share in any unit.
-    penalty = float(matrix.diagonal().mean()) / PENALTY
-    factor = factorize_definite(matrix + penalty * (differential.T @ differential))
-    loads = (mass @ form)[inner]
-    closed, stream = np.zeros(len(inner)), np.zeros(d1.shape[0])
-    size = float(np.abs(form).max(initial=0.0))
-    for _ in range(ROUNDS):
-        # Rounding of the penalty must stay in the range of dᵀ, or it would enter the closed part.
-        turning = stream + penalty * (differential @ closed)
-        rest = loads - matrix @ closed - differential.T @ turning
-        step = factor.solve(rest[:, None])[:, 0]
-        closed = closed + step
-        stream = stream + penalty * (differential @ closed)
-        if np.abs(step).max(initial=0.0) <= CLOSED * size:
-            break
-    else:
-        raise ConvergenceError(
-            f"The closed part of a one-form must have no circulation; after {ROUNDS} rounds it "
-            f"still changes by {np.abs(step).max() / size:.2g} of the largest value. Simplices may "
-            'be too thin; try repair(mesh, ["collapse_needles"]).'
-        )
-    whole = np.zeros(len(form))
-    whole[inner] = closed
-    return whole, stream

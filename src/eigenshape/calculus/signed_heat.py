@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Float
 
 from eigenshape._arrays import whole_numbers
 from eigenshape._errors import InvalidParameterError
@@ -81,61 +81,28 @@ def signed_heat_distance(
     True
     """
     solver = as_vector_heat(mesh)
-    starts, ends = _curve_edges(curves, solver.n_points)
-    outward, backward = _edge_directions(solver, starts, ends)
-    points = solver.mesh.vertices
-    lengths = np.linalg.norm(points[ends] - points[starts], axis=1)
-    # A quarter turn to the right from the way ahead; half of each edge counts at each of its ends.
-    normals = np.zeros(solver.n_points, dtype=complex)
-    np.add.at(normals, starts, -1j * outward * lengths / 2)
-    np.add.at(normals, ends, 1j * backward * lengths / 2)
-    reached = np.isin(solver.components, solver.components[starts])
-    field = diffuse(solver, normals)
-    _require_reached(solver, field, reached)
-    # Vectors are added before they are normalized: where fronts meet, they nearly cancel and their
-    # direction is rounding, which the longer vector at the other end of the edge outweighs.
-    distance = integrate_along_edges(solver, normalize(edge_sums(solver, field)))
-
-    n_components = int(solver.components.max()) + 1
-    along = np.bincount(solver.components[starts], lengths, minlength=n_components)
-    middles = lengths * (distance[starts] + distance[ends]) / 2
-    sums = np.bincount(solver.components[starts], middles, minlength=n_components)
-    means = sums / np.where(along > 0, along, 1.0)
-    shifted = distance - means[solver.components]
-    return in_length(np.where(reached, shifted, np.inf), solver.scale, 1)
-
-
-def _curve_edges(
-    curves: Sequence[ArrayLike], n_points: int
-) -> tuple[Int[np.ndarray, " e"], Int[np.ndarray, " e"]]:
-    """Return the start and the end of each edge of all curves."""
+    n, directions, faces = solver.n_points, solver.directions, solver.mesh.faces
     if not len(curves):
         raise InvalidParameterError("There must be at least one curve; there is none.")
-    starts, ends = [], []
+    paths = []
     for number, curve in enumerate(curves):
         if np.ndim(curve) == 0:
             raise InvalidParameterError(
                 f"curves must be a list of curves, each a list of vertices; curve {number} is "
                 f"{curve!r}. Pass a single curve as [curve]."
             )
-        vertices = whole_numbers(curve, f"A vertex of curve {number}", 0, n_points - 1)
+        vertices = whole_numbers(curve, f"A vertex of curve {number}", 0, n - 1)
         if len(vertices) < 2:
             raise InvalidParameterError(
                 f"A curve must have at least two vertices; curve {number} has {len(vertices)}. "
                 "The distance to a point has no sign: see heat_distances."
             )
-        starts.append(vertices[:-1])
-        ends.append(vertices[1:])
-    return np.concatenate(starts), np.concatenate(ends)
-
-
-def _edge_directions(
-    solver: VectorHeat, starts: Int[np.ndarray, " e"], ends: Int[np.ndarray, " e"]
-) -> tuple[Complex[np.ndarray, " e"], Complex[np.ndarray, " e"]]:
-    """Return the direction of each edge at its start, and the direction back at its end."""
-    n, directions = solver.n_points, solver.directions
-    tails, heads = side_ends(solver.mesh.faces)
-    # An edge may run along a side of a face or against it.
+        paths.append(vertices)
+    starts = np.concatenate([path[:-1] for path in paths])
+    ends = np.concatenate([path[1:] for path in paths])
+    # The direction of each edge at its start, and the direction back at its end. An edge may run
+    # along a side of a face or against it.
+    tails, heads = side_ends(faces)
     keys = np.concatenate([tails * n + heads, heads * n + tails])
     there = np.concatenate([directions.at_tail, directions.at_head])
     back = np.concatenate([directions.at_head, directions.at_tail])
@@ -149,17 +116,16 @@ def _edge_directions(
             f"{starts[bad[0]]} and {ends[bad[0]]} are not ({bad.size} such). "
             "es.calculus.geodesic_path finds ways between vertices that are not neighbors."
         )
-    return np.exp(1j * there[first[place]]), np.exp(1j * back[first[place]])
-
-
-def _require_reached(
-    solver: VectorHeat, field: Complex[np.ndarray, " n"], reached: np.ndarray
-) -> None:
-    """Raise an error where no normal arrives.
-
-    Where fronts meet, vectors may cancel at a vertex or along a line, but not on a whole face.
-    """
-    faces = solver.mesh.faces
+    outward, backward = np.exp(1j * there[first[place]]), np.exp(1j * back[first[place]])
+    points = solver.mesh.vertices
+    lengths = np.linalg.norm(points[ends] - points[starts], axis=1)
+    # A quarter turn to the right from the way ahead; half of each edge counts at each of its ends.
+    normals = np.zeros(n, dtype=complex)
+    np.add.at(normals, starts, -1j * outward * lengths / 2)
+    np.add.at(normals, ends, 1j * backward * lengths / 2)
+    reached = np.isin(solver.components, solver.components[starts])
+    field = diffuse(solver, normals)
+    # Where fronts meet, vectors may cancel at a vertex or along a line, but not on a whole face.
     cold = np.flatnonzero(reached[faces[:, 0]] & (field[faces] == 0).all(axis=1))
     if cold.size:
         raise InvalidParameterError(
@@ -167,3 +133,14 @@ def _require_reached(
             f"{cold[0]} they cancel, or are too small for a float ({cold.size} such). Run along "
             "each edge once, or choose a larger time_factor of prepare_vector_heat."
         )
+    # Vectors are added before they are normalized: where fronts meet, they nearly cancel and their
+    # direction is rounding, which the longer vector at the other end of the edge outweighs.
+    distance = integrate_along_edges(solver, normalize(edge_sums(solver, field)))
+
+    n_components = int(solver.components.max()) + 1
+    along = np.bincount(solver.components[starts], lengths, minlength=n_components)
+    middles = lengths * (distance[starts] + distance[ends]) / 2
+    sums = np.bincount(solver.components[starts], middles, minlength=n_components)
+    means = sums / np.where(along > 0, along, 1.0)
+    shifted = distance - means[solver.components]
+    return in_length(np.where(reached, shifted, np.inf), solver.scale, 1)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import short_repr
 from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
@@ -116,4 +116,4 @@ def as_path(points: Float[np.ndarray, "p 3"]) -> GeodesicPath:
     steps = np.linalg.norm(np.diff(unit, axis=0), axis=1)
     kept = np.append(True, steps > SAME)
     length = in_length(steps.sum(keepdims=True), scale, 1)
-    return GeodesicPath(freeze(points[kept]), float(length[0]))
+    return GeodesicPath(points[kept], float(length[0]))

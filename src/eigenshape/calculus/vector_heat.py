@@ -200,7 +200,11 @@ def extend_scalar(
             f"{len(wanted)} sources."
         )
     require_source_everywhere(solver, wanted)
-    return _extend(solver, wanted, given)
+    impulses = np.zeros((solver.n_points, 2))
+    np.add.at(impulses, wanted, np.column_stack([given, np.ones(len(given))]))
+    flowed = solver.scalar_heat.solve(impulses)
+    require_heat(flowed[:, 1:])
+    return flowed[:, 0] / flowed[:, 1]
 
 
 def transport_vectors(
@@ -254,7 +258,14 @@ def transport_vectors(
     """
     solver = as_vector_heat(mesh)
     wanted = require_sources(sources, solver.n_points)
-    given = _as_vectors(vectors, len(wanted))
+    rows = real_numbers(vectors, "vectors").astype(np.float64)
+    if rows.shape != (len(wanted), 2):
+        raise InvalidParameterError(
+            f"vectors must hold two coordinates per source, shape ({len(wanted)}, 2); the shape is "
+            f"{rows.shape}. Vectors in space have the coordinates tangent_frames(mesh)[i] @ vector."
+        )
+    require_finite_rows(rows, "vectors", "source")
+    given = rows[:, 0] + 1j * rows[:, 1]
     require_source_everywhere(solver, wanted)
     lengths = np.abs(given)
     impulses = np.zeros(solver.n_points, dtype=complex)
@@ -263,7 +274,7 @@ def transport_vectors(
         scalar_impulse(solver, int(wanted[0]))  # raises an error where no heat arrives
         lengths = np.full(solver.n_points, lengths[0])
     else:
-        lengths = _extend(solver, wanted, lengths)
+        lengths = extend_scalar(solver, wanted, lengths)
     found = normalize(diffuse(solver, impulses))
     return as_rows(found * lengths)
 
@@ -271,18 +282,6 @@ def transport_vectors(
 def as_vector_heat(mesh: MeshLike | VectorHeat) -> VectorHeat:
     """Prepare a mesh with the usual options, unless it is prepared."""
     return mesh if isinstance(mesh, VectorHeat) else prepare_vector_heat(mesh)
-
-
-def _as_vectors(vectors: ArrayLike, count: int) -> Complex[np.ndarray, " k"]:
-    """Return vectors of two coordinates as complex numbers."""
-    rows = real_numbers(vectors, "vectors").astype(np.float64)
-    if rows.shape != (count, 2):
-        raise InvalidParameterError(
-            f"vectors must hold two coordinates per source, shape ({count}, 2); the shape is "
-            f"{rows.shape}. Vectors in space have the coordinates tangent_frames(mesh)[i] @ vector."
-        )
-    require_finite_rows(rows, "vectors", "source")
-    return rows[:, 0] + 1j * rows[:, 1]
 
 
 def as_rows(field: Complex[np.ndarray, " n"]) -> Float[np.ndarray, "n 2"]:
@@ -317,16 +316,6 @@ def normalize(field: Complex[np.ndarray, " n"]) -> Complex[np.ndarray, " n"]:
     field = field.real / size + 1j * (field.imag / size)
     lengths = np.abs(field)
     return field / np.where(lengths > 0, lengths, 1.0)
-
-
-def _extend(
-    solver: VectorHeat, sources: Int[np.ndarray, " k"], values: Float[np.ndarray, " k"]
-) -> Float[np.ndarray, " n"]:
-    impulses = np.zeros((solver.n_points, 2))
-    np.add.at(impulses, sources, np.column_stack([values, np.ones(len(values))]))
-    flowed = solver.scalar_heat.solve(impulses)
-    require_heat(flowed[:, 1:])
-    return flowed[:, 0] / flowed[:, 1]
 
 
 def side_vectors(solver: VectorHeat) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -8,10 +8,9 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import surface_area, vertex_normals
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, triangular_sides
-from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
-from eigenshape.operators.choices import Mass
-from eigenshape.operators.cotangent import linear_mass, require_mass
+from eigenshape.operators.choices import Mass, require_choice
+from eigenshape.operators.cotangent import linear_mass
 from eigenshape.operators.laplacian import Laplacian
 
 # Asymmetry and negative eigenvalues up to this share of the largest entry count as rounding.
@@ -54,14 +53,7 @@ def anisotropic_laplacian(
     True
     """
     mesh = as_simplicial(mesh)
-    require_mass(mass)
-    _require_tensors(mesh, tensors)
-    require_sound(mesh)
-    products = elements.gradient_products(mesh, tensors)
-    return Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
-
-
-def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
+    require_choice(mass, Mass, "mass")
     wanted = (len(mesh.simplices), *(mesh.points.shape[1],) * 2)
     if tensors.shape != wanted:
         raise InvalidParameterError(
@@ -86,6 +78,9 @@ def _require_tensors(mesh: Mesh, tensors: np.ndarray) -> None:
             f"tensors must be positive semidefinite; that of {noun} {bad[0]} has the eigenvalue {lowest[bad[0]]:.6g} "
             f"({bad.size} such)."
         )
+    require_sound(mesh)
+    products = elements.gradient_products(mesh, tensors)
+    return Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
 
 
 def curvature_tensors(

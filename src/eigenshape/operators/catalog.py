@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr, short_repr
-from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
@@ -147,7 +147,8 @@ def build_laplacian(
     """
     if not isinstance(shape, sp.sparray):
         shape = as_shape(shape)
-    name = operator or default_operator(shape)
+    default = "point-cloud" if isinstance(shape, PointCloud) else "weighted"
+    name = operator or ("cotangent" if isinstance(shape, MESHES) else default)
     if name not in OPERATORS:
         raise InvalidParameterError(
             f"operator must be one of {', '.join(OPERATORS)}; it is {name!r}."
@@ -165,33 +166,22 @@ def build_laplacian(
         raise InvalidParameterError(
             f"The {name} operator takes {', '.join(entry.options) or 'no options'}; the option {unknown[0]} was given."
         )
-    if operator is None and isinstance(shape, PointCloud) and not options:
-        return _cloud_laplacian(shape)
-    return entry.build(shape, **options)
-
-
-def _cloud_laplacian(cloud: PointCloud) -> Laplacian:
-    """Build the kernel operator, or the robust one if points are too uneven for one width."""
+    if operator is not None or options or not isinstance(shape, PointCloud):
+        return entry.build(shape, **options)
+    # The kernel operator, or the robust one if points are too uneven for one width.
     try:
-        return point_cloud_laplacian(cloud)
+        return point_cloud_laplacian(shape)
     except UnevenSpacingError as error:
         # A width that reaches the farthest point would blur all others: no width is right.
-        if cloud.dim != 2 or cloud.points.shape[1] != 3:
+        if shape.dim != 2 or shape.points.shape[1] != 3:
             raise
         try:
-            robust = robust_laplacian(cloud)
+            robust = robust_laplacian(shape)
         except InvalidShapeError:
             raise error from None
     warnings.warn(
         "The points are too uneven for a kernel of one width, so robust_laplacian joins each point "
         "with its nearest ones. Pass a heat time t to use the kernel.",
-        stacklevel=3,
+        stacklevel=2,
     )
     return robust
-
-
-def default_operator(shape: Shape | sp.sparray) -> str:
-    """Return the name of the default operator for a shape."""
-    if isinstance(shape, PointCloud):
-        return "point-cloud"
-    return "cotangent" if isinstance(shape, MESHES) else "weighted"

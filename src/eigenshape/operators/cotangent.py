@@ -4,7 +4,6 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import scale_to_unit, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -12,7 +11,7 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import dual_volumes, in_length
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
-from eigenshape.operators.choices import Mass
+from eigenshape.operators.choices import Mass, require_choice
 from eigenshape.operators.laplacian import Laplacian
 
 # Dimension in which the default mass is averaged: experiments/ch3_tetrahedra chose it.
@@ -68,7 +67,7 @@ def cotangent_laplacian(mesh: MeshLike, mass: Mass | None = None) -> Laplacian:
     """
     mesh = as_simplicial(mesh)
     mass = mass or ("averaged" if mesh.dim == TETRAHEDRA else "lumped")
-    require_mass(mass)
+    require_choice(mass, Mass, "mass")
     require_sound(mesh)
     products = elements.gradient_products(mesh)
     return Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
@@ -81,14 +80,6 @@ def linear_mass(mesh: Mesh, mass: Mass) -> sp.csr_array:
         return lumped
     full = elements.mass(mesh, mesh.simplices, 1)
     return full if mass == "consistent" else ((full + lumped) / 2).tocsr()
-
-
-def require_mass(mass: str) -> None:
-    """Refuse a mass of another name."""
-    if mass not in ("lumped", "consistent", "averaged"):
-        raise InvalidParameterError(
-            f"mass must be 'lumped', 'consistent' or 'averaged'; it is {mass!r}."
-        )
 
 
 def mean_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:

@@ -61,54 +61,12 @@ def cotangents(lengths):
 
 @njit(error_model="numpy")
 @no_type_check
-def needs_flip(twins, lengths, side, tolerance):
-    one, size_one = cotangent(lengths, side)
-    two, size_two = cotangent(lengths, twins[side])
-    return one + two < -tolerance * (size_one + size_two)
-
-
-@njit(error_model="numpy")
-@no_type_check
 def _apex(lengths, side):
     """Return the coordinates of the opposite corner, along a side and perpendicular to it."""
     a = lengths[side]
     b = lengths[next_side(side)]
     c = lengths[next_side(next_side(side))]
     return (a * a + c * c - b * b) / (2 * a), 2 * area_of(a, b, c) / a
-
-
-@njit(error_model="numpy")
-@no_type_check
-def _crossing(lengths, side, twin):
-    """Return the length of the other diagonal of the two triangles at a side, unfolded."""
-    along, above = _apex(lengths, side)
-    back, below = _apex(lengths, twin)
-    return np.hypot(lengths[side] - along - back, above + below)
-
-
-@njit(error_model="numpy")
-@no_type_check
-def _flip(tails, twins, lengths, side):
-    # Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): outer sides move one place.
-    twin = twins[side]
-    crossing = _crossing(lengths, side, twin)
-    new = np.array(
-        [next_side(side), next_side(next_side(side)), next_side(twin), next_side(next_side(twin))]
-    )
-    old = np.array([new[1], new[2], new[3], new[0]])
-    from_old, of_old, old_lengths = tails[old], twins[old], lengths[old]
-    for k in range(4):
-        other = of_old[k]
-        for j in range(4):
-            if other == old[j]:
-                other = new[j]
-                break
-        tails[new[k]], lengths[new[k]] = from_old[k], old_lengths[k]
-        twins[new[k]] = other
-        twins[other] = new[k]
-    tails[side], tails[twin] = tails[new[2]], tails[new[0]]
-    lengths[side] = lengths[twin] = crossing
-    return new
 
 
 @njit(error_model="numpy")
@@ -129,12 +87,41 @@ def flip_to_delaunay(tails, twins, lengths, tolerance, most):
         side = queue[first]
         first, length = (first + 1) % n, length - 1
         waiting[side] = False
-        if not needs_flip(twins, lengths, side, tolerance):
+        one, size_one = cotangent(lengths, side)
+        two, size_two = cotangent(lengths, twins[side])
+        if not one + two < -tolerance * (size_one + size_two):
             continue
         flips += 1
         if flips > most:
             return -1
-        for outer in _flip(tails, twins, lengths, side):
+        # Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): outer sides move one place.
+        twin = twins[side]
+        # The length of the other diagonal of the two triangles, unfolded.
+        along, above = _apex(lengths, side)
+        back, below = _apex(lengths, twin)
+        crossing = np.hypot(lengths[side] - along - back, above + below)
+        new = np.array(
+            [
+                next_side(side),
+                next_side(next_side(side)),
+                next_side(twin),
+                next_side(next_side(twin)),
+            ]
+        )
+        old = np.array([new[1], new[2], new[3], new[0]])
+        from_old, of_old, old_lengths = tails[old], twins[old], lengths[old]
+        for k in range(4):
+            other = of_old[k]
+            for j in range(4):
+                if other == old[j]:
+                    other = new[j]
+                    break
+            tails[new[k]], lengths[new[k]] = from_old[k], old_lengths[k]
+            twins[new[k]] = other
+            twins[other] = new[k]
+        tails[side], tails[twin] = tails[new[2]], tails[new[0]]
+        lengths[side] = lengths[twin] = crossing
+        for outer in new:
             if not (waiting[outer] or waiting[twins[outer]]):
                 queue[(first + length) % n], waiting[outer] = outer, True
                 length += 1

@@ -11,6 +11,7 @@ from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import adjacency_matrix
+from eigenshape.operators.choices import require_choice
 from eigenshape.operators.laplacian import Laplacian, require_square
 
 Kind = Literal["combinatorial", "weighted", "normalized"]
@@ -62,10 +63,7 @@ def graph_laplacian(
     >>> es.solve_spectrum(laplacian, 3).eigenvalues.round(9).tolist()
     [0.0, 1.0, 3.0]
     """
-    if kind not in ("combinatorial", "weighted", "normalized"):
-        raise InvalidParameterError(
-            f"kind must be 'combinatorial', 'weighted' or 'normalized'; it is {kind!r}."
-        )
+    require_choice(kind, Kind, "kind")
     if sp.issparse(graph) or isinstance(graph, np.ndarray):
         adjacency = _as_adjacency(graph)
     else:
@@ -75,6 +73,7 @@ def graph_laplacian(
     if kind == "combinatorial":
         adjacency.data[:] = 1.0
     degrees = sp.diags_array(adjacency.sum(axis=1)).tocsr()
+    mass = sp.eye_array(adjacency.shape[0], format="csr")
     if kind == "normalized":
         alone = np.flatnonzero(np.diff(adjacency.indptr) == 0)
         if alone.size:
@@ -82,8 +81,8 @@ def graph_laplacian(
                 f"For a normalized Laplacian every point must have an edge; point {alone[0]} has none "
                 f"({alone.size} such). Choose combinatorial or weighted, or drop such points."
             )
-        return Laplacian((degrees - adjacency).tocsr(), degrees)
-    return Laplacian((degrees - adjacency).tocsr(), sp.eye_array(adjacency.shape[0], format="csr"))
+        mass = degrees
+    return Laplacian((degrees - adjacency).tocsr(), mass)
 
 
 def _as_adjacency(graph: sp.sparray | sp.spmatrix) -> sp.csr_array:
@@ -150,10 +149,7 @@ def edge_graph(mesh: MeshLike, weights: EdgeWeights = "unit") -> sp.csr_array:
     [[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0]]
     """
     mesh = as_simplicial(mesh)
-    if weights not in ("unit", "inverse_length"):
-        raise InvalidParameterError(
-            f"weights must be 'unit' or 'inverse_length'; it is {weights!r}."
-        )
+    require_choice(weights, EdgeWeights, "weights")
     require_distinct_corners(mesh)
     edges = edges_of(mesh)
     values = np.ones(len(edges))

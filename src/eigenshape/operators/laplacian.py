@@ -127,7 +127,7 @@ class Laplacian(ReadOnly):
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass"):
-            object.__setattr__(self, name, _as_symmetric(name, getattr(self, name)))
+            object.__setattr__(self, name, as_symmetric(name, getattr(self, name)))
         if self.stiffness.shape != self.mass.shape:
             raise InvalidParameterError(
                 f"stiffness and mass must have the same shape; the shapes are {self.stiffness.shape} and "
@@ -249,7 +249,7 @@ def require_square(matrix: Any, name: str, wanted: str = "a square sparse matrix
         )
 
 
-def _as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
+def as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
     """Return a read-only copy of a matrix, or raise an error if it is not finite and symmetric."""
     require_square(value, name)
     matrix = freeze_sparse(sp.csr_array(value, dtype=np.float64))

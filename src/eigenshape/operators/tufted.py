@@ -82,7 +82,27 @@ def tufted_cover(
     crowded = np.repeat(counts > 2, counts)
     if crowded.any():
         sides = order[crowded]
-        angles, ties = _angles(points, faces, sides, np.repeat(starts, counts)[crowded])
+        crowd = np.repeat(starts, counts)[crowded]
+        # The angle at which the face of each side stands around its edge.
+        face, corner = np.divmod(sides, 3)
+        tail, head, apex = (faces[face, (corner + step) % 3] for step in range(3))
+        low, high = np.minimum(tail, head), np.maximum(tail, head)
+        along = points[high] - points[low]
+        norms = np.linalg.norm(along, axis=1, keepdims=True)
+        along = np.divide(along, norms, out=np.zeros_like(along), where=norms > 0)
+        out = points[apex] - points[low]
+        out -= np.einsum("ij,ij->i", out, along)[:, None] * along
+        # Angles start from the face whose apex is farthest from the edge, which rounding has blurred
+        # least.
+        best = np.lexsort((sides, -np.linalg.norm(out, axis=1), crowd))
+        groups, inverse = np.unique(crowd, return_inverse=True)
+        zero = out[best[np.searchsorted(crowd[best], groups)]][inverse]
+        quarter = np.cross(along, zero)
+        angles = np.arctan2(np.einsum("ij,ij->i", out, quarter), np.einsum("ij,ij->i", out, zero))
+        # Faces with the same corners lie in one order seen from any of their sides: seen against it,
+        # from the last.
+        between = (low < apex) & (apex < high)
+        ties = np.where(between, -face, face)
         order[crowded] = sides[np.lexsort((ties, angles, keys[sides]))]
     place = np.arange(len(order)) + 1
     place[starts + counts - 1] = starts
@@ -107,34 +127,6 @@ def edge_keys(faces: Int[np.ndarray, "f 3"], n: int) -> Int[np.ndarray, " h"]:
     """Return for each side, the first from corner 0 to corner 1, a number that sides with the same ends share."""
     tails, heads = side_ends(faces)
     return np.minimum(tails, heads) * n + np.maximum(tails, heads)
-
-
-def _angles(
-    points: Float[np.ndarray, "n 3"],
-    faces: Int[np.ndarray, "f 3"],
-    sides: Int[np.ndarray, " c"],
-    edges: np.ndarray,
-) -> tuple[Float[np.ndarray, " c"], Int[np.ndarray, " c"]]:
-    """Return the angle at which the face of each side stands around its edge, and what orders faces at one angle."""
-    face, corner = np.divmod(sides, 3)
-    tail, head, apex = (faces[face, (corner + step) % 3] for step in range(3))
-    low, high = np.minimum(tail, head), np.maximum(tail, head)
-    along = points[high] - points[low]
-    lengths = np.linalg.norm(along, axis=1, keepdims=True)
-    along = np.divide(along, lengths, out=np.zeros_like(along), where=lengths > 0)
-    out = points[apex] - points[low]
-    out -= np.einsum("ij,ij->i", out, along)[:, None] * along
-    # Angles start from the face whose apex is farthest from the edge, which rounding has blurred
-    # least.
-    best = np.lexsort((sides, -np.linalg.norm(out, axis=1), edges))
-    groups, inverse = np.unique(edges, return_inverse=True)
-    zero = out[best[np.searchsorted(edges[best], groups)]][inverse]
-    quarter = np.cross(along, zero)
-    angles = np.arctan2(np.einsum("ij,ij->i", out, quarter), np.einsum("ij,ij->i", out, zero))
-    # Faces with the same corners lie in one order seen from any of their sides: seen against it,
-    # from the last.
-    between = (low < apex) & (apex < high)
-    return angles, np.where(between, -face, face)
 
 
 def flip_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Triangulation:

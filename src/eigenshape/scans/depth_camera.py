@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
@@ -110,16 +110,6 @@ class DepthScan(ReadOnly):
     __repr__ = short_repr
 
 
-@dataclass(frozen=True, eq=False)
-class _Picture:
-    """The pixels of a pinhole camera at the origin that looks along -z."""
-
-    focal: float
-    depth: Float[np.ndarray, "h w"]
-    slant: Float[np.ndarray, "h w"]
-    face: Int[np.ndarray, "h w"]
-
-
 def simulate_scan(
     mesh: MeshLike,
     rng: np.random.Generator,
@@ -196,17 +186,51 @@ def simulate_scan(
     turn, middle = rotation_towards(towards), low + (high - low) / 2
     ahead = np.array([0, 0, camera.distance])
     placed = TriangleMesh((points - middle) @ turn.T / diagonal - ahead, mesh.faces)
-    picture = _ideal_picture(placed, camera)
-    kept = _draw_pixels_to_keep(picture, camera, rng)
-    surface = _triangulate_pixels(picture, _noisy_depth(picture, camera, rng), kept)
+    # Depth, slant and face of each pixel without noise, by a pinhole camera at the origin that looks
+    # along -z; the picture just holds the sphere around the shape. 1/z is a linear function of the
+    # pixel within a face, so interpolating it gives exact depths.
+    size = camera.resolution
+    focal = (size / 2 - 1) * float(np.sqrt(4 * camera.distance**2 - 1))
+    depths = -placed.vertices[:, 2]
+    in_picture = focal * placed.vertices[:, :2] / depths[:, None] + size / 2
+    raster = rasterize(np.column_stack([in_picture, 1 / depths]), placed.faces, size, size)
+    is_seen = raster.face >= 0
+    depth = np.where(is_seen, 1 / raster.depth, np.inf)
+    # The vector from the camera to each pixel in the plane at distance 1.
+    across = (np.arange(size) + 0.5 - size / 2) / focal
+    rays = np.stack([*np.meshgrid(across, across), np.full((size, size), -1.0)], axis=2)
+    normals = face_normals(placed)[raster.face]
+    facing = np.abs(np.einsum("hwi,hwi->hw", normals, rays)) / np.linalg.norm(rays, axis=2)
+    slant = np.arccos(np.minimum(facing, 1))
+    # Pixels drop out at random, more of them where the surface turns away, and in round holes.
+    begins = np.deg2rad(camera.dropout_angle)
+    odds = np.clip((slant - begins) / (FULL_DROPOUT - begins), camera.dropout, 1)
+    kept = is_seen & (rng.random(odds.shape) >= odds)
+    seen_pixels = np.argwhere(is_seen)
+    if len(seen_pixels):
+        rows, columns = np.indices(kept.shape)
+        for row, column in seen_pixels[rng.integers(len(seen_pixels), size=camera.n_holes)]:
+            radius = camera.resolution * rng.uniform(*HOLE_SIZES)
+            kept &= (rows - row) ** 2 + (columns - column) ** 2 > radius**2
+    # Noise grows with the depth and the slant.
+    slanted = SLANT_NOISE * (slant / np.maximum(np.pi / 2 - slant, 1e-9)) ** 2
+    growth = (depth / camera.distance) ** 2 + np.minimum(slanted, LARGEST_SLANT_NOISE)
+    noise = camera.noise * np.where(is_seen, growth, 0) * rng.standard_normal(depth.shape)
+    measured = np.where(is_seen, depth + noise, 0)
+    # Connect the pixels that are kept, where they see one surface.
+    faces = pixel_faces(np.where(kept, measured, np.inf), focal)
+    if not len(faces):
+        raise InvalidShapeError(
+            "A scan must have a face; no three neighboring pixels see one surface from this view. "
+            "Choose another view, or a camera with a higher resolution."
+        )
+    places = rays * np.where(kept, measured, 0)[:, :, None]
+    surface = TriangleMesh(places.reshape(-1, 3), faces)
     wanted = np.ones(surface.n_faces, dtype=bool) if all_pieces else faces_of_largest(surface)
     seen, source = submesh(surface, wanted)
     back = ((seen.vertices + ahead) * diagonal @ turn + middle) * scale
-    columns = source % camera.resolution
-    pixels = np.column_stack([columns, source // camera.resolution])
-    return DepthScan(
-        TriangleMesh(back, seen.faces), freeze(picture.face.ravel()[source]), freeze(pixels)
-    )
+    pixels = np.column_stack([source % size, source // size])
+    return DepthScan(TriangleMesh(back, seen.faces), raster.face.ravel()[source], pixels)
 
 
 def _require_in_range(camera: DepthCamera) -> DepthCamera:
@@ -228,71 +252,3 @@ def _require_in_range(camera: DepthCamera) -> DepthCamera:
             f"dropout must be at least 0 and less than 1; it is {camera.dropout}."
         )
     return camera
-
-
-def _ideal_picture(placed: TriangleMesh, camera: DepthCamera) -> _Picture:
-    """Return depth, slant and face of each pixel without noise.
-
-    1/z is a linear function of the pixel within a face, so interpolating it gives exact depths.
-    """
-    size, points = camera.resolution, placed.vertices
-    focal = (size / 2 - 1) * float(np.sqrt(4 * camera.distance**2 - 1))
-    ahead = -points[:, 2]
-    pixels = np.column_stack([focal * points[:, :2] / ahead[:, None] + size / 2, 1 / ahead])
-    raster = rasterize(pixels, placed.faces, size, size)
-    depth = np.where(raster.face >= 0, 1 / raster.depth, np.inf)
-    rays = _rays(size, focal)
-    facing = np.abs(
-        np.einsum("hwi,hwi->hw", face_normals(placed)[raster.face], rays)
-    ) / np.linalg.norm(rays, axis=2)
-    return _Picture(focal, depth, np.arccos(np.minimum(facing, 1)), raster.face)
-
-
-def _rays(size: int, focal: float) -> Float[np.ndarray, "h w 3"]:
-    """Return the vector from the camera to each pixel in the plane at distance 1."""
-    across = (np.arange(size) + 0.5 - size / 2) / focal
-    return np.stack([*np.meshgrid(across, across), np.full((size, size), -1.0)], axis=2)
-
-
-def _draw_pixels_to_keep(
-    picture: _Picture, camera: DepthCamera, rng: np.random.Generator
-) -> Bool[np.ndarray, "h w"]:
-    begins = np.deg2rad(camera.dropout_angle)
-    odds = np.clip((picture.slant - begins) / (FULL_DROPOUT - begins), camera.dropout, 1)
-    kept = (picture.face >= 0) & (rng.random(odds.shape) >= odds)
-    seen = np.argwhere(picture.face >= 0)
-    if len(seen):
-        rows, columns = np.indices(kept.shape)
-        for row, column in seen[rng.integers(len(seen), size=camera.n_holes)]:
-            radius = camera.resolution * rng.uniform(*HOLE_SIZES)
-            kept &= (rows - row) ** 2 + (columns - column) ** 2 > radius**2
-    return kept
-
-
-def _noisy_depth(
-    picture: _Picture, camera: DepthCamera, rng: np.random.Generator
-) -> Float[np.ndarray, "h w"]:
-    slanted = SLANT_NOISE * (picture.slant / np.maximum(np.pi / 2 - picture.slant, 1e-9)) ** 2
-    growth = (picture.depth / camera.distance) ** 2 + np.minimum(slanted, LARGEST_SLANT_NOISE)
-    away = rng.standard_normal(picture.depth.shape)
-    return np.where(
-        picture.face >= 0,
-        picture.depth + camera.noise * np.where(picture.face >= 0, growth, 0) * away,
-        0,
-    )
-
-
-def _triangulate_pixels(
-    picture: _Picture, depth: Float[np.ndarray, "h w"], kept: Bool[np.ndarray, "h w"]
-) -> TriangleMesh:
-    """Connect the pixels that are kept, where they see one surface."""
-    faces = pixel_faces(np.where(kept, depth, np.inf), picture.focal)
-    if not len(faces):
-        raise InvalidShapeError(
-            "A scan must have a face; no three neighboring pixels see one surface from this view. "
-            "Choose another view, or a camera with a higher resolution."
-        )
-    points = (_rays(len(depth), picture.focal) * np.where(kept, depth, 0)[:, :, None]).reshape(
-        -1, 3
-    )
-    return TriangleMesh(points, faces)

@@ -1,7 +1,7 @@
 """Make a surface of a frame of a depth camera, along the grid of its pixels."""
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.spatial import Delaunay
 
 from eigenshape._errors import InvalidShapeError
@@ -43,33 +43,14 @@ def pixel_faces(depth: Float[np.ndarray, "h w"], focal: float) -> Int[np.ndarray
     """
     measured = np.isfinite(depth)
     is_full = measured[:-1, :-1] & measured[:-1, 1:] & measured[1:, 1:] & measured[1:, :-1]
-    faces = np.concatenate([_square_faces(depth, is_full), _gap_faces(measured, is_full)])
-
-    # A face may be as deep as its extent in the picture allows.
-    places = np.stack(np.divmod(faces, depth.shape[1]), axis=2)
-    extents = np.ptp(places, axis=1).max(axis=1)
-    depths = depth.ravel()[faces]
-    widths = depths.mean(axis=1) / focal
-    return faces[np.ptp(depths, axis=1) <= LARGEST_JUMP * extents * widths]
-
-
-def _square_faces(
-    depth: Float[np.ndarray, "h w"], is_full: Bool[np.ndarray, "_ _"]
-) -> Int[np.ndarray, "f 3"]:
-    """Return two triangles of each full square, along the diagonal with the smaller jump."""
+    # Two triangles of each full square, along the diagonal with the smaller jump.
     a = np.flatnonzero(np.pad(is_full, ((0, 1), (0, 1))))
     b, c, d = a + 1, a + depth.shape[1] + 1, a + depth.shape[1]
     flat = depth.ravel()
     along = np.abs(flat[a] - flat[c]) <= np.abs(flat[b] - flat[d])
     one = np.where(along[:, None], np.column_stack([a, b, c]), np.column_stack([a, b, d]))
     two = np.where(along[:, None], np.column_stack([a, c, d]), np.column_stack([b, c, d]))
-    return np.concatenate([one, two])
-
-
-def _gap_faces(
-    measured: Bool[np.ndarray, "h w"], is_full: Bool[np.ndarray, "_ _"]
-) -> Int[np.ndarray, "f 3"]:
-    """Return the small Delaunay triangles of the measured pixels that lie in no full square."""
+    # The small Delaunay triangles of the measured pixels that lie in no full square.
     # The corners of these triangles belong to a square that is not full, and full squares are
     # cells of the Delaunay triangulation. So it needs only those pixels; what it has within full
     # squares is left out.
@@ -95,7 +76,14 @@ def _gap_faces(
     turn = first[1] * second[0] - first[0] * second[1]
     triangles = np.where(turn[:, None] < 0, triangles[:, ::-1], triangles)[turn != 0]
     numbers = pixels[:, 0] * n_columns + pixels[:, 1]
-    return np.asarray(numbers[triangles])
+    faces = np.concatenate([one, two, numbers[triangles]])
+
+    # A face may be as deep as its extent in the picture allows.
+    places = np.stack(np.divmod(faces, depth.shape[1]), axis=2)
+    extents = np.ptp(places, axis=1).max(axis=1)
+    depths = depth.ravel()[faces]
+    widths = depths.mean(axis=1) / focal
+    return faces[np.ptp(depths, axis=1) <= LARGEST_JUMP * extents * widths]
 
 
 def triangulate_frame(points: Float[np.ndarray, "h w 3"]) -> RepairedMesh[TriangleMesh]:

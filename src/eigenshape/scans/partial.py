@@ -115,7 +115,25 @@ def partial_scan(
     """
     mesh = as_mesh(mesh)
     whole_number(resolution, "resolution", 16, 8192)
-    visible = _visible_vertices(mesh, unit_direction(view), resolution)
+    direction = unit_direction(view)
+    points = scale_to_unit(mesh)[0] @ rotation_towards(direction).T
+    low = points.min(axis=0)
+    span = float((points.max(axis=0) - low)[:2].max())
+    if not span > 0:
+        raise InvalidShapeError(
+            "A shape must have a size as seen by the viewer; "
+            "all its vertices lie on one line of sight. Choose another view."
+        )
+    pixels = (points - low) * ((resolution - 2) / span) + 1
+    raster = rasterize(pixels, mesh.faces, resolution, resolution)
+    column, row = pixels[:, :2].astype(np.int64).T
+    # The slope is the same on both sides of the surface, so it does not matter which is outside.
+    towards = np.abs(mean_normals(orient_consistently(mesh)) @ direction)
+    slope = np.minimum(
+        np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST_SURFACE),
+        STEEPEST_SURFACE,
+    )
+    visible = pixels[:, 2] >= raster.depth[row, column] - SLACK * (1 + slope)
     keep = visible[mesh.faces].all(axis=1)
     if keep.any() and not all_pieces:
         keep[keep] = faces_of_largest(TriangleMesh(mesh.vertices, mesh.faces[keep]))
@@ -184,29 +202,6 @@ def rotation_towards(view: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     right = np.cross(helper, view)
     right = right / np.linalg.norm(right)
     return np.stack([right, np.cross(view, right), view])
-
-
-def _visible_vertices(
-    mesh: TriangleMesh, view: Float[np.ndarray, "3"], resolution: int
-) -> Bool[np.ndarray, " n"]:
-    points = scale_to_unit(mesh)[0] @ rotation_towards(view).T
-    low = points.min(axis=0)
-    span = float((points.max(axis=0) - low)[:2].max())
-    if not span > 0:
-        raise InvalidShapeError(
-            "A shape must have a size as seen by the viewer; "
-            "all its vertices lie on one line of sight. Choose another view."
-        )
-    pixels = (points - low) * ((resolution - 2) / span) + 1
-    raster = rasterize(pixels, mesh.faces, resolution, resolution)
-    column, row = pixels[:, :2].astype(np.int64).T
-    # The slope is the same on both sides of the surface, so it does not matter which is outside.
-    towards = np.abs(mean_normals(orient_consistently(mesh)) @ view)
-    slope = np.minimum(
-        np.sqrt(1 - np.minimum(towards, 1) ** 2) / np.maximum(towards, 1 / STEEPEST_SURFACE),
-        STEEPEST_SURFACE,
-    )
-    return pixels[:, 2] >= raster.depth[row, column] - SLACK * (1 + slope)
 
 
 def cut_by_planes(mesh: MeshLike, planes: ArrayLike) -> MeshPart:

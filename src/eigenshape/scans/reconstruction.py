@@ -86,11 +86,37 @@ def reconstruct_surface(
         fft.next_fast_len(int(np.ceil(size + MARGIN * extent / cell)) + 1, real=True)
         for size in places.max(axis=0)
     ]
-    field = _field(places, -normals * areas[:, None] / cell**2, counts)
     near = np.zeros(counts, dtype=bool)
     near[tuple(places.astype(int).T)] = True
-    surface = _level_set(field, ndimage.binary_dilation(near, iterations=REACH))
-    mesh = _supported(surface, places, normals, np.sqrt(areas) / cell)
+    near = ndimage.binary_dilation(near, iterations=REACH)
+    mesh = _level_set(places, -normals * areas[:, None] / cell**2, near)
+    # Drop large pieces whose faces are far from all points, or face away from the nearest.
+    corners = mesh.vertices[mesh.faces]
+    facing = area_vectors(corners)
+    distance, nearest = cKDTree(places).query(corners.mean(axis=1))
+    # A camera sees few points on a face that turns away from it: far is what is far for them.
+    reach = SUPPORT * np.clip((np.sqrt(areas) / cell)[nearest], 1, REACH)
+    bare = (np.einsum("fi,fi->f", facing, normals[nearest]) < 0) | (distance > reach)
+    if bare.any():
+        # Single points decide where the rim runs, so it is ragged: averages of what faces say over
+        # their neighbors move it as mean curvature does (Merriman, Bence and Osher, 1992).
+        corner_of = sp.csr_array(
+            (
+                np.ones(3 * mesh.n_faces),
+                (np.repeat(np.arange(mesh.n_faces), 3), mesh.faces.ravel()),
+            ),
+            shape=(mesh.n_faces, mesh.n_vertices),
+        )
+        n_around = np.maximum(corner_of.sum(axis=0), 1)
+        share = bare.astype(float)
+        for _ in range(RIM_STEPS):
+            share = corner_of @ ((corner_of.T @ share) / n_around) / 3
+        bare = share > 0.5
+        bare = _large_pieces(mesh, bare)  # smaller ones close holes
+        kept = _large_pieces(mesh, ~bare)
+        if not kept.any():
+            raise _misses_points(1, len(places))
+        mesh = submesh(mesh, kept)[0]
     missed = np.mean(cKDTree(mesh.vertices).query(places)[0] > MISSED_CELLS)
     if missed > MOST_MISSED:
         raise _misses_points(missed, cloud.n_points)
@@ -136,10 +162,16 @@ def _oriented_normals(
     return normals
 
 
-def _field(
-    places: Float[np.ndarray, "n 3"], slopes: Float[np.ndarray, "n 3"], counts: list[int]
-) -> Float[np.ndarray, "x y z"]:
-    """Return the field on a grid whose slopes fit best; its median at the points is 0."""
+def _level_set(
+    places: Float[np.ndarray, "n 3"],
+    slopes: Float[np.ndarray, "n 3"],
+    near: Bool[np.ndarray, "x y z"],
+) -> TriangleMesh:
+    """Return where the field whose slopes fit best is zero in some cells, in their unit.
+
+    The surface faces lower values.
+    """
+    counts = near.shape
     first = places.astype(int)
     rest = places - first
     corners = [np.ravel_multi_index(tuple((first + corner).T), counts) for corner in CUBE]
@@ -163,17 +195,14 @@ def _field(
     field: Float[np.ndarray, "x y z"] = fft.irfftn(smoothed, s=counts)
     flat = field.ravel()
     at_points = sum(flat[corner] * share for corner, share in zip(corners, shares, strict=True))
-    return field - np.median(at_points)
-
-
-def _level_set(field: Float[np.ndarray, "x y z"], near: Bool[np.ndarray, "x y z"]) -> TriangleMesh:
-    """Return where a field is zero in some cells, in their unit; it faces lower values."""
-    counts, flat = field.shape, field.ravel()
+    # The median at the points is 0.
+    flat = flat - np.median(at_points)
+    # The surface in the cells, cut into tetrahedra.
     cells = np.argwhere(near[:-1, :-1, :-1])
-    corners = np.ravel_multi_index(tuple(np.moveaxis(cells[:, None] + CUBE, -1, 0)), counts)
-    inside = flat[corners] > 0
+    cell_corners = np.ravel_multi_index(tuple(np.moveaxis(cells[:, None] + CUBE, -1, 0)), counts)
+    inside = flat[cell_corners] > 0
     crossed = inside.any(axis=1) & ~inside.all(axis=1)
-    ids = corners[crossed][:, TETRAHEDRA].reshape(-1, 4)
+    ids = cell_corners[crossed][:, TETRAHEDRA].reshape(-1, 4)
     # Corners inside come first: then two kinds of cuts are left, a triangle and a quad.
     order = np.argsort(flat[ids] <= 0, axis=1, kind="stable")
     ids = np.take_along_axis(ids, order, axis=1)
@@ -197,39 +226,6 @@ def _level_set(field: Float[np.ndarray, "x y z"], near: Bool[np.ndarray, "x y z"
     outward = (end - start)[faces].sum(axis=1)
     turned = np.einsum("fi,fi->f", area_vectors(vertices[faces]), outward) < 0
     return TriangleMesh(vertices, np.where(turned[:, None], faces[:, ::-1], faces))
-
-
-def _supported(
-    mesh: TriangleMesh,
-    places: Float[np.ndarray, "n 3"],
-    normals: Float[np.ndarray, "n 3"],
-    spacings: Float[np.ndarray, " n"],
-) -> TriangleMesh:
-    """Drop large pieces whose faces are far from all points, or face away from the nearest."""
-    corners = mesh.vertices[mesh.faces]
-    facing = area_vectors(corners)
-    distance, nearest = cKDTree(places).query(corners.mean(axis=1))
-    # A camera sees few points on a face that turns away from it: far is what is far for them.
-    reach = SUPPORT * np.clip(spacings[nearest], 1, REACH)
-    bare = (np.einsum("fi,fi->f", facing, normals[nearest]) < 0) | (distance > reach)
-    if not bare.any():
-        return mesh
-    # Single points decide where the rim runs, so it is ragged: averages of what faces say over
-    # their neighbors move it as mean curvature does (Merriman, Bence and Osher, 1992).
-    corner_of = sp.csr_array(
-        (np.ones(3 * mesh.n_faces), (np.repeat(np.arange(mesh.n_faces), 3), mesh.faces.ravel())),
-        shape=(mesh.n_faces, mesh.n_vertices),
-    )
-    n_around = np.maximum(corner_of.sum(axis=0), 1)
-    share = bare.astype(float)
-    for _ in range(RIM_STEPS):
-        share = corner_of @ ((corner_of.T @ share) / n_around) / 3
-    bare = share > 0.5
-    bare = _large_pieces(mesh, bare)  # smaller ones close holes
-    kept = _large_pieces(mesh, ~bare)
-    if not kept.any():
-        raise _misses_points(1, len(places))
-    return submesh(mesh, kept)[0]
 
 
 def _misses_points(share: float, n_points: int) -> InvalidShapeError:

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, positive_values, whole_number
+from eigenshape._arrays import ReadOnly, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -104,8 +104,8 @@ def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes
         np.minimum(least, row, out=least)
     reached = float(least.max())
     return AnchorNodes(
-        vertices=freeze(np.array(chosen)),
-        points=freeze(mesh.points[chosen]),
+        vertices=np.array(chosen),
+        points=mesh.points[chosen],
         reached=reached,
         cover=reached + float(longest_edges(mesh).max()) / 3**0.5,
     )
@@ -141,7 +141,7 @@ def anchor_region(points: Points, nodes: Points, delta: float) -> Bool[np.ndarra
     array([ True,  True, False])
     """
     positive_values(delta, "delta")
-    return _distance_to_nodes(points, nodes) <= delta
+    return np.asarray(cKDTree(nodes).query(points)[0] <= delta)
 
 
 def witness_region(
@@ -205,7 +205,7 @@ def witness_region(
     reach = (positive_values(rho, "rho")[0] + 1) * positive_values(delta, "delta")[0]
     labels, before = preimages(perturbation, points)
     inside = np.zeros(points.n_points, dtype=bool)
-    inside[labels == OUTSIDE] = _distance_to_nodes(before, nodes) <= reach
+    inside[labels == OUTSIDE] = cKDTree(nodes).query(before)[0] <= reach
     met = np.any(regions_met(perturbation, nodes, reach), axis=0)
     inside[labels != OUTSIDE] = np.take(met, labels[labels != OUTSIDE])
     return inside
@@ -259,7 +259,3 @@ def regions_met(perturbation: Perturbation, nodes: Points, reach: float) -> Bool
             least = squared_distances(point[None], near).min(initial=np.inf)
             found[node, region] = least <= within**2
     return found
-
-
-def _distance_to_nodes(points: Points, nodes: Points) -> Float[np.ndarray, " _"]:
-    return cKDTree(nodes).query(points)[0]

@@ -98,17 +98,8 @@ def weyl_bound(one: Laplacian, two: Laplacian, partners: ArrayLike | None = None
             "Weyl's bound needs operators on the same number of points; "
             f"they have {one.n_points} and {two.n_points}."
         )
-    order = _permutation(partners, two.n_points)
-    first, second = _symmetric(one, "one"), _symmetric(two, "two")
-    difference = (first - second[order][:, order]).tocsr()
-    proven = float(abs(difference).sum(axis=1).max())
-    return WeylBound(min(_norm(difference), proven) if proven else 0.0, proven)
-
-
-def _permutation(partners: ArrayLike | None, n: int) -> np.ndarray:
-    if partners is None:
-        return np.arange(n)
-    order = whole_numbers(partners, "partners", 0, n - 1)
+    n = two.n_points
+    order = np.arange(n) if partners is None else whole_numbers(partners, "partners", 0, n - 1)
     if len(order) != n:
         raise InvalidParameterError(
             f"partners must name each point once; there are {len(order)} of {n}."
@@ -118,30 +109,20 @@ def _permutation(partners: ArrayLike | None, n: int) -> np.ndarray:
         raise InvalidParameterError(
             f"partners must name each point once; point {times.argmax()} has {times.max()}."
         )
-    return order
-
-
-def _symmetric(laplacian: Laplacian, name: str) -> sp.csr_array:
-    """Return B^(-1/2) W B^(-1/2)."""
-    require_matrix(laplacian, name)
-    if laplacian.mass.nnz > laplacian.n_points:
-        raise InvalidParameterError(
-            f"Weyl's bound needs a diagonal mass; that of {name} is not. Build it with lumped mass."
-        )
-    roots = sp.diags_array(1 / np.sqrt(laplacian.mass.diagonal()))
-    return (roots @ laplacian.stiffness @ roots).tocsr()
-
-
-def _norm(matrix: sp.csr_array) -> float:
-    """Return the largest absolute eigenvalue."""
-    n = matrix.shape[0]
+    first, second = _symmetric(one, "one"), _symmetric(two, "two")
+    difference = (first - second[order][:, order]).tocsr()
+    proven = float(abs(difference).sum(axis=1).max())
+    if not proven:
+        return WeylBound(0.0, proven)
+    # The norm is the largest absolute eigenvalue.
     if n <= DENSE:
-        return float(np.abs(np.linalg.eigvalsh(matrix.toarray())).max())
-    size = float(abs(matrix).max())
+        norm = float(np.abs(np.linalg.eigvalsh(difference.toarray())).max())
+        return WeylBound(min(norm, proven), proven)
+    size = float(abs(difference).max())
     start = np.random.default_rng(0).standard_normal(n)
     try:
         values = eigsh(
-            matrix / size,
+            difference / size,
             1,
             which="LM",
             v0=start,
@@ -154,7 +135,18 @@ def _norm(matrix: sp.csr_array) -> float:
             "The norm of the difference of two operators must converge; "
             f"it was not found in {MOST_STEPS} steps of Lanczos' method."
         ) from err
-    return size * float(np.abs(values[0]))
+    return WeylBound(min(size * float(np.abs(values[0])), proven), proven)
+
+
+def _symmetric(laplacian: Laplacian, name: str) -> sp.csr_array:
+    """Return B^(-1/2) W B^(-1/2)."""
+    require_matrix(laplacian, name)
+    if laplacian.mass.nnz > laplacian.n_points:
+        raise InvalidParameterError(
+            f"Weyl's bound needs a diagonal mass; that of {name} is not. Build it with lumped mass."
+        )
+    roots = sp.diags_array(1 / np.sqrt(laplacian.mass.diagonal()))
+    return (roots @ laplacian.stiffness @ roots).tocsr()
 
 
 @dataclass(frozen=True)

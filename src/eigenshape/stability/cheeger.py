@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape._typing import Integer
@@ -119,18 +119,6 @@ def cheeger_estimate(
     """
     mesh = as_mesh(mesh)
     require_type(spectrum, Spectrum, "spectrum")
-    values = _first_values(mesh, spectrum)
-    count = min(whole_number(n_modes, "n_modes", 1), len(values) - 1)
-    upper, level, mode = min(
-        (*_best_cut(mesh, spectrum.eigenvectors[:, mode]), mode) for mode in range(1, count + 1)
-    )
-    a = np.sqrt(max(-least_curvature, 0.0)) if least_curvature is not None else np.inf
-    lower = (np.sqrt(a**2 + 10 * values[1]) - a) / 10 if np.isfinite(a) else 0.0
-    part = freeze(spectrum.eigenvectors[:, mode] > level)
-    return CheegerEstimate(upper, float(2 * np.sqrt(values[1])), float(lower), mode, part)
-
-
-def _first_values(mesh: TriangleMesh, spectrum: Spectrum) -> Float[np.ndarray, " k"]:
     values, n_vertices = spectrum.eigenvalues, len(spectrum.eigenvectors)
     if n_vertices != mesh.n_vertices:
         raise InvalidParameterError(
@@ -148,14 +136,25 @@ def _first_values(mesh: TriangleMesh, spectrum: Spectrum) -> Float[np.ndarray, "
             f"{values[1]:.3g}, so it falls into pieces and the constant is 0. "
             "Take one component of it."
         )
-    return values
+    count = min(whole_number(n_modes, "n_modes", 1), len(values) - 1)
+    upper, level, mode = min(
+        (*_best_cut(mesh, spectrum.eigenvectors[:, mode]), mode) for mode in range(1, count + 1)
+    )
+    a = np.sqrt(max(-least_curvature, 0.0)) if least_curvature is not None else np.inf
+    lower = (np.sqrt(a**2 + 10 * values[1]) - a) / 10 if np.isfinite(a) else 0.0
+    part = spectrum.eigenvectors[:, mode] > level
+    return CheegerEstimate(upper, float(2 * np.sqrt(values[1])), float(lower), mode, part)
 
 
 def _best_cut(mesh: TriangleMesh, function: Float[np.ndarray, " n"]) -> tuple[float, float]:
     """Return the smallest ratio of length to smaller area among level lines, and its level."""
     corners = np.sort(function[mesh.faces], axis=1)
     areas = face_areas(mesh)
-    slopes = _slopes(mesh, function, areas)
+    # |∇f| on each face, in value/length.
+    p, q, r = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
+    a, b, c = (function[mesh.faces[:, corner]][:, None] for corner in range(3))
+    # f is constant along a(r - q) + b(p - r) + c(q - p), whose length is |∇f| times twice the area.
+    slopes = np.linalg.norm(a * (r - q) + b * (p - r) + c * (q - p), axis=1) / (2 * areas)
     shares = np.linspace(0, 1, N_LEVELS + 2)[1:-1]
     low, high = function.min(), function.max()
     # Evenly spaced levels sample necks, which have few vertices and a steep slope; quantiles sample
@@ -167,16 +166,6 @@ def _best_cut(mesh: TriangleMesh, function: Float[np.ndarray, " n"]) -> tuple[fl
     ratios = [_ratio(corners, areas, slopes, level) for level in levels]
     best = int(np.argmin(ratios))
     return ratios[best], float(levels[best])
-
-
-def _slopes(
-    mesh: TriangleMesh, function: Float[np.ndarray, " n"], areas: Float[np.ndarray, " f"]
-) -> Float[np.ndarray, " f"]:
-    """Return |∇f| on each face, in value/length."""
-    p, q, r = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
-    a, b, c = (function[mesh.faces[:, corner]][:, None] for corner in range(3))
-    # f is constant along a(r - q) + b(p - r) + c(q - p), whose length is |∇f| times twice the area.
-    return np.linalg.norm(a * (r - q) + b * (p - r) + c * (q - p), axis=1) / (2 * areas)
 
 
 def _ratio(

@@ -1,13 +1,13 @@
 """Closeness of two shapes: the smallest δ of thesis 3.1 and 4.1."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly
 from eigenshape._text import short_repr
 from eigenshape.geometry.enclosing_ball import enclosing_ball
 from eigenshape.geometry.simplices import require_volumes, size_one, volumes
@@ -68,21 +68,19 @@ class Closeness(ReadOnly):
 
     def explain(self) -> str:
         """Describe in plain words how close the shapes are, and what limits δ."""
-        parts = _relative_changes(
-            self.displacement, self.jacobians, self.radii, self.volume_ratios, self.size
-        )
+        parts = self._largest_changes()
         points = "Outside the anomalous regions points" if len(self.radii) else "Points"
         text = (
             f"{points} move by up to {_largest(self.displacement):.3g} "
-            f"({_largest(parts['displacement']):.3g} of the size {self.size:.3g}), and the volumes "
-            f"of simplices change by a factor of up to 1 ± {_largest(parts['Jacobian']):.3g}."
+            f"({parts['displacement']:.3g} of the size {self.size:.3g}), and the volumes "
+            f"of simplices change by a factor of up to 1 ± {parts['Jacobian']:.3g}."
         )
         if len(self.radii):
             text += (
                 f" Each of the {len(self.radii)} anomalous regions and its replacement lie in a "
                 f"ball of radius {_largest(self.radii):.3g} or less "
-                f"({_largest(parts['ball']):.3g} of the size), and its volume changes by a factor "
-                f"of up to 1 ± {_largest(parts['volume']):.3g}."
+                f"({parts['ball']:.3g} of the size), and its volume changes by a factor "
+                f"of up to 1 ± {parts['volume']:.3g}."
             )
         limit = {
             "nothing": "the shapes are the same",
@@ -94,6 +92,14 @@ class Closeness(ReadOnly):
         return (
             f"{text} The smallest δ for which the shapes are δ-close is {self.delta:.3g}: {limit}."
         )
+
+    def _largest_changes(self) -> dict[Limit, float]:
+        return {
+            "displacement": _largest(self.displacement / self.size),
+            "Jacobian": _largest(np.abs(self.jacobians - 1)),
+            "ball": _largest(self.radii / self.size),
+            "volume": _largest(np.abs(self.volume_ratios - 1)),
+        }
 
 
 def measure_closeness(perturbation: Perturbation) -> Closeness:
@@ -157,33 +163,10 @@ def measure_closeness(perturbation: Perturbation) -> Closeness:
     sums_two = np.bincount(perturbation.regions_two + 1, volumes_two, perturbation.n_regions + 1)
     ratios = sums_two[1:] / sums_one[1:]
 
-    changes = _relative_changes(displacement, jacobians, radii, ratios, size)
-    largest = {name: _largest(change) for name, change in changes.items()}
+    found = Closeness(displacement, jacobians, radii, ratios, size, 0.0, "nothing")
+    largest = found._largest_changes()
     limit = max(largest, key=lambda name: largest[name])
-    return Closeness(
-        displacement=freeze(displacement),
-        jacobians=freeze(jacobians),
-        radii=freeze(radii),
-        volume_ratios=freeze(ratios),
-        size=size,
-        delta=largest[limit],
-        limited_by=limit if largest[limit] else "nothing",
-    )
-
-
-def _relative_changes(
-    displacement: Float[np.ndarray, " v"],
-    jacobians: Float[np.ndarray, " f"],
-    radii: Float[np.ndarray, " r"],
-    volume_ratios: Float[np.ndarray, " r"],
-    size: float,
-) -> dict[Limit, Float[np.ndarray, " _"]]:
-    return {
-        "displacement": displacement / size,
-        "Jacobian": np.abs(jacobians - 1),
-        "ball": radii / size,
-        "volume": np.abs(volume_ratios - 1),
-    }
+    return replace(found, delta=largest[limit], limited_by=limit) if largest[limit] else found
 
 
 def _largest(values: Float[np.ndarray, " _"]) -> float:

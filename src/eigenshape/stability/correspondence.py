@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, positive_values
+from eigenshape._arrays import ReadOnly, finite_rows, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
@@ -187,15 +187,9 @@ def correspondence_graph(
     require_type(points_two, SurfacePoints, "points_two")
     reach = float((positive_values(rho, "rho")[0] + 1) * positive_values(delta, "delta")[0])
     used, node = np.unique(cKDTree(nodes).query(points_one.points)[1], return_inverse=True)
-    witnesses = _list_witnesses(perturbation, points_two, nodes[used], reach)
-    return sp.csr_array(witnesses[node])
-
-
-def _list_witnesses(
-    perturbation: Perturbation, points: SurfacePoints, nodes: Float[np.ndarray, "a d"], reach: float
-) -> sp.csr_array:
-    """Return, for each node, the points of N in its witness region, as rows of a matrix."""
-    labels, before = preimages(perturbation, points)
+    nodes = nodes[used]
+    # The points of N in the witness region of each node, as rows of a matrix.
+    labels, before = preimages(perturbation, points_two)
     near = near_pairs(nodes, before, reach, 2.0)
     rows, columns = [near.i], [np.flatnonzero(labels == OUTSIDE)[near.j]]
     meets = regions_met(perturbation, nodes, reach)
@@ -204,11 +198,11 @@ def _list_witnesses(
         rows.append(np.repeat(met, len(inside)))
         columns.append(np.tile(inside, len(met)))
     ends = np.concatenate(rows), np.concatenate(columns)
-    graph = sp.csr_array(
+    witnesses = sp.csr_array(
         (np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(nodes), len(labels))
     )
-    graph.sort_indices()
-    return graph
+    witnesses.sort_indices()
+    return sp.csr_array(witnesses[node])
 
 
 def maximum_matching(graph: sp.sparray) -> MaximumMatching:
@@ -239,7 +233,7 @@ def maximum_matching(graph: sp.sparray) -> MaximumMatching:
     n, n_columns = joined.shape
     partners, depth = match_rows(joined.indptr, joined.indices, n_columns, np.full(n, -1))
     blocked = np.flatnonzero(depth >= 0) if (partners < 0).any() else np.empty(0, dtype=np.int64)
-    return MaximumMatching(freeze(partners), freeze(blocked))
+    return MaximumMatching(partners, blocked)
 
 
 def bottleneck_matching(one: ArrayLike, two: ArrayLike) -> BottleneckMatching:
@@ -280,4 +274,4 @@ def bottleneck_matching(one: ArrayLike, two: ArrayLike) -> BottleneckMatching:
         )
     both, scale = size_one(np.stack([first, second]))
     distance, partners = least_perfect(both[0], both[1], 2.0)
-    return BottleneckMatching(freeze(partners), scale * distance)
+    return BottleneckMatching(partners, scale * distance)

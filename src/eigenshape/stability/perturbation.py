@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, face_labels, freeze
+from eigenshape._arrays import ReadOnly, face_labels
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
@@ -131,9 +131,35 @@ def measure_perturbation(
         )
     labels_one = _check_labels(regions_one, one, "regions_one")
     labels_two = _check_labels(regions_two, two, "regions_two")
-    _require_same_regions(labels_one, labels_two)
-    found = Perturbation(one, two, freeze(labels_one), freeze(labels_two))
-    _require_rims(found, vertex_pairs(found))
+    n_regions = max(labels_one.max(), labels_two.max()) + 1
+    for name, labels in (("regions_one", labels_one), ("regions_two", labels_two)):
+        missing = np.flatnonzero(np.bincount(labels[labels != OUTSIDE], minlength=n_regions) == 0)
+        if missing.size:
+            raise InvalidParameterError(
+                f"Both shapes must have the same anomalous regions, numbered 0..{n_regions - 1}; "
+                f"{name} has no face in region {missing[0]}."
+            )
+    outside = [int((labels == OUTSIDE).sum()) for labels in (labels_one, labels_two)]
+    if outside[0] != outside[1]:
+        raise InvalidParameterError(
+            "The same number of faces of both shapes must lie outside the regions; "
+            f"{outside[0]} and {outside[1]} do."
+        )
+    found = Perturbation(one, two, labels_one, labels_two)
+    # Φ must map the boundary of each X_i onto that of Y_i (C1).
+    pairs = vertex_pairs(found)
+    image = np.full(one.n_points, OUTSIDE)
+    image[pairs[:, 0]] = pairs[:, 1]
+    here = _rims(one, labels_one)
+    here[:, 1:] = np.sort(image[here[:, 1:]], axis=1)
+    there = _rims(two, labels_two)
+    different = set(map(tuple, here.tolist())) ^ set(map(tuple, there.tolist()))
+    if different:
+        region, *corners = min(different)
+        raise InvalidParameterError(
+            "The boundary of a region must be mapped onto that of its counterpart (C1); for region "
+            f"{region} vertices {corners} of `two` span a side of only one of the two boundaries."
+        )
     return found
 
 
@@ -196,11 +222,6 @@ def _check_labels(regions: ArrayLike | None, mesh: Mesh, name: str) -> Labels:
             f"{name} must number regions from 0, with -1 outside; "
             f"face {wrong[0]} has {labels[wrong[0]]}."
         )
-    _require_apart(mesh, labels, name)
-    return labels
-
-
-def _require_apart(mesh: Mesh, labels: Labels, name: str) -> None:
     corners, at = mesh.simplices[labels != OUTSIDE], labels[labels != OUTSIDE]
     least, most = np.full(mesh.n_points, len(labels)), np.full(mesh.n_points, OUTSIDE)
     np.minimum.at(least, corners, at[:, None])
@@ -212,39 +233,7 @@ def _require_apart(mesh: Mesh, labels: Labels, name: str) -> None:
             f"Anomalous regions must not touch; in {name}, vertex {vertex} is in regions "
             f"{least[vertex]} and {most[vertex]}. Make them one region."
         )
-
-
-def _require_same_regions(one: Labels, two: Labels) -> None:
-    n_regions = max(one.max(), two.max()) + 1
-    for name, labels in (("regions_one", one), ("regions_two", two)):
-        missing = np.flatnonzero(np.bincount(labels[labels != OUTSIDE], minlength=n_regions) == 0)
-        if missing.size:
-            raise InvalidParameterError(
-                f"Both shapes must have the same anomalous regions, numbered 0..{n_regions - 1}; "
-                f"{name} has no face in region {missing[0]}."
-            )
-    outside = [int((labels == OUTSIDE).sum()) for labels in (one, two)]
-    if outside[0] != outside[1]:
-        raise InvalidParameterError(
-            "The same number of faces of both shapes must lie outside the regions; "
-            f"{outside[0]} and {outside[1]} do."
-        )
-
-
-def _require_rims(perturbation: Perturbation, pairs: Int[np.ndarray, "v 2"]) -> None:
-    """Raise an error if Φ does not map the boundary of each X_i onto that of Y_i (C1)."""
-    image = np.full(perturbation.one.n_points, OUTSIDE)
-    image[pairs[:, 0]] = pairs[:, 1]
-    here = _rims(perturbation.one, perturbation.regions_one)
-    here[:, 1:] = np.sort(image[here[:, 1:]], axis=1)
-    there = _rims(perturbation.two, perturbation.regions_two)
-    different = set(map(tuple, here.tolist())) ^ set(map(tuple, there.tolist()))
-    if different:
-        region, *corners = min(different)
-        raise InvalidParameterError(
-            "The boundary of a region must be mapped onto that of its counterpart (C1); for region "
-            f"{region} vertices {corners} of `two` span a side of only one of the two boundaries."
-        )
+    return labels
 
 
 def _rims(mesh: Mesh, labels: Labels) -> Int[np.ndarray, "k _"]:

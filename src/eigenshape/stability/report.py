@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
+from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, positive_values, whole_number, whole_numbers
@@ -13,10 +14,10 @@ from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
-from eigenshape.geometry.simplicial import Mesh
+from eigenshape.geometry.samples.surface_points import sample_surface
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.clouds.kernel import neighbor_distance
-from eigenshape.spectral.bounds.brackets import Brackets, bracket_eigenvalues
+from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.comparison.eigenvalues import SpectrumComparison, compare_spectra
 from eigenshape.spectral.solve import solve_spectrum
@@ -27,13 +28,16 @@ from eigenshape.stability.plan import USUAL_K, StabilityPlan
 from eigenshape.stability.sampled import (
     ChangeAtTime,
     changes_over_times,
-    default_sample_times,
-    distances_between,
     matched_samples,
 )
 
 # Fewest matched points: the fewer points, the larger the effect of sampling.
 FEWEST_SAMPLES = 100
+# Heat times over the admissible range. Each costs three solves.
+N_TIMES = 4
+# Points of a shape to which distances are measured, as a multiple of the matched points. More of
+# them lower the distance of points to the surface that sampling adds.
+DENSER = 20
 # Most matched points: memory of the kernels and of the matching grows faster than their number.
 MOST_SAMPLES = 20_000
 
@@ -107,19 +111,34 @@ class StabilityReport(ReadOnly):
 
     def explain(self) -> str:
         """Describe the results in plain words, in one paragraph each."""
-        where = (
-            "from vertex to vertex"
-            if self.closeness
-            else f"between {self.n_samples} matched points of each"
-        )
-        lines = [self.spectra.explain(), self._explain_distance()]
+        lines = [
+            self.spectra.explain(),
+            f"In space, each point of one shape is within {self.distance:.3g} of the other. The "
+            f"best one-to-one correspondence of {self.n_samples} random points of each moves them "
+            f"by up to {self.matching_distance:.3g}; for two such samples of the first shape it is "
+            f"{self.sampling_distance:.3g}.",
+        ]
+        where = f"between {self.n_samples} matched points of each"
         if self.closeness:
             lines.append(self.closeness.explain())
-        lines += [
-            self.times.explain(),
-            self._explain_changes(),
-            f"Eigenspaces, {where}: {self.angles.explain()}",
-        ]
+            where = "from vertex to vertex"
+        lines.append(self.times.explain())
+        significant = [change for change in self.changes if change.significant]
+        if significant:
+            clearest = max(significant, key=lambda change: change.change / change.floor)
+            lines.append(
+                "Graph Laplacians of such samples distinguish the shapes at "
+                f"{len(significant)} of {len(self.changes)} heat times, most clearly at "
+                f"t = {clearest.t:.3g}: eigenvalues change by up to {clearest.change:.3g} of the "
+                f"last, those of two samples of the first shape by {clearest.floor:.3g}, and "
+                f"Weyl's bound is {clearest.weyl:.3g}."
+            )
+        else:
+            lines.append(
+                "Graph Laplacians of such samples do not distinguish the shapes at any heat time: "
+                "sampling alone changes them as much."
+            )
+        lines.append(f"Eigenspaces, {where}: {self.angles.explain()}")
         if not self.closeness and self.times.low_reason == "closeness":
             lines.append(
                 "Points were matched by their places in space, which says little about one shape "
@@ -127,30 +146,6 @@ class StabilityReport(ReadOnly):
                 "only."
             )
         return "\n\n".join(lines)
-
-    def _explain_distance(self) -> str:
-        return (
-            f"In space, each point of one shape is within {self.distance:.3g} of the other. The "
-            f"best one-to-one correspondence of {self.n_samples} random points of each moves them "
-            f"by up to {self.matching_distance:.3g}; for two such samples of the first shape it is "
-            f"{self.sampling_distance:.3g}."
-        )
-
-    def _explain_changes(self) -> str:
-        significant = [change for change in self.changes if change.significant]
-        if not significant:
-            return (
-                "Graph Laplacians of such samples do not distinguish the shapes at any heat time: "
-                "sampling alone changes them as much."
-            )
-        clearest = max(significant, key=lambda change: change.change / change.floor)
-        return (
-            "Graph Laplacians of such samples distinguish the shapes at "
-            f"{len(significant)} of {len(self.changes)} heat times, most clearly at "
-            f"t = {clearest.t:.3g}: eigenvalues change by up to {clearest.change:.3g} of the last, "
-            f"those of two samples of the first shape by {clearest.floor:.3g}, and Weyl's bound is "
-            f"{clearest.weyl:.3g}."
-        )
 
 
 def compare_shapes(
@@ -217,17 +212,42 @@ def compare_shapes(
     require_type(plan, StabilityPlan | None, "plan")
     chosen = plan or StabilityPlan()
     report_progress = progress or silent
-    meshes = _meshes(one, two, chosen, partners)
+    meshes, images = None, None
+    if not isinstance(one, PointCloud) and not isinstance(two, PointCloud):
+        meshes = one, two
+    elif chosen.brackets or partners is not None:
+        raise InvalidParameterError(
+            f"brackets and partners are for meshes; the shapes are {one!r} and {two!r}."
+        )
     n_samples, k = _check_plan(chosen, one, two)
-    images = _find_partners(*meshes, partners) if meshes else None
+    # The point of the second mesh for each point of the first; None if unknown.
+    if partners is not None:
+        images = whole_numbers(partners, "partners", 0, two.n_points - 1)
+        if len(images) != one.n_points:
+            raise InvalidParameterError(
+                "partners must have one entry per point of the first mesh; "
+                f"there are {len(images)} for {one.n_points}."
+            )
+    elif meshes and np.array_equal(meshes[0].simplices, meshes[1].simplices):
+        images = np.arange(one.n_points) if one.n_points == two.n_points else None
     report_progress(0.0, "spectra")
     laplacians = [build_laplacian(shape) for shape in (one, two)]
     spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
-    brackets = _brackets(*meshes, k) if meshes and chosen.brackets else None
+    brackets = None
+    if meshes and chosen.brackets:
+        brackets = (bracket_eigenvalues(meshes[0], k), bracket_eigenvalues(meshes[1], k))
     report_progress(0.3, "matching points")
     rng = np.random.default_rng(chosen.seed)
     samples = matched_samples(one, two, n_samples, rng)
-    distances = distances_between(one, two, n_samples, rng)
+    # The distance of each point of each shape to the other; a mesh is represented by its vertices
+    # and random points.
+    first, second = (
+        shape.points
+        if isinstance(shape, PointCloud)
+        else np.vstack([shape.points, sample_surface(shape, DENSER * n_samples, rng=rng).points])
+        for shape in (one, two)
+    )
+    distances = (cKDTree(second).query(one.points)[0], cKDTree(first).query(two.points)[0])
     distance = float(max(each.max() for each in distances))
     closeness = None
     if meshes is not None and images is not None:
@@ -241,10 +261,13 @@ def compare_shapes(
     times = admissible_times(
         delta=delta, spacing=spacing, eigenvalue=float(spectra[0].eigenvalues[-1])
     )
+    # Heat times over the admissible range; if it is empty, over the computable one.
+    low = times.reach if times.empty else times.low
+    spread = np.geomspace(low, times.high, N_TIMES).tolist() if low < times.high else [low]
     changes, angles = changes_over_times(
         samples,
         k,
-        chosen.times or default_sample_times(times),
+        chosen.times or tuple(spread),
         times,
         lambda share, what: report_progress(0.5 + share / 2, what),
     )
@@ -289,36 +312,3 @@ def _check_plan(plan: StabilityPlan, one: Shape, two: Shape) -> tuple[int, int]:
     most = min(n_samples, len(one.points), len(two.points)) - 1
     k = min(USUAL_K, max(most, 2)) if plan.k is None else plan.k
     return n_samples, whole_number(k, "k", 2, most)
-
-
-def _meshes(
-    one: Shape, two: Shape, plan: StabilityPlan, partners: ArrayLike | None
-) -> tuple[Mesh, Mesh] | None:
-    if not isinstance(one, PointCloud) and not isinstance(two, PointCloud):
-        return one, two
-    if plan.brackets or partners is not None:
-        raise InvalidParameterError(
-            f"brackets and partners are for meshes; the shapes are {one!r} and {two!r}."
-        )
-    return None
-
-
-def _find_partners(
-    one: Mesh, two: Mesh, partners: ArrayLike | None
-) -> Int[np.ndarray, " n"] | None:
-    """Return, for each point of the first mesh, the point of the second; None if unknown."""
-    n = one.n_points
-    if partners is None:
-        same = n == two.n_points and np.array_equal(one.simplices, two.simplices)
-        return np.arange(n) if same else None
-    found = whole_numbers(partners, "partners", 0, two.n_points - 1)
-    if len(found) != n:
-        raise InvalidParameterError(
-            "partners must have one entry per point of the first mesh; "
-            f"there are {len(found)} for {n}."
-        )
-    return found
-
-
-def _brackets(one: Mesh, two: Mesh, k: int) -> tuple[Brackets, Brackets]:
-    return bracket_eigenvalues(one, k), bracket_eigenvalues(two, k)

@@ -3,11 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from eigenshape._arrays import freeze
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
@@ -21,19 +19,12 @@ from eigenshape.operators.clouds.kernel import (
     require_whole,
 )
 from eigenshape.operators.clouds.neighbors import neighbor_graph
-from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.comparison.angles import EigenspaceAngles, eigenspace_angles
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.stability.bounds import TimeRange, weyl_bound
 from eigenshape.stability.correspondence import BottleneckMatching, bottleneck_matching
 from eigenshape.stability.rates import theorem_rate
 
-# Heat times over the admissible range. Each costs three solves.
-N_TIMES = 4
-# Points of a shape to which distances are measured, as a multiple of the matched points. More of
-# them lower the distance of points to the surface that sampling adds.
-DENSER = 20
 # A change is significant if it exceeds that between two samples of one shape by this factor.
 ABOVE_SAMPLING = 2.0
 
@@ -131,87 +122,41 @@ def _draw_points(shape: Shape, n: int, rng: np.random.Generator) -> Points:
     return sample_surface(shape, n, rng=rng).points
 
 
-def distances_between(
-    one: Shape, two: Shape, n: int, rng: np.random.Generator
-) -> tuple[Float[np.ndarray, " n1"], Float[np.ndarray, " n2"]]:
-    """Return the distance of each point of each shape to the other shape.
-
-    A mesh is represented by its vertices and 20 n random points.
-    """
-    clouds = [_dense_points(shape, DENSER * n, rng) for shape in (one, two)]
-    pairs = zip((one, two), clouds[::-1], strict=True)
-    first, second = (freeze(cKDTree(cloud).query(shape.points)[0]) for shape, cloud in pairs)
-    return first, second
-
-
-def _dense_points(shape: Shape, n: int, rng: np.random.Generator) -> Points:
-    if isinstance(shape, PointCloud):
-        return shape.points
-    return np.vstack([shape.points, sample_surface(shape, n, rng=rng).points])
-
-
-def default_sample_times(times: TimeRange) -> tuple[float, ...]:
-    """Return heat times over the admissible range; if it is empty, over the computable one."""
-    low = times.reach if times.empty else times.low
-    return tuple(np.geomspace(low, times.high, N_TIMES).tolist()) if low < times.high else (low,)
-
-
 def changes_over_times(
     samples: Samples, k: int, times: tuple[float, ...], admissible: TimeRange, progress: Progress
 ) -> tuple[tuple[ChangeAtTime, ...], EigenspaceAngles]:
     """Return the changes at each heat time, and the angles of eigenspaces at the middle one."""
     changes = []
     clouds = (samples.one, samples.two, samples.again)
-    pieces = [(points, _label_pieces(points, samples.dim)) for points in clouds]
+    dim, moved = samples.dim, samples.matching
+    pieces = []  # the connected components of the graphs of nearest neighbors
+    for points in clouds:
+        joined = neighbor_graph(points, min(dim * (dim + 1), len(points) - 1))
+        pieces.append(connected_components(joined, directed=False)[1])
     for place, t in enumerate(times):
         progress(place / len(times), f"heat time {t:.3g}")
-        laplacians = [_graph_laplacian(points, t, samples.dim, labels) for points, labels in pieces]
+        laplacians = []
+        for points, labels in zip(clouds, pieces, strict=True):
+            kernel = choose_kernel(KernelOptions(t=t), neighbor_distance(points, dim))
+            laplacian = kernel_laplacian(Quadrature(points, None, dim), kernel)
+            require_whole(laplacian, labels, kernel)
+            # Without its kernel the solver does not warn about heat times out of range:
+            # `ChangeAtTime.admissible` reports them. (A filter of warnings would act on other
+            # threads too.)
+            laplacians.append(replace(laplacian, kernel=None))
         spectra = [solve_spectrum(laplacian, k) for laplacian in laplacians]
-        changes.append(_measure_change(samples, laplacians, spectra, t, admissible))
-        if place == len(times) // 2:
-            angles = eigenspace_angles(
-                *spectra[:2], points=samples.matching.partners, laplacian=laplacians[0]
+        values = [spectrum.eigenvalues for spectrum in spectra]
+        last = float(values[0][-1])
+        changes.append(
+            ChangeAtTime(
+                t=t,
+                change=float(np.abs(values[1] - values[0]).max()) / last,
+                floor=float(np.abs(values[2] - values[0]).max()) / last,
+                weyl=weyl_bound(laplacians[0], laplacians[1], moved.partners).norm / last,
+                bound=float(theorem_rate("lipschitz", dim).at(moved.distance, t)) / last,
+                admissible=admissible.low <= t <= admissible.high,
             )
+        )
+        if place == len(times) // 2:
+            angles = eigenspace_angles(*spectra[:2], points=moved.partners, laplacian=laplacians[0])
     return tuple(changes), angles
-
-
-def _graph_laplacian(
-    points: Points, t: float, dim: int, labels: Int[np.ndarray, " n"]
-) -> Laplacian:
-    """Build the Gaussian graph Laplacian of some points, which must connect points of one label.
-
-    The kernel is removed from the result, so that the solver does not warn about heat times out of
-    range: `ChangeAtTime.admissible` reports them. (A filter of warnings would act on other threads
-    too.)
-    """
-    measure = Quadrature(points, None, dim)
-    kernel = choose_kernel(KernelOptions(t=t), neighbor_distance(measure.points, dim))
-    laplacian = kernel_laplacian(measure, kernel)
-    require_whole(laplacian, labels, kernel)
-    return replace(laplacian, kernel=None)
-
-
-def _label_pieces(points: Points, dim: int) -> Int[np.ndarray, " n"]:
-    """Label the connected components of the graph of nearest neighbors."""
-    joined = neighbor_graph(points, min(dim * (dim + 1), len(points) - 1))
-    return connected_components(joined, directed=False)[1]
-
-
-def _measure_change(
-    samples: Samples,
-    laplacians: list[Laplacian],
-    spectra: list[Spectrum],
-    t: float,
-    admissible: TimeRange,
-) -> ChangeAtTime:
-    values = [spectrum.eigenvalues for spectrum in spectra]
-    last = float(values[0][-1])
-    moved = samples.matching
-    return ChangeAtTime(
-        t=t,
-        change=float(np.abs(values[1] - values[0]).max()) / last,
-        floor=float(np.abs(values[2] - values[0]).max()) / last,
-        weyl=weyl_bound(laplacians[0], laplacians[1], moved.partners).norm / last,
-        bound=float(theorem_rate("lipschitz", samples.dim).at(moved.distance, t)) / last,
-        admissible=admissible.low <= t <= admissible.high,
-    )

@@ -17,12 +17,11 @@ from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components
-from eigenshape.operators.choices import Correction, Distance, Form
+from eigenshape.operators.choices import Correction, Distance, Form, require_choice
 from eigenshape.operators.clouds.cells import cell_grid, gaussian_differences
 from eigenshape.operators.clouds.kernel import (
     KernelOptions,
     choose_kernel,
-    geodesic_laplacian,
     kernel_laplacian,
     neighbor_distance,
     require_whole,
@@ -126,10 +125,7 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     2.0
     """
     shape = as_simplicial(shape, "shape")
-    if distance not in ("euclidean", "geodesic"):
-        raise InvalidParameterError(
-            f"distance must be 'euclidean' or 'geodesic'; it is {distance!r}."
-        )
+    require_choice(distance, Distance, "distance")
     if isinstance(t, str) and t != "pointwise":
         raise InvalidParameterError(f"t must be a heat time or 'pointwise'; it is {t!r}.")
     measure = shape_quadrature(shape)
@@ -140,11 +136,7 @@ def mesh_laplacian(  # noqa: PLR0913 - one keyword for each choice that the meth
     warn_of_narrow(kernel)
     if t != "pointwise":
         warn_of_few(measure, kernel)
-    laplacian = (
-        geodesic_laplacian(shape, measure, kernel)
-        if distance == "geodesic"
-        else kernel_laplacian(measure, kernel)
-    )
+    laplacian = kernel_laplacian(measure, kernel, shape if distance == "geodesic" else None)
     require_whole(laplacian, vertex_components(shape)[1], kernel)
     return laplacian
 

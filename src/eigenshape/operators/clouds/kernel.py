@@ -20,8 +20,8 @@ from eigenshape.geometry.distances.geodesic import geodesic_balls
 from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.operators.choices import Correction, Form
-from eigenshape.operators.clouds.cells import CellGrid, cell_grid, count_partners, gaussian_rows
+from eigenshape.operators.choices import Correction, Form, require_choice
+from eigenshape.operators.clouds.cells import cell_grid, count_partners, gaussian_rows
 from eigenshape.operators.clouds.pair_loops import component_labels
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 
@@ -76,10 +76,7 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
         positive_values(value, name)
     if options.correct not in (None, "log"):
         raise InvalidParameterError(f"correct must be None or 'log'; it is {options.correct!r}.")
-    if options.form not in ("literal", "random-walk"):
-        raise InvalidParameterError(
-            f"form must be 'literal' or 'random-walk'; it is {options.form!r}."
-        )
+    require_choice(options.form, Form, "form")
     width = options.h or (options.edge_factor or EDGE_FACTOR) * edge
     t = options.t or width**2 / 4
     factor = 2 * t**0.5 / edge
@@ -112,60 +109,64 @@ def neighbor_distance(points: Float[np.ndarray, "n d"], dim: int) -> float:
     return distance
 
 
-def kernel_laplacian(measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
+def kernel_laplacian(
+    measure: Quadrature, kernel: GaussianKernel, mesh: Mesh | None = None
+) -> Laplacian:
     """Build the Laplacian of the kernel on weighted points.
 
-    Raise InvalidShapeError if the matrix would not fit into memory or its entries into floats, or a
+    Distances are along the surface of `mesh` if it is given, otherwise through space. Raise
+    InvalidShapeError if the matrix would not fit into memory or its entries into floats, or a
     point has no partner.
     """
+    n = measure.n_points
     points, scale = size_one(measure.points)
     weights, unit = size_one(measure.weights)
     t = kernel.t / scale / scale
     grid = cell_grid(points, kernel.cutoff * 2 * t**0.5)
-    _require_matrix_fits(grid)
-    counts = count_partners(grid)
-    _require_partners(measure, counts - 1, kernel)
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    columns, values = gaussian_rows(grid, weights, t, starts)
-    matrix = sp.csr_array((values, columns, starts), shape=(measure.n_points,) * 2)
-    return _assemble(measure, kernel, matrix, (unit, scale))
-
-
-def geodesic_laplacian(mesh: Mesh, measure: Quadrature, kernel: GaussianKernel) -> Laplacian:
-    """Build the Laplacian of the kernel with distances along the surface.
-
-    Errors are those of `kernel_laplacian`; the mesh must be a surface.
-    """
-    points, scale = size_one(measure.points)
-    weights, unit = size_one(measure.weights)
-    radius = kernel.cutoff * kernel.width
-    # No ball along the surface holds more than one through space.
-    _require_matrix_fits(cell_grid(points, radius / scale))
-    matrix = geodesic_balls(mesh, radius)
-    _require_partners(measure, np.diff(matrix.indptr), kernel)
-    rows = np.repeat(np.arange(measure.n_points), np.diff(matrix.indptr))
-    matrix.data = (
-        weights[rows] * weights[matrix.indices] * np.exp(-((matrix.data / kernel.width) ** 2))
+    # The size of the matrix is estimated from some of its rows. No ball along the surface holds
+    # more points than one through space.
+    sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLED_ROWS)).astype(np.int64))
+    entries = count_partners(grid, sample)[sample].mean() * n
+    require_memory(
+        "A kernel matrix",
+        f"{entries:.2g} entries, {entries / n:.0f} a row,",
+        {"values and columns": entries * PEAK},
+        "Choose a smaller t, or functional_laplacian, which stores none.",
+        share=0.5,
+        error=InvalidShapeError,
     )
-    return _assemble(measure, kernel, (matrix + sp.diags_array(weights**2)).tocsr(), (unit, scale))
-
-
-def _assemble(
-    measure: Quadrature, kernel: GaussianKernel, matrix: sp.csr_array, units: tuple[float, float]
-) -> Laplacian:
-    """Make W and B of the matrix w_i w_j exp(-d_ij²/4t), in whose place W is written.
-
-    `units` are the powers of two that weights and coordinates were divided by.
-    """
-    of_weight, of_length = (int(np.frexp(unit)[1]) - 1 for unit in units)
+    if mesh is None:
+        counts = count_partners(grid)
+        n_partners = counts - 1
+    else:
+        matrix = geodesic_balls(mesh, kernel.cutoff * kernel.width)
+        n_partners = np.diff(matrix.indptr)
+    alone = np.flatnonzero(n_partners == 0)
+    if alone.size:
+        raise UnevenSpacingError(
+            f"Every point must have another one within the cutoff of the kernel; point {alone[0]} "
+            f"at {measure.points[alone[0]].tolist()} has none within "
+            f"{kernel.cutoff * kernel.width:.4g} ({alone.size} such). Choose a larger t than "
+            f"{kernel.t:.4g}, or remove such points. {OR_ROBUST}"
+        )
+    # The entries w_i w_j exp(-d_ij²/4t).
+    if mesh is None:
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        columns, values = gaussian_rows(grid, weights, t, starts)
+        matrix = sp.csr_array((values, columns, starts), shape=(n, n))
+    else:
+        rows = np.repeat(np.arange(n), n_partners)
+        heat = np.exp(-((matrix.data / kernel.width) ** 2))
+        matrix.data = weights[rows] * weights[matrix.indices] * heat
+        matrix = (matrix + sp.diags_array(weights**2)).tocsr()
+    # W is written in the place of the matrix. Weights and coordinates were divided by powers of two.
+    of_weight, of_length = (int(np.frexp(each)[1]) - 1 for each in (unit, scale))
     t = float(np.ldexp(kernel.t, -2 * of_length))
     matrix.data /= (4 * pi * t) ** (measure.dim / 2)
     exponent = 2 * of_weight - measure.dim * of_length
-    mass = (
-        _scale_by_power(matrix.sum(axis=1), exponent)
-        if kernel.form == "random-walk"
-        else measure.weights
-    )
+    mass = measure.weights
+    if kernel.form == "random-walk":
+        mass = _scale_by_power(matrix.sum(axis=1), exponent)
     matrix.setdiag(0)
     matrix.data /= -t
     matrix.setdiag(-matrix.sum(axis=1))
@@ -181,16 +182,6 @@ def _scale_by_power(values: Float[np.ndarray, " z"], exponent: int) -> Float[np.
     if exponent:
         values *= 2.0**exponent
     return values
-
-
-def _require_partners(measure: Quadrature, n_partners: np.ndarray, kernel: GaussianKernel) -> None:
-    alone = np.flatnonzero(n_partners == 0)
-    if alone.size:
-        raise UnevenSpacingError(
-            f"Every point must have another one within the cutoff of the kernel; point {alone[0]} at "
-            f"{measure.points[alone[0]].tolist()} has none within {kernel.cutoff * kernel.width:.4g} ({alone.size} "
-            f"such). Choose a larger t than {kernel.t:.4g}, or remove such points. {OR_ROBUST}"
-        )
 
 
 def require_whole(laplacian: Laplacian, labels: np.ndarray, kernel: GaussianKernel) -> None:
@@ -229,18 +220,3 @@ def warn_of_few(measure: Quadrature, kernel: GaussianKernel) -> None:
             f"correction. Choose a smaller t.",
             stacklevel=3,
         )
-
-
-def _require_matrix_fits(grid: CellGrid) -> None:
-    """Estimate the size of the matrix from some of its rows, and raise an error if it is too large."""
-    n = len(grid.order)
-    sample = np.unique(np.linspace(0, n - 1, min(n, SAMPLED_ROWS)).astype(np.int64))
-    entries = count_partners(grid, sample)[sample].mean() * n
-    require_memory(
-        "A kernel matrix",
-        f"{entries:.2g} entries, {entries / n:.0f} a row,",
-        {"values and columns": entries * PEAK},
-        "Choose a smaller t, or functional_laplacian, which stores none.",
-        share=0.5,
-        error=InvalidShapeError,
-    )

@@ -14,10 +14,10 @@ from eigenshape.sparse.sort_loops import sort_part
 
 @njit
 @no_type_check
-def _square(points, i, j):
+def _square(one, i, two, j):
     total = 0.0
-    for axis in range(points.shape[1]):
-        step = points[i, axis] - points[j, axis]
+    for axis in range(one.shape[1]):
+        step = one[i, axis] - two[j, axis]
         total += step * step
     return total
 
@@ -32,28 +32,8 @@ def count(points, order, cells, runs, farthest, wanted, counts, first, last):
             found = 0
             for run in range(runs.shape[1]):
                 for j in range(runs[cell, run, 0], runs[cell, run, 1]):
-                    found += _square(points, i, j) <= farthest
+                    found += _square(points, i, points, j) <= farthest
             counts[order[i]] = found
-
-
-@njit
-@no_type_check
-def _find_candidates(points, order, place, runs, cell, numbers, near):
-    """Fill the numbers and coordinates of the points that may lie within reach of a cell.
-
-    Numbers are those before the points were sorted into cells, ascending. `place` is the inverse of
-    `order`. Returns the number of points.
-    """
-    total = 0
-    for run in range(runs.shape[1]):
-        for j in range(runs[cell, run, 0], runs[cell, run, 1]):
-            numbers[total] = order[j]
-            total += 1
-    sort_part(numbers, 0, total)
-    for candidate in range(total):
-        for axis in range(points.shape[1]):
-            near[candidate, axis] = points[place[numbers[candidate]], axis]
-    return total
 
 
 @njit
@@ -80,15 +60,22 @@ def fill(
     `numbers` and `near` are scratch, with one entry for each point that a cell may reach.
     """
     for cell in range(first, last):
-        total = _find_candidates(points, order, place, runs, cell, numbers, near)
+        # The numbers of points that may lie within reach, before they were sorted into cells,
+        # ascending. `place` is the inverse of `order`.
+        total = 0
+        for run in range(runs.shape[1]):
+            for j in range(runs[cell, run, 0], runs[cell, run, 1]):
+                numbers[total] = order[j]
+                total += 1
+        sort_part(numbers, 0, total)
+        for candidate in range(total):
+            for axis in range(points.shape[1]):
+                near[candidate, axis] = points[place[numbers[candidate]], axis]
         for i in range(cells[cell], cells[cell + 1]):
             row = order[i]
             entry = starts[row]
             for candidate in range(total):
-                square = 0.0
-                for axis in range(points.shape[1]):
-                    step = points[i, axis] - near[candidate, axis]
-                    square += step * step
+                square = _square(points, i, near, candidate)
                 if square <= farthest:
                     other = numbers[candidate]
                     columns[entry] = other
@@ -104,7 +91,7 @@ def difference(points, cells, runs, farthest, weights, rate, values, sums, first
             sums[i] = 0.0
             for run in range(runs.shape[1]):
                 for j in range(runs[cell, run, 0], runs[cell, run, 1]):
-                    square = _square(points, i, j)
+                    square = _square(points, i, points, j)
                     if square <= farthest:
                         pair = weights[i] * weights[j] * np.exp(-rate * square)
                         for b in range(values.shape[1]):
