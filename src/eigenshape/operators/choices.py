@@ -15,5 +15,5 @@ def require_choice(value: object, choice: Any, name: str) -> None:
     """Raise an error if an option is none of its names."""
     *names, last = get_args(choice)
     if value not in (*names, last):
-        listed = ", ".join(repr(each) for each in names)
-        raise InvalidParameterError(f"{name} must be {listed} or {last!r}; it is {value!r}.")
+        listed = "', '".join(names)
+        raise InvalidParameterError(f"{name} must be '{listed}' or '{last}'; it is {value!r}.")
