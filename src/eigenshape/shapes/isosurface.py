@@ -46,7 +46,10 @@ def isosurface(
     for offset in OFFSETS % 1:
         points, quads = _nets(field, low - spacing * (1 + offset), high + 2 * spacing, spacing)
         if _is_sound(TriangleMesh(points, _split(points, quads))):
-            mesh = _smooth(field, points, quads, spacing)
+            points = _project(field, points, spacing)[0]
+            for _ in range(N_STAGES):
+                points = relax(field, TriangleMesh(points, _split(points, quads)), spacing).vertices
+            mesh = TriangleMesh(points, _split(points, quads))
             if _is_sound(mesh):
                 return mesh
     raise InvalidShapeError(
@@ -77,7 +80,13 @@ def _nets(
     field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float
 ) -> tuple[Float[np.ndarray, "p 3"], Int[np.ndarray, "q 4"]]:
     values = _lattice_values(field, low, np.ceil((high - low) / spacing).astype(int), spacing)
-    cells = _crossed_cells(values)
+    # The surface crosses the cells with corners inside and outside. Count the inside corners of
+    # pairs, then squares, then cubes of lattice points.
+    counts = (values < 0).astype(np.int8)
+    for axis in range(3):
+        here, there = (counts.take(np.arange(s, counts.shape[axis] - 1 + s), axis) for s in (0, 1))
+        counts = here + there
+    cells = np.argwhere((counts > 0) & (counts < 8))
     corners = np.stack([values[tuple((cells + corner).T)] for corner in CORNERS], axis=1)
     number, points = _sheet_points(cells, corners)
     cell_number = np.full(np.array(values.shape) - 1, -1, dtype=np.int64)
@@ -143,15 +152,6 @@ UNIT_VECTORS = np.eye(3, dtype=np.int64)
 CORNERS = np.array(list(np.ndindex(2, 2, 2)))
 EDGES = [(axis, np.insert(shift, axis, 0)) for axis in range(3) for shift in np.ndindex(2, 2)]
 FACES = [_face(normal, side) for normal in range(3) for side in (0, 1)]
-
-
-def _crossed_cells(values: Float[np.ndarray, "x y z"]) -> Int[np.ndarray, "c 3"]:
-    inside = (values < 0).astype(np.int8)
-    # Count the inside corners of pairs, then squares, then cubes of lattice points.
-    for axis in range(3):
-        here, there = (inside.take(np.arange(s, inside.shape[axis] - 1 + s), axis) for s in (0, 1))
-        inside = here + there
-    return np.argwhere((inside > 0) & (inside < 8))
 
 
 def _sheet_points(
@@ -248,15 +248,6 @@ def _cotangent(
     one, two = one - apex, two - apex
     twice_area = np.linalg.norm(np.cross(one, two), axis=1)
     return np.einsum("ij,ij->i", one, two) / np.maximum(twice_area, np.finfo(np.float64).tiny)
-
-
-def _smooth(
-    field: Field, points: Float[np.ndarray, "p 3"], quads: Int[np.ndarray, "q 4"], spacing: float
-) -> TriangleMesh:
-    points = _project(field, points, spacing)[0]
-    for _ in range(N_STAGES):
-        points = relax(field, TriangleMesh(points, _split(points, quads)), spacing).vertices
-    return TriangleMesh(points, _split(points, quads))
 
 
 def relax(field: Field, mesh: TriangleMesh, spacing: float) -> TriangleMesh:

@@ -73,11 +73,16 @@ def place_limbs(plan: Sequence[Limb], individual: int = 0) -> Body:
 
     The seed of an individual varies the lengths and widths of the limbs, unless it is 0.
     """
-    growth = _growth(plan, individual)
+    # How much longer and wider limbs are. Names with the same first word vary together.
+    rng = np.random.default_rng(individual)
+    growth = {
+        group: np.exp(VARIATION * rng.uniform(-1, 1, 2)) if individual else np.ones(2)
+        for group in dict.fromkeys(_group(limb.name) for limb in plan)
+    }
     drawn = {
         _name_side(limb.name, side): _mirror_limb(limb, side)
         for limb in plan
-        for side in _sides(limb)
+        for side in ((1, -1) if limb.name.endswith("*") else (1,))
     }
     numbers = {name: number for number, name in enumerate(drawn)}
     placed: list[PlacedLimb] = []
@@ -91,26 +96,26 @@ def place_limbs(plan: Sequence[Limb], individual: int = 0) -> Body:
         longer, wider = growth[_group(name)]
         lengthened = start + longer * (nodes[:, :3] - nodes[0, :3])
         nodes = np.column_stack([lengthened, wider * nodes[:, 3]])
-        placed.append(_place(limb, nodes, numbers.get(parent, -1), int(node or 0)))
+        # A smooth curve through the nodes (Catmull and Rom 1974).
+        curve = CubicHermiteSpline(np.arange(len(nodes)), nodes, np.gradient(nodes, axis=0))
+        n_pieces = PIECES_PER_SEGMENT * (len(nodes) - 1)
+        placed.append(
+            PlacedLimb(
+                nodes=nodes,
+                pieces=curve(np.linspace(0, len(nodes) - 1, n_pieces + 1)),
+                squash=np.array(limb.squash, dtype=np.float64),
+                power=float(limb.power),
+                parent=numbers.get(parent, -1),
+                parent_node=int(node or 0),
+                hub=limb.hub,
+                swings=limb.swings,
+            )
+        )
     return Body(tuple(placed))
-
-
-def _growth(plan: Sequence[Limb], individual: int) -> dict[str, Float[np.ndarray, "2"]]:
-    """Draw how much longer and wider limbs are; names with the same first word vary together."""
-    rng = np.random.default_rng(individual)
-    groups = dict.fromkeys(_group(limb.name) for limb in plan)
-    return {
-        group: np.exp(VARIATION * rng.uniform(-1, 1, 2)) if individual else np.ones(2)
-        for group in groups
-    }
 
 
 def _group(name: str) -> str:
     return name.split(maxsplit=1)[0].rstrip("*+-")
-
-
-def _sides(limb: Limb) -> tuple[int, ...]:
-    return (1, -1) if limb.name.endswith("*") else (1,)
 
 
 def _name_side(name: str, side: int) -> str:
@@ -127,18 +132,6 @@ def _mirror_limb(limb: Limb, side: int) -> Limb:
         (node, (side * x, y, side * z), low, high) for node, (x, y, z), low, high in limb.swings
     )
     return limb._replace(parent=_name_side(limb.parent, side), nodes=nodes, swings=swings)
-
-
-def _place(
-    limb: Limb, nodes: Float[np.ndarray, "k 4"], parent: int, parent_node: int
-) -> PlacedLimb:
-    """Place a limb on a smooth curve through its nodes (Catmull and Rom 1974)."""
-    curve = CubicHermiteSpline(np.arange(len(nodes)), nodes, np.gradient(nodes, axis=0))
-    pieces = curve(np.linspace(0, len(nodes) - 1, PIECES_PER_SEGMENT * (len(nodes) - 1) + 1))
-    squash = np.array(limb.squash, dtype=np.float64)
-    return PlacedLimb(
-        nodes, pieces, squash, float(limb.power), parent, parent_node, limb.hub, limb.swings
-    )
 
 
 def distance_to_body(points: Float[np.ndarray, "p 3"], body: Body) -> Float[np.ndarray, " p"]:
