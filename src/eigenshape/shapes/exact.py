@@ -64,9 +64,7 @@ def sphere_eigenvalues(k: Integer, dim: Integer = 2) -> Float[np.ndarray, " k"]:
     values: list[float] = []
     degree = 0
     while len(values) < count:
-        copies = comb(m + degree, m, exact=True) - (
-            comb(m + degree - 2, m, exact=True) if degree > 1 else 0
-        )
+        copies = comb(m + degree, m, exact=True) - comb(m + degree - 2, m, exact=True)
         values += [float(degree * (degree + m - 1))] * copies
         degree += 1
     return np.array(values[:count])

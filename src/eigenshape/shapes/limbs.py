@@ -167,35 +167,39 @@ def distance_to_limb(
     apart = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0), axis=1)
     place = np.zeros(len(points))
     close = np.flatnonzero(apart < 2 * BLEND)
-    piece, share = _nearest_piece(points[close], limb)
-    center = limb.pieces[piece] + share[:, None] * (limb.pieces[piece + 1] - limb.pieces[piece])
-    apart[close] = _distance_to_section(points[close] - center[:, :3], center[:, 3], limb)
-    place[close] = (piece + share) / PIECES_PER_SEGMENT
-    return apart, place
+    points = points[close]
 
-
-def _nearest_piece(
-    points: Float[np.ndarray, "p 3"], limb: PlacedLimb
-) -> tuple[Int[np.ndarray, " p"], Float[np.ndarray, " p"]]:
-    """Return the piece of a limb with the nearest skin, and the position along the piece, 0 to 1.
-
-    The cross-section is taken to be round.
-    """
-    begins, radii = limb.pieces[:-1, :3], limb.pieces[:, 3]
-    along = np.diff(limb.pieces[:, :3], axis=0)
+    # The piece with the nearest skin if cross-sections were round, and the position along it.
+    begins = centers[:-1]
+    along = np.diff(centers, axis=0)
     length2 = np.square(along).sum(axis=1)
     reach = _products(points, along) - (begins * along).sum(axis=1)
-    share = np.clip(reach / length2, 0, 1)
+    shares = np.clip(reach / length2, 0, 1)
     # |p - b - s a|² is expanded, so that no array has the size points by pieces by coordinates.
     apart2 = (
         np.square(points).sum(axis=1)[:, None]
         - 2 * _products(points, begins)
         + np.square(begins).sum(axis=1)
     )
-    apart2 += share * (share * length2 - 2 * reach)
-    apart = np.sqrt(np.maximum(apart2, 0)) - radii[:-1] - share * np.diff(radii)
-    piece = apart.argmin(axis=1)
-    return piece, share[np.arange(len(points)), piece]
+    apart2 += shares * (shares * length2 - 2 * reach)
+    widths = limb.pieces[:, 3]
+    to_skin = np.sqrt(np.maximum(apart2, 0)) - widths[:-1] - shares * np.diff(widths)
+    piece = to_skin.argmin(axis=1)
+    share = shares[np.arange(len(points)), piece]
+    place[close] = (piece + share) / PIECES_PER_SEGMENT
+
+    # The distance to the cross-section, a superellipsoid, to first order: the value of the norm
+    # that defines it, minus the radius, divided by its slope.
+    center = limb.pieces[piece] + share[:, None] * (limb.pieces[piece + 1] - limb.pieces[piece])
+    arm, radius = points - center[:, :3], center[:, 3]
+    if limb.power == 2 and (limb.squash == 1).all():
+        apart[close] = np.sqrt(np.einsum("ij,ij->i", arm, arm)) - radius
+        return apart, place
+    scaled = np.abs(arm) / limb.squash
+    size = np.maximum((scaled**limb.power).sum(axis=1) ** (1 / limb.power), TINY_SIZE)
+    slope = np.linalg.norm((scaled / size[:, None]) ** (limb.power - 1) / limb.squash, axis=1)
+    apart[close] = (size - radius) / np.maximum(slope, 0.5)
+    return apart, place
 
 
 def _products(
@@ -204,18 +208,3 @@ def _products(
     # A matrix product by BLAS may change its last digits with the number of threads; einsum does
     # not.
     return np.einsum("pi,si->ps", one, two)
-
-
-def _distance_to_section(
-    arm: Float[np.ndarray, "p 3"], radius: Float[np.ndarray, " p"], limb: PlacedLimb
-) -> Float[np.ndarray, " p"]:
-    """Return the distance to the cross-section of a limb, a superellipsoid, to first order.
-
-    That is the value of the norm that defines it, minus the radius, divided by its slope.
-    """
-    if limb.power == 2 and (limb.squash == 1).all():
-        return np.sqrt(np.einsum("ij,ij->i", arm, arm)) - radius
-    scaled = np.abs(arm) / limb.squash
-    size = np.maximum((scaled**limb.power).sum(axis=1) ** (1 / limb.power), TINY_SIZE)
-    slope = np.linalg.norm((scaled / size[:, None]) ** (limb.power - 1) / limb.squash, axis=1)
-    return (size - radius) / np.maximum(slope, 0.5)
