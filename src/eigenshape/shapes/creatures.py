@@ -75,27 +75,27 @@ def make_creature(
     rest, joints = _rest_pose(kind, about, whole_number(individual, "individual", 0, 2**32 - 1))
     points = rest.vertices
     if seed:
-        points = bend_at_joints(points, joints, _angles(joints, [seed, CREATURES.index(kind)]))
+        # Angles near the limits are more likely than those between, so that poses differ clearly.
+        low, high = joints.limits.T
+        rng = np.random.default_rng([seed, CREATURES.index(kind)])
+        share = (1 - np.cos(np.pi * rng.uniform(size=len(low)))) / 2
+        points = bend_at_joints(points, joints, low + share * (high - low))
     return TriangleMesh(points[:, TO_Y_UP], rest.faces)
 
 
 @lru_cache(maxsize=32)
 def _rest_pose(kind: str, n_vertices: int, individual: int) -> tuple[TriangleMesh, Joints]:
     body = place_limbs(PLANS[kind], individual)
-    mesh = _skin(body, n_vertices)
-    return mesh, _joints(mesh, body)
-
-
-def _skin(body: Body, n_vertices: int) -> TriangleMesh:
-    """Mesh the skin on a grid fine enough for the thinnest limb, then remove surplus vertices."""
 
     def field(points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, " p"]:
         return distance_to_body(points, body)
 
+    # Mesh the skin on a grid fine enough for the thinnest limb, then remove surplus vertices.
     wanted = find_spacing(field, *body.box, round(SURPLUS * n_vertices))
     spacing = min(wanted, body.thinnest)
     mesh = collapse_shortest_edges(isosurface(field, *body.box, spacing), n_vertices)
-    return relax(field, mesh, spacing)
+    mesh = relax(field, mesh, spacing)
+    return mesh, _joints(mesh, body)
 
 
 def _joints(mesh: TriangleMesh, body: Body) -> Joints:
@@ -115,13 +115,3 @@ def _joints(mesh: TriangleMesh, body: Body) -> Joints:
     table = np.array(rows)
     follows = diffuse(mesh, np.column_stack(beyond).astype(np.float64), np.array(widths))
     return Joints(table[:, :3], table[:, 3:6], np.radians(table[:, 6:]), follows)
-
-
-def _angles(joints: Joints, seed: list[int]) -> Float[np.ndarray, " j"]:
-    """Draw the angle of each joint.
-
-    Angles near the limits are more likely than those between, so that poses differ clearly.
-    """
-    low, high = joints.limits.T
-    share = (1 - np.cos(np.pi * np.random.default_rng(seed).uniform(size=len(low)))) / 2
-    return low + share * (high - low)

@@ -124,30 +124,23 @@ def disc(n_rings: Integer = 10, radius: float = 1.0) -> TriangleMesh:
     """
     count = whole_number(n_rings, "n_rings", 1, 1000)
     positive_values(radius, "radius")
-    rings = [np.zeros((1, 2))]
+    rings, faces = [np.zeros((1, 2))], []
     for j in range(1, count + 1):
         angles = 2 * np.pi * np.arange(6 * j) / (6 * j)
         rings.append(j / count * radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+        # Between ring j - 1 and ring j, each sixth has j triangles that point inward and j - 1 that
+        # point outward.
+        inner, outer = 1 + 3 * (j - 2) * (j - 1) if j > 1 else 0, 1 + 3 * (j - 1) * j
+        sector, step = (index.ravel() for index in np.indices((6, j)))
+        out = outer + sector * j + step
+        out_next = outer + (sector * j + step + 1) % (6 * j)
+        n_inner = max(6 * (j - 1), 1)
+        below = inner + (sector * (j - 1) + step) % n_inner
+        below_next = inner + (sector * (j - 1) + step + 1) % n_inner
+        faces.append(np.column_stack([out, out_next, below]))
+        faces.append(np.column_stack([out_next, below_next, below])[step < j - 1])
     flat = np.concatenate(rings)
-    faces = [_band(j) for j in range(1, count + 1)]
     return TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), np.concatenate(faces))
-
-
-def _band(j: int) -> np.ndarray:
-    """Return the triangles between ring j - 1 and ring j.
-
-    Each sixth of the band has j triangles that point inward and j - 1 that point outward.
-    """
-    inner, outer = 1 + 3 * (j - 2) * (j - 1) if j > 1 else 0, 1 + 3 * (j - 1) * j
-    sector, step = (index.ravel() for index in np.indices((6, j)))
-    out = outer + sector * j + step
-    out_next = outer + (sector * j + step + 1) % (6 * j)
-    n_inner = max(6 * (j - 1), 1)
-    below = inner + (sector * (j - 1) + step) % n_inner
-    below_next = inner + (sector * (j - 1) + step + 1) % n_inner
-    inward = np.column_stack([out, out_next, below])
-    outward = np.column_stack([out_next, below_next, below])[step < j - 1]
-    return np.concatenate([inward, outward])
 
 
 def irregular_grid(

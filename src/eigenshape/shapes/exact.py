@@ -64,9 +64,7 @@ def sphere_eigenvalues(k: Integer, dim: Integer = 2) -> Float[np.ndarray, " k"]:
     values: list[float] = []
     degree = 0
     while len(values) < count:
-        copies = comb(m + degree, m, exact=True) - (
-            comb(m + degree - 2, m, exact=True) if degree > 1 else 0
-        )
+        copies = comb(m + degree, m, exact=True) - comb(m + degree - 2, m, exact=True)
         values += [float(degree * (degree + m - 1))] * copies
         degree += 1
     return np.array(values[:count])
@@ -194,10 +192,8 @@ def box_eigenvalues(
     >>> (es.shapes.box_eigenvalues(4, [1, 1]) / 3.141592653589793**2).round(6).tolist()
     [0.0, 1.0, 1.0, 2.0]
     """
-    count, lengths = (
-        _eigenvalue_number(k),
-        positive_values(list(sides), "sides"),
-    )
+    count = _eigenvalue_number(k)
+    lengths = positive_values(list(sides), "sides")
     first = int(_require_condition(condition) == "dirichlet")
     frequencies = [(np.arange(first, first + count) / length) ** 2 for length in lengths]
     sums = frequencies[0]
@@ -247,10 +243,8 @@ def flat_torus_eigenvalues(k: Integer, periods: ArrayLike) -> Float[np.ndarray, 
     >>> (values / (2 * 3.141592653589793) ** 2).round(6).tolist()
     [0.0, 1.0, 1.0, 1.0, 1.0]
     """
-    count, rows = (
-        _eigenvalue_number(k),
-        real_numbers(periods, "periods").astype(np.float64),
-    )
+    count = _eigenvalue_number(k)
+    rows = real_numbers(periods, "periods").astype(np.float64)
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
         raise InvalidParameterError(
             f"periods must be a finite 2 x 2 matrix; they are {rows.tolist()}."
@@ -303,16 +297,14 @@ def disc_eigenvalues(k: Integer, condition: Condition = "neumann") -> Float[np.n
     """
     count = whole_number(k, "k", 1, 10_000)
     zeros = jn_zeros if _require_condition(condition) == "dirichlet" else jnp_zeros
-    values = [0.0] if condition == "neumann" else []
     # More zeros of each order than can be among the first `count` eigenvalues.
-    order, radial = 0, int(count**0.5) + 4
-    while True:
-        found = zeros(order, radial) ** 2
-        values = sorted([*values, *np.repeat(found, 2 if order else 1)])[: count + 1]
-        order += 1
-        # From order 1 on the first zero grows with the order. Only J_0' has a larger one than J_1'.
-        if order > 2 and len(values) > count and found[0] > values[count]:
-            return np.array(values[:count])
+    radial = int(count**0.5) + 4
+    return _lowest_squares(
+        count,
+        condition,
+        lambda order: zeros(order, radial),
+        lambda order: 2 if order else 1,
+    )
 
 
 def ball_eigenvalues(k: Integer, condition: Condition = "neumann") -> Float[np.ndarray, " k"]:
@@ -350,13 +342,29 @@ def ball_eigenvalues(k: Integer, condition: Condition = "neumann") -> Float[np.n
     """
     count = whole_number(k, "k", 1, 2_000)
     derivative = _require_condition(condition) == "neumann"
-    values = [0.0] if derivative else []
-    degree = 0
+    return _lowest_squares(
+        count,
+        condition,
+        lambda degree: _zeros(partial(spherical_jn, degree, derivative=derivative), degree, count),
+        lambda degree: 2 * degree + 1,
+    )
+
+
+def _lowest_squares(
+    count: int,
+    condition: Condition,
+    zeros: Callable[[int], Float[np.ndarray, " z"]],
+    copies: Callable[[int], int],
+) -> Float[np.ndarray, " k"]:
+    """Return the lowest squares of the zeros of Bessel functions of all orders, with copies."""
+    values = [0.0] if condition == "neumann" else []
+    order = 0
     while True:
-        found = _zeros(partial(spherical_jn, degree, derivative=derivative), degree, count) ** 2
-        values = sorted([*values, *np.repeat(found, 2 * degree + 1)])[: count + 1]
-        degree += 1
-        if degree > 2 and len(values) > count and found[0] > values[count]:
+        found = zeros(order) ** 2
+        values = sorted([*values, *np.repeat(found, copies(order))])[: count + 1]
+        order += 1
+        # From order 1 on the first zero grows with the order. Only J_0' has a larger one than J_1'.
+        if order > 2 and len(values) > count and found[0] > values[count]:
             return np.array(values[:count])
 
 

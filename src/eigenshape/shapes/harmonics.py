@@ -57,23 +57,6 @@ def sphere_harmonics(points: ArrayLike, k: Integer) -> Float[np.ndarray, "n k"]:
     [[0.2821], [0.2821]]
     """
     count = whole_number(k, "k", 1, MOST_HARMONICS)
-    directions = _directions(points)
-    last = isqrt(count - 1)
-    harmonics = np.empty((len(directions), (last + 1) ** 2))
-    turn = directions[:, 0] + 1j * directions[:, 1]
-    power, top = np.ones(len(directions), dtype=np.complex128), (4 * np.pi) ** -0.5
-    for order in range(last + 1):
-        if order:
-            power = power * turn
-            top *= ((2 * order + 1) / (2 * order)) ** 0.5
-        values = (2**0.5 if order else 1.0) * _over_degrees(directions[:, 2], order, last, top)
-        degrees = np.arange(order, last + 1)
-        harmonics[:, degrees * (degrees + 1) - order] = values * power.imag[:, None]
-        harmonics[:, degrees * (degrees + 1) + order] = values * power.real[:, None]
-    return freeze(harmonics[:, :count])
-
-
-def _directions(points: ArrayLike) -> Float[np.ndarray, "n 3"]:
     rows = finite_rows(points, "points", 3)
     sizes = np.abs(rows).max(axis=1, initial=0.0)
     origin = np.flatnonzero(sizes == 0)
@@ -83,20 +66,27 @@ def _directions(points: ArrayLike) -> Float[np.ndarray, "n 3"]:
         )
     # Scale each point to size 1 first: squares of tiny or huge coordinates underflow or overflow.
     rows = np.ldexp(rows, -np.frexp(sizes)[1][:, None])
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
-
-
-def _over_degrees(
-    heights: Float[np.ndarray, " n"], order: int, last: int, top: float
-) -> Float[np.ndarray, "n l"]:
-    """Return N P_l^m(z) / (1 - z²)^{m/2} for l = m..last, given its value `top` for l = m."""
-    values = np.empty((last - order + 1, len(heights)))
-    values[0] = top
-    if order < last:
-        values[1] = (2 * order + 3) ** 0.5 * heights * top
-    for degree in range(order + 2, last + 1):
-        ahead = ((4 * degree**2 - 1) / (degree**2 - order**2)) ** 0.5
-        behind = (((degree - 1) ** 2 - order**2) / (4 * (degree - 1) ** 2 - 1)) ** 0.5
-        place = degree - order
-        values[place] = ahead * (heights * values[place - 1] - behind * values[place - 2])
-    return values.T
+    x, y, z = (rows / np.linalg.norm(rows, axis=1, keepdims=True)).T
+    last = isqrt(count - 1)
+    harmonics = np.empty((len(rows), (last + 1) ** 2))
+    turn = x + 1j * y
+    power, top = np.ones(len(rows), dtype=np.complex128), (4 * np.pi) ** -0.5
+    for order in range(last + 1):
+        if order:
+            power = power * turn
+            top *= ((2 * order + 1) / (2 * order)) ** 0.5
+        # N P_l^m(z) / (1 - z²)^{m/2} for each degree l, from its value `top` for l = m upwards.
+        legendre = np.empty((last - order + 1, len(rows)))
+        legendre[0] = top
+        if order < last:
+            legendre[1] = (2 * order + 3) ** 0.5 * z * top
+        for degree in range(order + 2, last + 1):
+            ahead = ((4 * degree**2 - 1) / (degree**2 - order**2)) ** 0.5
+            behind = (((degree - 1) ** 2 - order**2) / (4 * (degree - 1) ** 2 - 1)) ** 0.5
+            before, nearest = legendre[degree - order - 2 : degree - order]
+            legendre[degree - order] = ahead * (z * nearest - behind * before)
+        values = (2**0.5 if order else 1.0) * legendre.T
+        degrees = np.arange(order, last + 1)
+        harmonics[:, degrees * (degrees + 1) - order] = values * power.imag[:, None]
+        harmonics[:, degrees * (degrees + 1) + order] = values * power.real[:, None]
+    return freeze(harmonics[:, :count])

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, is_closed, is_manifold, vertex_components
+from eigenshape.geometry.topology import is_closed, is_manifold, vertex_components
+from eigenshape.operators.graph import edge_graph
 
 Field = Callable[[Float[np.ndarray, "p 3"]], Float[np.ndarray, " p"]]
 
@@ -46,7 +46,10 @@ def isosurface(
     for offset in OFFSETS % 1:
         points, quads = _nets(field, low - spacing * (1 + offset), high + 2 * spacing, spacing)
         if _is_sound(TriangleMesh(points, _split(points, quads))):
-            mesh = _smooth(field, points, quads, spacing)
+            points = _project(field, points, spacing)[0]
+            for _ in range(N_STAGES):
+                points = relax(field, TriangleMesh(points, _split(points, quads)), spacing).vertices
+            mesh = TriangleMesh(points, _split(points, quads))
             if _is_sound(mesh):
                 return mesh
     raise InvalidShapeError(
@@ -77,7 +80,13 @@ def _nets(
     field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float
 ) -> tuple[Float[np.ndarray, "p 3"], Int[np.ndarray, "q 4"]]:
     values = _lattice_values(field, low, np.ceil((high - low) / spacing).astype(int), spacing)
-    cells = _crossed_cells(values)
+    # The surface crosses the cells with corners inside and outside. Count the inside corners of
+    # pairs, then squares, then cubes of lattice points.
+    counts = (values < 0).astype(np.int8)
+    for axis in range(3):
+        here, there = (counts.take(np.arange(s, counts.shape[axis] - 1 + s), axis) for s in (0, 1))
+        counts = here + there
+    cells = np.argwhere((counts > 0) & (counts < 8))
     corners = np.stack([values[tuple((cells + corner).T)] for corner in CORNERS], axis=1)
     number, points = _sheet_points(cells, corners)
     cell_number = np.full(np.array(values.shape) - 1, -1, dtype=np.int64)
@@ -120,11 +129,6 @@ def _edge(axis: int, corner: tuple[int, ...]) -> int:
     return 4 * axis + 2 * one + two
 
 
-def _corner(corner: tuple[int, ...]) -> int:
-    """Return the number of a corner of a cell: 0 to 7."""
-    return 4 * corner[0] + 2 * corner[1] + corner[2]
-
-
 def _face(normal: int, side: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the edges around a face of a cell, and the corners at which each of them begins."""
     p, q = (axis for axis in range(3) if axis != normal)
@@ -134,24 +138,17 @@ def _face(normal: int, side: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
         return tuple(place[axis] for axis in range(3))
 
     edges = (_edge(p, at(0, 0)), _edge(q, at(1, 0)), _edge(p, at(0, 1)), _edge(q, at(0, 0)))
-    return edges, tuple(_corner(corner) for corner in (at(0, 0), at(1, 0), at(1, 1), at(0, 1)))
+    corners = (at(0, 0), at(1, 0), at(1, 1), at(0, 1))
+    return edges, tuple(4 * x + 2 * y + z for x, y, z in corners)
 
 
 UNIT_VECTORS = np.eye(3, dtype=np.int64)
-# The corners, edges (axis and start) and faces (edges and corners) of a cell, in the order of their
-# numbers.
+# The corners, edges (directions and starts) and faces (edges and corners) of a cell, in the order of
+# their numbers.
 CORNERS = np.array(list(np.ndindex(2, 2, 2)))
-EDGES = [(axis, np.insert(shift, axis, 0)) for axis in range(3) for shift in np.ndindex(2, 2)]
+DIRECTIONS = UNIT_VECTORS.repeat(4, axis=0)
+STARTS = np.array([np.insert(shift, axis, 0) for axis in range(3) for shift in np.ndindex(2, 2)])
 FACES = [_face(normal, side) for normal in range(3) for side in (0, 1)]
-
-
-def _crossed_cells(values: Float[np.ndarray, "x y z"]) -> Int[np.ndarray, "c 3"]:
-    inside = (values < 0).astype(np.int8)
-    # Count the inside corners of pairs, then squares, then cubes of lattice points.
-    for axis in range(3):
-        here, there = (inside.take(np.arange(s, inside.shape[axis] - 1 + s), axis) for s in (0, 1))
-        inside = here + there
-    return np.argwhere((inside > 0) & (inside < 8))
 
 
 def _sheet_points(
@@ -162,17 +159,11 @@ def _sheet_points(
     The point is the mean of the crossings of the sheet with the edges of the cell. Returns the
     point of each edge of each cell, -1 where the surface does not cross the edge, and the points.
     """
-    ends = [
-        (_corner(tuple(start.tolist())), _corner(tuple((start + UNIT_VECTORS[axis]).tolist())))
-        for axis, start in EDGES
-    ]
-    here, there = corners[:, [one for one, _ in ends]], corners[:, [two for _, two in ends]]
+    # Corner (x, y, z) has number 4x + 2y + z.
+    here, there = (corners[:, ends @ [4, 2, 1]] for ends in (STARTS, STARTS + DIRECTIONS))
     crosses = (here < 0) != (there < 0)
     share = np.where(crosses, here / np.where(crosses, here - there, 1.0), 0.0)
-    directions = np.eye(3)[[axis for axis, _ in EDGES]]
-    places = (
-        np.array([start for _, start in EDGES]) + share[..., None] * directions + cells[:, None, :]
-    )
+    places = STARTS + share[..., None] * DIRECTIONS + cells[:, None, :]
     sheets = 12 * np.arange(len(cells))[:, None] + _sheets(corners < 0, crosses)
     _, number = np.unique(sheets[crosses], return_inverse=True)
     counts = np.bincount(number)
@@ -250,20 +241,9 @@ def _cotangent(
     return np.einsum("ij,ij->i", one, two) / np.maximum(twice_area, np.finfo(np.float64).tiny)
 
 
-def _smooth(
-    field: Field, points: Float[np.ndarray, "p 3"], quads: Int[np.ndarray, "q 4"], spacing: float
-) -> TriangleMesh:
-    points = _project(field, points, spacing)[0]
-    for _ in range(N_STAGES):
-        points = relax(field, TriangleMesh(points, _split(points, quads)), spacing).vertices
-    return TriangleMesh(points, _split(points, quads))
-
-
 def relax(field: Field, mesh: TriangleMesh, spacing: float) -> TriangleMesh:
     """Move vertices along the surface towards the mean of their neighbors."""
-    one, two = edge_table(mesh).edges.T
-    links = sp.coo_array((np.ones(len(one)), (one, two)), shape=(mesh.n_vertices,) * 2)
-    links = (links + links.T).tocsr()
+    links = edge_graph(mesh)
     degree = links.sum(axis=1)[:, None]
     points, normals = _project(field, mesh.vertices, spacing)
     for _ in range(N_ROUNDS):

@@ -73,11 +73,16 @@ def place_limbs(plan: Sequence[Limb], individual: int = 0) -> Body:
 
     The seed of an individual varies the lengths and widths of the limbs, unless it is 0.
     """
-    growth = _growth(plan, individual)
+    # How much longer and wider limbs are. Names with the same first word vary together.
+    rng = np.random.default_rng(individual)
+    growth = {
+        group: np.exp(VARIATION * rng.uniform(-1, 1, 2)) if individual else np.ones(2)
+        for group in dict.fromkeys(_group(limb.name) for limb in plan)
+    }
     drawn = {
         _name_side(limb.name, side): _mirror_limb(limb, side)
         for limb in plan
-        for side in _sides(limb)
+        for side in ((1, -1) if limb.name.endswith("*") else (1,))
     }
     numbers = {name: number for number, name in enumerate(drawn)}
     placed: list[PlacedLimb] = []
@@ -91,26 +96,26 @@ def place_limbs(plan: Sequence[Limb], individual: int = 0) -> Body:
         longer, wider = growth[_group(name)]
         lengthened = start + longer * (nodes[:, :3] - nodes[0, :3])
         nodes = np.column_stack([lengthened, wider * nodes[:, 3]])
-        placed.append(_place(limb, nodes, numbers.get(parent, -1), int(node or 0)))
+        # A smooth curve through the nodes (Catmull and Rom 1974).
+        curve = CubicHermiteSpline(np.arange(len(nodes)), nodes, np.gradient(nodes, axis=0))
+        n_pieces = PIECES_PER_SEGMENT * (len(nodes) - 1)
+        placed.append(
+            PlacedLimb(
+                nodes=nodes,
+                pieces=curve(np.linspace(0, len(nodes) - 1, n_pieces + 1)),
+                squash=np.array(limb.squash, dtype=np.float64),
+                power=float(limb.power),
+                parent=numbers.get(parent, -1),
+                parent_node=int(node or 0),
+                hub=limb.hub,
+                swings=limb.swings,
+            )
+        )
     return Body(tuple(placed))
-
-
-def _growth(plan: Sequence[Limb], individual: int) -> dict[str, Float[np.ndarray, "2"]]:
-    """Draw how much longer and wider limbs are; names with the same first word vary together."""
-    rng = np.random.default_rng(individual)
-    groups = dict.fromkeys(_group(limb.name) for limb in plan)
-    return {
-        group: np.exp(VARIATION * rng.uniform(-1, 1, 2)) if individual else np.ones(2)
-        for group in groups
-    }
 
 
 def _group(name: str) -> str:
     return name.split(maxsplit=1)[0].rstrip("*+-")
-
-
-def _sides(limb: Limb) -> tuple[int, ...]:
-    return (1, -1) if limb.name.endswith("*") else (1,)
 
 
 def _name_side(name: str, side: int) -> str:
@@ -127,18 +132,6 @@ def _mirror_limb(limb: Limb, side: int) -> Limb:
         (node, (side * x, y, side * z), low, high) for node, (x, y, z), low, high in limb.swings
     )
     return limb._replace(parent=_name_side(limb.parent, side), nodes=nodes, swings=swings)
-
-
-def _place(
-    limb: Limb, nodes: Float[np.ndarray, "k 4"], parent: int, parent_node: int
-) -> PlacedLimb:
-    """Place a limb on a smooth curve through its nodes (Catmull and Rom 1974)."""
-    curve = CubicHermiteSpline(np.arange(len(nodes)), nodes, np.gradient(nodes, axis=0))
-    pieces = curve(np.linspace(0, len(nodes) - 1, PIECES_PER_SEGMENT * (len(nodes) - 1) + 1))
-    squash = np.array(limb.squash, dtype=np.float64)
-    return PlacedLimb(
-        nodes, pieces, squash, float(limb.power), parent, parent_node, limb.hub, limb.swings
-    )
 
 
 def distance_to_body(points: Float[np.ndarray, "p 3"], body: Body) -> Float[np.ndarray, " p"]:
@@ -174,35 +167,39 @@ def distance_to_limb(
     apart = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0), axis=1)
     place = np.zeros(len(points))
     close = np.flatnonzero(apart < 2 * BLEND)
-    piece, share = _nearest_piece(points[close], limb)
-    center = limb.pieces[piece] + share[:, None] * (limb.pieces[piece + 1] - limb.pieces[piece])
-    apart[close] = _distance_to_section(points[close] - center[:, :3], center[:, 3], limb)
-    place[close] = (piece + share) / PIECES_PER_SEGMENT
-    return apart, place
+    points = points[close]
 
-
-def _nearest_piece(
-    points: Float[np.ndarray, "p 3"], limb: PlacedLimb
-) -> tuple[Int[np.ndarray, " p"], Float[np.ndarray, " p"]]:
-    """Return the piece of a limb with the nearest skin, and the position along the piece, 0 to 1.
-
-    The cross-section is taken to be round.
-    """
-    begins, radii = limb.pieces[:-1, :3], limb.pieces[:, 3]
-    along = np.diff(limb.pieces[:, :3], axis=0)
+    # The piece with the nearest skin if cross-sections were round, and the position along it.
+    begins = centers[:-1]
+    along = np.diff(centers, axis=0)
     length2 = np.square(along).sum(axis=1)
     reach = _products(points, along) - (begins * along).sum(axis=1)
-    share = np.clip(reach / length2, 0, 1)
+    shares = np.clip(reach / length2, 0, 1)
     # |p - b - s a|² is expanded, so that no array has the size points by pieces by coordinates.
     apart2 = (
         np.square(points).sum(axis=1)[:, None]
         - 2 * _products(points, begins)
         + np.square(begins).sum(axis=1)
     )
-    apart2 += share * (share * length2 - 2 * reach)
-    apart = np.sqrt(np.maximum(apart2, 0)) - radii[:-1] - share * np.diff(radii)
-    piece = apart.argmin(axis=1)
-    return piece, share[np.arange(len(points)), piece]
+    apart2 += shares * (shares * length2 - 2 * reach)
+    widths = limb.pieces[:, 3]
+    to_skin = np.sqrt(np.maximum(apart2, 0)) - widths[:-1] - shares * np.diff(widths)
+    piece = to_skin.argmin(axis=1)
+    share = shares[np.arange(len(points)), piece]
+    place[close] = (piece + share) / PIECES_PER_SEGMENT
+
+    # The distance to the cross-section, a superellipsoid, to first order: the value of the norm
+    # that defines it, minus the radius, divided by its slope.
+    center = limb.pieces[piece] + share[:, None] * (limb.pieces[piece + 1] - limb.pieces[piece])
+    arm, radius = points - center[:, :3], center[:, 3]
+    if limb.power == 2 and (limb.squash == 1).all():
+        apart[close] = np.sqrt(np.einsum("ij,ij->i", arm, arm)) - radius
+        return apart, place
+    scaled = np.abs(arm) / limb.squash
+    size = np.maximum((scaled**limb.power).sum(axis=1) ** (1 / limb.power), TINY_SIZE)
+    slope = np.linalg.norm((scaled / size[:, None]) ** (limb.power - 1) / limb.squash, axis=1)
+    apart[close] = (size - radius) / np.maximum(slope, 0.5)
+    return apart, place
 
 
 def _products(
@@ -211,18 +208,3 @@ def _products(
     # A matrix product by BLAS may change its last digits with the number of threads; einsum does
     # not.
     return np.einsum("pi,si->ps", one, two)
-
-
-def _distance_to_section(
-    arm: Float[np.ndarray, "p 3"], radius: Float[np.ndarray, " p"], limb: PlacedLimb
-) -> Float[np.ndarray, " p"]:
-    """Return the distance to the cross-section of a limb, a superellipsoid, to first order.
-
-    That is the value of the norm that defines it, minus the radius, divided by its slope.
-    """
-    if limb.power == 2 and (limb.squash == 1).all():
-        return np.sqrt(np.einsum("ij,ij->i", arm, arm)) - radius
-    scaled = np.abs(arm) / limb.squash
-    size = np.maximum((scaled**limb.power).sum(axis=1) ** (1 / limb.power), TINY_SIZE)
-    slope = np.linalg.norm((scaled / size[:, None]) ** (limb.power - 1) / limb.squash, axis=1)
-    return (size - radius) / np.maximum(slope, 0.5)

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import splu
 
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table
+from eigenshape.geometry.topology import adjacency_matrix, edge_table
 
 # Implicit diffusion steps of the narrowest bend; wider bends take more steps of the same length.
 # Three steps are close to a Gaussian profile.
@@ -46,9 +46,7 @@ def diffuse(
     edges = edge_table(mesh).edges
     ends = mesh.vertices[edges]
     length2 = np.square(ends[:, 0] - ends[:, 1]).sum(axis=1).mean()
-    one, two = edges.T
-    links = sp.coo_array((np.ones(len(edges)), (one, two)), shape=(mesh.n_vertices,) * 2)
-    links = links + links.T
+    links = adjacency_matrix(edges, np.ones(len(edges)), mesh.n_vertices)
     step = widths.min() ** 2 / STEPS
     # With six neighbors at equal distance the sum of differences is 3/2 length² times the
     # Laplacian, and the variance of diffused heat is twice the time.

@@ -250,21 +250,15 @@ def projective_plane(level: Integer = 3) -> SimplicialMesh:
     """
     sphere = icosphere(whole_number(level, "level", 1, 9))
     x, y, z = sphere.vertices.T
-    # The first of two antipodes represents both.
-    _, first, names = np.unique(
-        _signless(sphere.vertices), axis=0, return_index=True, return_inverse=True
-    )
+    # Points are rounded, and negated so that antipodes are equal; the first represents both.
+    rounded = np.round(sphere.vertices, 9) + 0.0
+    leading = np.argmax(rounded != 0, axis=1)
+    signs = np.sign(rounded[np.arange(len(rounded)), leading])
+    lines = rounded * signs[:, None] + 0.0
+    _, first, names = np.unique(lines, axis=0, return_index=True, return_inverse=True)
     image = np.column_stack(
         [y * z, x * z, x * y, (x**2 - y**2) / 2, (x**2 + y**2 - 2 * z**2) / 12**0.5]
     )
     return SimplicialMesh(
         image[first], np.unique(np.sort(names.ravel()[sphere.faces], axis=1), axis=0)
     )
-
-
-def _signless(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """Return points rounded, and negated so that antipodes are equal."""
-    rounded = np.round(points, 9) + 0.0
-    leading = np.argmax(rounded != 0, axis=1)
-    signs = np.sign(rounded[np.arange(len(rounded)), leading])
-    return rounded * signs[:, None] + 0.0

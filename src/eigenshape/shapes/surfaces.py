@@ -1,5 +1,7 @@
 """Synthetic surfaces whose spectra are known."""
 
+from itertools import combinations
+
 import numpy as np
 from jaxtyping import Int
 
@@ -54,25 +56,15 @@ def _icosahedron() -> TriangleMesh:
         [np.roll(np.insert(signs, 0, 0.0, axis=1), turn, axis=1) for turn in range(3)]
     )
     points = points / np.linalg.norm(points[0])
-    return TriangleMesh(points, _faces_around_origin(points))
-
-
-def _faces_around_origin(points: np.ndarray) -> Int[np.ndarray, "f 3"]:
-    """Return the triangles of points that are nearest neighbors of each other, facing outward."""
+    # The faces are the triangles of points that are nearest neighbors of each other.
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = (distance < 1.01 * distance[distance > 0].min()) & (distance > 0)
-    n = len(points)
-    triples = [
-        (a, b, c)
-        for a in range(n)
-        for b in range(a + 1, n)
-        for c in range(b + 1, n)
+    outward = [
+        (a, b, c) if np.linalg.det(points[[a, b, c]]) > 0 else (a, c, b)
+        for a, b, c in combinations(range(len(points)), 3)
         if near[a, b] and near[b, c] and near[a, c]
     ]
-    outward = [
-        (a, b, c) if np.linalg.det(points[[a, b, c]]) > 0 else (a, c, b) for a, b, c in triples
-    ]
-    return np.array(outward, dtype=np.int64)
+    return TriangleMesh(points, np.array(outward, dtype=np.int64))
 
 
 def torus(
@@ -112,13 +104,16 @@ def torus(
     points = np.stack(
         [rim * np.cos(u), rim * np.sin(u), np.broadcast_to(inner * np.sin(v), (n_around, n_across))]
     )
-    return TriangleMesh(points.reshape(3, -1).T, _wrapped_grid(n_around, n_across))
+    i, j = (index.ravel() for index in np.indices((n_around, n_across)))
+    after, beside = (i + 1) % n_around * n_across, (j + 1) % n_across
+    faces = _halve_cells(i * n_across + j, i * n_across + beside, after + j, after + beside)
+    return TriangleMesh(points.reshape(3, -1).T, faces)
 
 
-def _wrapped_grid(rows: int, columns: int) -> Int[np.ndarray, "f 3"]:
-    i, j = (index.ravel() for index in np.indices((rows, columns)))
-    here, right = i * columns + j, i * columns + (j + 1) % columns
-    below, across = (i + 1) % rows * columns + j, (i + 1) % rows * columns + (j + 1) % columns
+def _halve_cells(
+    here: np.ndarray, right: np.ndarray, below: np.ndarray, across: np.ndarray
+) -> Int[np.ndarray, "f 3"]:
+    """Return the two triangles of each cell, given its four corners."""
     return np.concatenate(
         [np.column_stack([here, below, across]), np.column_stack([here, across, right])]
     )
@@ -165,8 +160,4 @@ def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     i, j = (index.ravel() for index in np.indices((n_x, n_y)))
     here = i * (n_y + 1) + j
-    right, below, across = here + 1, here + n_y + 1, here + n_y + 2
-    faces = np.concatenate(
-        [np.column_stack([here, below, across]), np.column_stack([here, across, right])]
-    )
-    return TriangleMesh(points, faces)
+    return TriangleMesh(points, _halve_cells(here, here + 1, here + n_y + 1, here + n_y + 2))

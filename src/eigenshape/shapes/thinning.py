@@ -4,7 +4,6 @@ import heapq
 import math
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
@@ -35,42 +34,32 @@ def collapse_shortest_edges(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh
         length, kept, gone = heapq.heappop(shortest)
         # The heap still holds edges that have collapsed or changed their length since.
         out_of_date = gone not in around[kept] or length != math.dist(points[kept], points[gone])
-        if out_of_date or not _may_collapse(around, kept, gone):
+        if out_of_date:
+            continue
+        common = around[kept] & around[gone]
+        n_left = len(around[kept]) + len(around[gone]) - 4
+        if (
+            len(common) != 2
+            or not FEWEST_NEIGHBORS <= n_left <= MOST_NEIGHBORS
+            or any(len(around[other]) <= FEWEST_NEIGHBORS for other in common)
+        ):
             continue
         points[kept] = [(x + y) / 2 for x, y in zip(points[kept], points[gone], strict=True)]
         target[gone] = kept
-        _join(around, kept, gone)
+        for other in around[gone]:
+            around[other].remove(gone)
+            if other != kept:
+                around[other].add(kept)
+                around[kept].add(other)
+        around[gone] = set()
         for other in sorted(around[kept]):
             heapq.heappush(shortest, (math.dist(points[kept], points[other]), kept, other))
         surplus -= 1
-    return _relabel_faces(np.array(points), mesh.faces, np.array(target))
-
-
-def _may_collapse(around: list[set[int]], kept: int, gone: int) -> bool:
-    common = around[kept] & around[gone]
-    return (
-        len(common) == 2
-        and FEWEST_NEIGHBORS <= len(around[kept]) + len(around[gone]) - 4 <= MOST_NEIGHBORS
-        and all(len(around[other]) > FEWEST_NEIGHBORS for other in common)
-    )
-
-
-def _join(around: list[set[int]], kept: int, gone: int) -> None:
-    for other in around[gone]:
-        around[other].remove(gone)
-        if other != kept:
-            around[other].add(kept)
-            around[kept].add(other)
-    around[gone] = set()
-
-
-def _relabel_faces(
-    points: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"], target: Int[np.ndarray, " n"]
-) -> TriangleMesh:
-    """Replace the corners of faces by what they have collapsed to; remove collapsed faces."""
-    while (target[target] != target).any():
-        target = target[target]
-    stays, number = np.unique(target, return_inverse=True)
-    corners = number[faces]
+    # Replace the corners of faces by what they have collapsed to, and leave out collapsed faces.
+    into = np.array(target)
+    while (into[into] != into).any():
+        into = into[into]
+    stays, number = np.unique(into, return_inverse=True)
+    corners = number[mesh.faces]
     alive = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-    return TriangleMesh(points[stays], corners[alive])
+    return TriangleMesh(np.array(points)[stays], corners[alive])

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape.retrieval.patches.distance import patch_distances, view_distances
+from eigenshape.retrieval.patches.distance import packed_distances, patch_distances
 from eigenshape.retrieval.patches.matching import patch_agreement
+from eigenshape.retrieval.patches.packing import pack_codes
 from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.retrieval.patches.verification import (
     AGREEMENT_WEIGHT,
@@ -69,12 +70,13 @@ def test_the_nearest_view_of_the_query_serves_against_a_part(wholes, scan):
 
 def test_views_of_the_query_serve_against_parts(wholes, scan):
     whole, other, part = wholes[1].codes, wholes[0].codes, scan.codes
-    found = view_distances(whole, [part, other])
+    packed = [pack_codes(codes.reshape(-1, codes.shape[-1])) for codes in (part, other)]
+    found = packed_distances(whole, packed)
     own = patch_distances(whole[0], np.array([part[0], other[0]]))
     nearest = min(own[0], *(patch_distances(view, part)[0] for view in whole[1:]))
     assert nearest < own[0]
     assert found[0] == pytest.approx((own[0] + nearest) / 2)
-    assert found[1] == view_distances(whole[:1], [other])[0]
+    assert found[1] == packed_distances(whole[:1], packed[1:])[0]
 
 
 @pytest.mark.parametrize("name", ["sphere", "torus", "hand"])

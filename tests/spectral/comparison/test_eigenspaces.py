@@ -97,9 +97,7 @@ def test_bad_input_to_errors():
         InvalidParameterError, match=r"one row for each of 162 points; the shape is \(161, 16\)"
     ):
         eigenspace_errors(SPECTRUM, EXACT, HARMONICS[1:])
-    with pytest.raises(
-        InvalidParameterError, match=r"functions must be finite; row 3 is not \(1 such\)"
-    ):
+    with pytest.raises(InvalidParameterError, match="functions must be finite; that of point 3 is"):
         eigenspace_errors(
             SPECTRUM, EXACT, np.where(np.arange(162)[:, None] == 3, np.nan, HARMONICS)
         )

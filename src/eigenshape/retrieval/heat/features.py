@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, vertex_values
+from eigenshape._arrays import ReadOnly, vertex_values
 from eigenshape._progress import Progress
 from eigenshape._text import short_repr
 from eigenshape._threads import map_in_threads
@@ -199,33 +198,57 @@ def find_heat_features(
     mesh = as_mesh(mesh)
     require_type(recipe, HeatRecipe, "recipe")
     height = None if values is None else vertex_values(values, "values", mesh.n_vertices)
-    shape = _prepare(mesh, recipe)
-    unit, times = _unit_and_times(shape.area, recipe)
+    require_describable(mesh)
+    if recipe.unit == "box":
+        mesh = normalize_mesh(mesh, "box")
+    laplacian = cotangent_laplacian(mesh)
+    areas = laplacian.mass.diagonal()
+    fragments = fragment_vertices(mesh)
+    _, labels = vertex_components(mesh)
+    n_components = len(np.unique(np.delete(labels, fragments)))
+    n_modes = recipe.n_modes + n_components - 1
+    # Heat flows with the fragments fixed, and once more with the boundary fixed as well, which
+    # cancels its reflections: not if the recipe keeps them, or if there are no interior vertices.
+    fixed = [fragments]
+    boundary = np.setdiff1d(boundary_edges(mesh), fragments)
+    no_interior = len(boundary) + len(fragments) == mesh.n_vertices
+    if len(boundary) and not recipe.reflections and not no_interior:
+        fixed.append(np.union1d(fragments, boundary))
+    area = float(laplacian.mass.sum()) - float(areas[fragments].sum())
+    unit, times = _unit_and_times(area, recipe)
+    spectrum, error = None, None
     if accuracy is None:
-        heat = _certified_heat(shape, times, progress)
+        heat, spectrum = _certified_heat(laplacian, fixed, n_modes, times, progress)
     else:
-        heat = _approximate_heat(shape, times, accuracy, progress)
+        heat, error = _approximate_heat(laplacian, fixed, n_modes, times, accuracy, progress)
     if height is None:
-        height = _with_heat_of_fragments(shape, heat.first)
+        # The heat on a fragment is constant: 1 over its area.
+        height = heat[:, 0].copy()
+        height[fragments] = 1 / np.bincount(labels, weights=areas)[labels[fragments]]
 
     # Cut the shape around the maxima, and put the regions of fragments last.
-    tree = merge_tree(shape.mesh, height)
-    n_fragments = int(np.isin(tree.maxima, shape.fragments).sum())
+    tree = merge_tree(mesh, height)
+    n_fragments = int(np.isin(tree.maxima, fragments).sum())
     parts = segment(tree, n_regions=recipe.n_features + n_fragments)
-    on_fragment = np.isin(parts.features.vertices, shape.fragments)
-    parts = _reorder_parts(parts, np.argsort(on_fragment, kind="stable"))
+    on_fragment = np.isin(parts.features.vertices, fragments)
+    order = np.argsort(on_fragment, kind="stable")
+    found = parts.features
+    columns = (found.vertices, found.values, found.persistence)
+    parts = Segmentation(
+        np.argsort(order)[parts.labels], FeaturePoints(*(column[order] for column in columns))
+    )
 
-    n_described = min(max(recipe.n_features, shape.n_components), int((~on_fragment).sum()))
-    descriptor = _descriptor(heat.later, parts.features.vertices[:n_described], recipe, unit)
+    n_described = min(max(recipe.n_features, n_components), int((~on_fragment).sum()))
+    descriptor = _descriptor(heat[:, 1:], parts.features.vertices[:n_described], recipe, unit)
     return HeatFeatures(
-        mesh=shape.mesh,
-        spectrum=heat.spectrum,
+        mesh=mesh,
+        spectrum=spectrum,
         heat=height,
-        error=heat.error,
+        error=error,
         tree=tree,
         parts=parts,
         descriptor=descriptor,
-        fragments=shape.fragments,
+        fragments=fragments,
     )
 
 
@@ -250,96 +273,40 @@ def find_view_features(
     return part, find_heat_features(part.mesh, recipe)
 
 
-@dataclass(frozen=True, eq=False)
-class _PreparedShape:
-    """A shape with what a recipe asks of it.
-
-    Attributes
-    ----------
-    mesh : TriangleMesh
-    laplacian : Laplacian
-    boundary : (b,) int
-        Boundary vertices whose reflections are to be canceled: none if the recipe keeps
-        reflections, or if the shape has no interior vertices.
-    fragments : (c,) int
-        Vertices of `fragment_vertices`.
-    n_components : int
-        Without fragments.
-    area : float
-        Without fragments, in length².
-    n_modes : int
-        Eigenpairs to take: those of the recipe, and one for each further component.
-    """
-
-    mesh: TriangleMesh
-    laplacian: Laplacian
-    boundary: Int[np.ndarray, " b"]
-    fragments: Int[np.ndarray, " c"]
-    n_components: int
-    area: float
-    n_modes: int
-
-
-def _prepare(mesh: TriangleMesh, recipe: HeatRecipe) -> _PreparedShape:
-    """Scale a mesh as its recipe asks, build its operator, and find its boundary and fragments."""
-    require_describable(mesh)
-    mesh = normalize_mesh(mesh, "box") if recipe.unit == "box" else mesh
-    laplacian = cotangent_laplacian(mesh)
-    fragments = fragment_vertices(mesh)
-    _, labels = vertex_components(mesh)
-    n_components = len(np.unique(np.delete(labels, fragments)))
-    boundary = np.setdiff1d(boundary_edges(mesh), fragments)
-    if recipe.reflections or len(boundary) + len(fragments) == mesh.n_vertices:
-        boundary = boundary[:0]
-    area = float(laplacian.mass.sum()) - float(laplacian.mass.diagonal()[fragments].sum())
-    n_modes = recipe.n_modes + n_components - 1
-    return _PreparedShape(mesh, laplacian, boundary, fragments, n_components, area, n_modes)
-
-
-class _Heat(NamedTuple):
-    """Heat at the time that finds features (n,), at the later times that describe them (n, q)."""
-
-    first: Float[np.ndarray, " n"]
-    later: Float[np.ndarray, "n q"]
-    spectrum: Spectrum | None
-    error: float | None
-
-
 def _certified_heat(
-    shape: _PreparedShape, times: Float[np.ndarray, " t"], progress: Progress | None
-) -> _Heat:
-    def spectrum_without(points: Int[np.ndarray, " c"]) -> Spectrum:
-        n_free = shape.mesh.n_vertices - len(points)
-        n_modes = min(shape.n_modes, n_free)
-        return solve_spectrum(shape.laplacian, n_modes, fixed=points, progress=progress)
-
-    spectrum = spectrum_without(shape.fragments)
-    dirichlet = None
-    if len(shape.boundary):
-        dirichlet = spectrum_without(np.union1d(shape.fragments, shape.boundary))
-    first = _heat(spectrum, dirichlet, times[:1])[:, 0]
-    return _Heat(first, _heat(spectrum, dirichlet, times[1:]), spectrum, None)
+    laplacian: Laplacian,
+    fixed: list[Int[np.ndarray, " _"]],
+    n_modes: int,
+    times: Float[np.ndarray, " t"],
+    progress: Progress | None,
+) -> tuple[Float[np.ndarray, "n t"], Spectrum]:
+    spectra = []
+    for points in fixed:
+        k = min(n_modes, laplacian.n_points - len(points))
+        spectra.append(solve_spectrum(laplacian, k, fixed=points, progress=progress))
+    dirichlet = spectra[1] if len(spectra) > 1 else None
+    columns = [_heat(spectra[0], dirichlet, each) for each in (times[:1], times[1:])]
+    return np.concatenate(columns, axis=1), spectra[0]
 
 
 def _approximate_heat(
-    shape: _PreparedShape,
+    laplacian: Laplacian,
+    fixed: list[Int[np.ndarray, " _"]],
+    n_modes: int,
     times: Float[np.ndarray, " t"],
     accuracy: float,
     progress: Progress | None,
-) -> _Heat:
-    def heat_without(points: Int[np.ndarray, " c"]) -> tuple[Float[np.ndarray, "n t"], float]:
-        inner, free = dirichlet_laplacian(shape.laplacian, points)
-        k = min(shape.n_modes, inner.n_points)
+) -> tuple[Float[np.ndarray, "n t"], float]:
+    heat, errors = [], []
+    for points in fixed:
+        inner, free = dirichlet_laplacian(laplacian, points)
+        k = min(n_modes, inner.n_points)
         found = approximate_heat_signature(inner, k, times, accuracy=accuracy, progress=progress)
-        columns = np.zeros((shape.mesh.n_vertices, len(times)))
+        columns = np.zeros((laplacian.n_points, len(times)))
         columns[free] = found.values
-        return columns, float(found.errors[0])
-
-    columns, error = heat_without(shape.fragments)
-    if len(shape.boundary):
-        fixed, fixed_error = heat_without(np.union1d(shape.fragments, shape.boundary))
-        columns, error = (columns + fixed) / 2, max(error, fixed_error)
-    return _Heat(columns[:, 0], columns[:, 1:], None, error)
+        heat.append(columns)
+        errors.append(float(found.errors[0]))
+    return np.mean(heat, axis=0), max(errors)
 
 
 def _heat(
@@ -350,31 +317,10 @@ def _heat(
     return reflection_free_signature(spectrum, dirichlet, times)
 
 
-def _with_heat_of_fragments(
-    shape: _PreparedShape, heat: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, " n"]:
-    """Fill in the heat on fragments, constant on each: 1 over its area."""
-    if not len(shape.fragments):
-        return heat
-    _, labels = vertex_components(shape.mesh)
-    areas = np.bincount(labels, weights=shape.laplacian.mass.diagonal())
-    heat = heat.copy()
-    heat[shape.fragments] = 1 / areas[labels[shape.fragments]]
-    return heat
-
-
 def _unit_and_times(area: float, recipe: HeatRecipe) -> tuple[float, Float[np.ndarray, " t"]]:
     """Return what a time of 1 means, and the times: first that of the features. All in length²."""
     unit = area if recipe.unit == "area" else 1.0
     return unit, unit * recipe.time_unit * np.array([recipe.feature_scale, *recipe.scales])
-
-
-def _reorder_parts(parts: Segmentation, order: Int[np.ndarray, " m"]) -> Segmentation:
-    features, number = parts.features, np.argsort(order)
-    columns = (features.vertices, features.values, features.persistence)
-    return Segmentation(
-        freeze(number[parts.labels]), FeaturePoints(*(freeze(column[order]) for column in columns))
-    )
 
 
 def _descriptor(

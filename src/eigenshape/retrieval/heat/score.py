@@ -54,11 +54,19 @@ def matching_score(first: HeatDescriptor, second: HeatDescriptor) -> float:
     >>> es.retrieval.matching_score(fish, again) < es.retrieval.matching_score(fish, bird)
     True
     """
+    return _score_and_shift(first, second)[0]
+
+
+def _score_and_shift(first: HeatDescriptor, second: HeatDescriptor) -> tuple[float, int]:
     require_type(first, HeatDescriptor, "first")
     require_type(second, HeatDescriptor, "second")
-    _require_same_recipe(first, second)
-    scores, _ = matching_scores(first.vectors, second.vectors, np.array([0]), first.recipe)
-    return float(scores[0])
+    if first.recipe != second.recipe:
+        raise InvalidParameterError(
+            f"Only descriptors by the same recipe compare; the first is by {first.recipe}, the "
+            f"second by {second.recipe}. Describe both by one recipe."
+        )
+    scores, shifts = matching_scores(first.vectors, second.vectors, np.array([0]), first.recipe)
+    return float(scores[0]), int(shifts[0])
 
 
 def matching_scores(
@@ -156,21 +164,10 @@ def match_features(first: HeatDescriptor, second: HeatDescriptor) -> Int[np.ndar
     >>> bool((pairs[:, 0] == pairs[:, 1]).all())
     True
     """
-    require_type(first, HeatDescriptor, "first")
-    require_type(second, HeatDescriptor, "second")
-    _require_same_recipe(first, second)
-    _, shifts = matching_scores(first.vectors, second.vectors, np.array([0]), first.recipe)
-    ours, theirs = shift_columns(first.vectors, second.vectors, int(shifts[0]), first.recipe)
+    _, shift = _score_and_shift(first, second)
+    ours, theirs = shift_columns(first.vectors, second.vectors, shift, first.recipe)
     distances = cdist(ours, theirs, "cityblock")
     forth, back = distances.argmin(axis=1), distances.argmin(axis=0)
     one = np.flatnonzero(back[forth] == np.arange(len(forth)))
     pairs = np.column_stack([one, forth[one]])
     return pairs[np.argsort(distances[one, forth[one]], kind="stable")]
-
-
-def _require_same_recipe(first: HeatDescriptor, second: HeatDescriptor) -> None:
-    if first.recipe != second.recipe:
-        raise InvalidParameterError(
-            f"Only descriptors by the same recipe compare; the first is by {first.recipe}, the "
-            f"second by {second.recipe}. Describe both by one recipe."
-        )

@@ -18,7 +18,7 @@ from eigenshape.retrieval.patches.codebook import (
     whiten_numbers,
 )
 from eigenshape.retrieval.patches.matching import PatchPoints, patch_points
-from eigenshape.retrieval.patches.patches import Patches, surface_patches
+from eigenshape.retrieval.patches.patches import surface_patches
 
 # Points of each shape. Time grows with the cube; 300 lie 6 hundredths of √area apart.
 N_LABEL_POINTS = 300
@@ -66,33 +66,30 @@ def label_points(mesh: TriangleMesh, *, n_points: int = N_LABEL_POINTS) -> Label
     found = surface_patches(clean, n_samples=n_points)
     cells = found.weights.max(axis=1).astype(np.float64)
     shares = cells / cells.sum()
-    distances = _finite_distances(found)
+    # Components are farther from each other than any points within one.
+    distances = found.distances.astype(np.float64)
+    finite = np.isfinite(distances)
+    farthest = max(distances[finite].max(), SHORTEST_CHORD)
+    distances = np.where(finite, distances, APART * farthest)
     codebook = default_codebook()
-    numbers = np.stack([_whitened(found, size) for size in range(N_SIZES)])
+    numbers = [
+        np.concatenate(
+            [
+                whiten_numbers(found.numbers[:, base + size], codebook, place)
+                for place, base in enumerate(BASES)
+            ],
+            axis=1,
+        )
+        for size in range(N_SIZES)
+    ]
     return LabelPoints(
         vertices=found.vertices,
         shares=shares,
         patches=patch_points(found, codebook),
-        numbers=numbers,
+        numbers=np.stack(numbers),
         radii=_ball_radii(clean, found.vertices),
         distances=distances / np.sqrt(shares @ distances**2 @ shares),
     )
-
-
-def _whitened(patches: Patches, size: int) -> Float[np.ndarray, "m d"]:
-    """Return the whitened numbers at each base radius, enlarged by a number of steps."""
-    codebook = default_codebook()
-    rows = [
-        whiten_numbers(patches.numbers[:, base + size], codebook, place)
-        for place, base in enumerate(BASES)
-    ]
-    return np.concatenate(rows, axis=1).astype(np.float64)
-
-
-def _finite_distances(patches: Patches) -> Float[np.ndarray, "m m"]:
-    distances = patches.distances.astype(np.float64)
-    finite = np.isfinite(distances)
-    return np.where(finite, distances, APART * max(distances[finite].max(), SHORTEST_CHORD))
 
 
 def _ball_radii(mesh: TriangleMesh, vertices: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 2"]:

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_each
-from eigenshape._arrays import ReadOnly, freeze, point_functions
+from eigenshape._arrays import ReadOnly, point_functions
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._text import short_repr
@@ -279,7 +279,20 @@ def _settle(
     vocabulary: Int[np.ndarray, " l"],
     weights: Float[np.ndarray, " s"],
 ) -> LabelTransfer:
-    shares = _spread_votes(target, votes)
+    # Spread the votes by one implicit step of heat.
+    mesh = normalize_mesh(orient_closed_outward(target), "box")
+    laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
+    area = float(face_areas(mesh).sum())
+    step = laplacian.mass + SPREAD_TIME * area * laplacian.stiffness
+    spread = np.maximum(factor_definite(step).solve(votes / votes.sum()), 0)
+    # A component without votes takes those of the nearest point that has some.
+    reached = spread.sum(axis=1) > 0
+    if not reached.all():
+        tree = cKDTree(mesh.vertices[reached])
+        _, nearest = tree.query(mesh.vertices[~reached])
+        spread[~reached] = spread[reached][nearest]
+    shares = spread / spread.sum(axis=1)[:, None]
+
     face_shares = shares[target.faces].mean(axis=1)
     chosen = _join_small_pieces(target, face_shares.argmax(axis=1))
     areas = face_areas(target)
@@ -299,36 +312,14 @@ def _settle(
     order = np.lexsort((rows, -share, parts))
     clearest = order[np.searchsorted(parts[order], np.arange(count))]
     return LabelTransfer(
-        labels=freeze(vocabulary[chosen]),
-        confidence=freeze(confidence),
-        parts=freeze(parts),
-        part_labels=freeze(vocabulary[chosen[clearest]]),
-        part_confidence=freeze(part_confidence),
-        part_vertices=freeze(target.faces[clearest, 0]),
-        weights=freeze(weights),
+        labels=vocabulary[chosen],
+        confidence=confidence,
+        parts=parts,
+        part_labels=vocabulary[chosen[clearest]],
+        part_confidence=part_confidence,
+        part_vertices=target.faces[clearest, 0],
+        weights=weights,
     )
-
-
-def _spread_votes(
-    target: TriangleMesh, votes: Float[np.ndarray, "n l"]
-) -> Float[np.ndarray, "n l"]:
-    """Spread votes by one implicit step of heat, and return the share of each label."""
-    mesh = normalize_mesh(orient_closed_outward(target), "box")
-    laplacian = anisotropic_laplacian(mesh, curvature_tensors(mesh, CONCAVITY, concave=True))
-    area = float(face_areas(mesh).sum())
-    step = laplacian.mass + SPREAD_TIME * area * laplacian.stiffness
-    spread = factor_definite(step).solve(votes / votes.sum())
-    spread = np.maximum(spread, 0)
-    total = spread.sum(axis=1)
-
-    # A component without votes takes those of the nearest point that has some.
-    reached = total > 0
-    if not reached.all():
-        tree = cKDTree(mesh.vertices[reached])
-        _, nearest = tree.query(mesh.vertices[~reached])
-        spread[~reached] = spread[reached][nearest]
-        total = spread.sum(axis=1)
-    return np.asarray(spread / total[:, None])
 
 
 def _pieces(mesh: TriangleMesh, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, " f"]:

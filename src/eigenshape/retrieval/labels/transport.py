@@ -54,23 +54,21 @@ def transport_points(target: LabelPoints, source: LabelPoints) -> Transport:
     ours, theirs = target.numbers[max(-step, 0)], source.numbers[max(step, 0)]
     ratios = target.radii[:, None] - source.radii
     thickness = np.minimum(ratios**2, LARGEST_RATIO**2) @ [RADIUS_WEIGHT, OUTER_WEIGHT]
-    alike = _squares(ours, theirs) + ANCHOR_WEIGHT * strain + thickness
-    costs = alike
-    plan = _balance(costs, target.shares, source.shares)
+    sizes = (ours**2).sum(axis=1)[:, None] + (theirs**2).sum(axis=1)
+    squares = np.maximum(sizes - 2 * ours @ theirs.T, 0)
+    squares = squares / (np.median(squares) or 1.0)
+    alike = squares + ANCHOR_WEIGHT * strain + thickness
+    plan = _balance(alike, target.shares, source.shares)
     for _ in range(ROUNDS):
-        costs = alike + DISTANCE_WEIGHT * _distortion(target, source, plan)
+        # The mean of (d(i, k) - d(j, l))² over matched k and l, for each pair i, j
+        plan = plan / plan.sum()
+        one = target.distances**2 @ plan.sum(axis=1)
+        two = source.distances**2 @ plan.sum(axis=0)
+        distortion = one[:, None] + two - 2 * target.distances @ plan @ source.distances
+        costs = alike + DISTANCE_WEIGHT * distortion
         plan = _balance(costs, target.shares, source.shares)
     shares = plan / plan.sum(axis=1, keepdims=True)
     return Transport(shares, float(target.shares @ (shares * costs).sum(axis=1)))
-
-
-def _squares(
-    one: Float[np.ndarray, "m d"], two: Float[np.ndarray, "n d"]
-) -> Float[np.ndarray, "m n"]:
-    """Return squared distances between rows, over their median."""
-    norms = (one**2).sum(axis=1)[:, None] + (two**2).sum(axis=1)
-    squares = np.maximum(norms - 2 * one @ two.T, 0)
-    return np.asarray(squares / (np.median(squares) or 1.0))
 
 
 def _balance(
@@ -84,13 +82,3 @@ def _balance(
         right = (columns / (left @ kernel)) ** BALANCE
         left = rows / (kernel @ right)
     return np.asarray(left[:, None] * kernel * right)
-
-
-def _distortion(
-    target: LabelPoints, source: LabelPoints, plan: Float[np.ndarray, "m n"]
-) -> Float[np.ndarray, "m n"]:
-    """Return the mean of (d(i, k) - d(j, l))² over matched k and l, for each pair i, j."""
-    plan = plan / plan.sum()
-    ours = target.distances**2 @ plan.sum(axis=1)
-    theirs = source.distances**2 @ plan.sum(axis=0)
-    return np.asarray(ours[:, None] + theirs - 2 * target.distances @ plan @ source.distances)

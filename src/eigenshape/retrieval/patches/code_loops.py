@@ -78,12 +78,16 @@ def distances_to(query, query_lengths, others, other_lengths, n_sizes, price, fo
 
 @njit
 @no_type_check
-def view_distance(query, query_lengths, other, other_lengths, m, n_sizes, price):
+def packed_view_distance(query, query_lengths, packed, codes, code_lengths, m, n_sizes, price):
     """Return the mean of two distances: to a whole, and to the nearest of it and its views.
 
     A description has `m` rows; those of the whole come first. If the other has no views, the views
-    of the query serve in their place.
+    of the query serve in their place. `codes` and `code_lengths` are scratch memory.
     """
+    n_rows = len(packed)
+    unpack(packed, codes)
+    lengths(codes[:n_rows], code_lengths)
+    other, other_lengths = codes[:n_rows], code_lengths[:n_rows]
     own = distance(query[:m], query_lengths[:m], other[:m], other_lengths[:m], n_sizes, price)
     nearest = own
     for first in range(m, len(other), m):
@@ -98,13 +102,3 @@ def view_distance(query, query_lengths, other, other_lengths, m, n_sizes, price)
             view = distance(query[rows], query_lengths[rows], other, other_lengths, n_sizes, price)
             nearest = min(nearest, view)
     return (own + nearest) / 2
-
-
-@njit
-@no_type_check
-def packed_view_distance(query, query_lengths, packed, codes, code_lengths, m, n_sizes, price):
-    """Return `view_distance` to packed rows; `codes` and `code_lengths` are scratch memory."""
-    n_rows = len(packed)
-    unpack(packed, codes)
-    lengths(codes[:n_rows], code_lengths)
-    return view_distance(query, query_lengths, codes[:n_rows], code_lengths, m, n_sizes, price)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Int, Int8
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
@@ -164,4 +164,4 @@ def patch_descriptor(patches: Sequence[Patches], recipe: PatchRecipe) -> PatchDe
             [round_codes(encode_patches(each, recipe.codebook), recipe.clip) for each in patches]
         )
         points = tuple(patch_points(each, recipe.codebook) for each in patches)
-    return PatchDescriptor(freeze(codes), points, recipe)
+    return PatchDescriptor(codes, points, recipe)

@@ -9,7 +9,6 @@ from eigenshape.retrieval.patches.code_loops import (
     distances_to,
     lengths,
     packed_view_distance,
-    view_distance,
 )
 
 # Added to a distance for each step of 1.25 in relative size, so that of equally good steps the
@@ -36,40 +35,25 @@ def patch_distances(
     return found
 
 
-def view_distances(
-    query: Int8[np.ndarray, "u b s v"], others: Sequence[Int8[np.ndarray, "_ b s v"]]
+def packed_distances(
+    query: Int8[np.ndarray, "u b s v"], others: Sequence[UInt8[np.ndarray, "_ h"]]
 ) -> Float[np.ndarray, " k"]:
     """For each other shape, average two distances: to it, and to the closest of it and its views.
 
     A partial scan is nearer to a scan from the same side than to the whole; a whole stays nearest
     to the whole. If a shape has no views, since it is a part, the views of the query serve in their
-    place.
+    place. No copy is made of all codes: each shape is unpacked into the same scratch memory.
 
     Parameters
     ----------
     query : (u, b, s, v) int8
         Of the query and, if it is closed, of its views.
-    others : sequence of k (_, b, s, v) int8
-        Of each other shape and its views.
+    others : sequence of k (_, h) uint8
+        Of each other shape and its views, packed by `pack_codes` as an index stores them.
 
     Returns
     -------
     (k,) float
-    """
-    (rows, row_lengths), n_bases, n_sizes = _rows(query), *query.shape[1:3]
-    found = [
-        view_distance(rows, row_lengths, *_rows(other), n_bases * n_sizes, n_sizes, SIZE_PRICE)
-        for other in others
-    ]
-    return np.array(found, dtype=np.float64)
-
-
-def packed_distances(
-    query: Int8[np.ndarray, "u b s v"], others: Sequence[UInt8[np.ndarray, "_ h"]]
-) -> Float[np.ndarray, " k"]:
-    """Return `view_distances` to shapes whose codes are packed, as an index stores them.
-
-    No copy is made of all codes: each shape is unpacked into the same scratch memory.
     """
     (rows, row_lengths), n_bases, n_sizes = _rows(query), *query.shape[1:3]
     most = max(map(len, others), default=0)

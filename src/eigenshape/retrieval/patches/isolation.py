@@ -67,7 +67,7 @@ def scale_distances(
     query : (u, b, s, v) int8
         Codes of the query and of its views. Without views it is open.
     distances, isolations : (k,) float
-        Of `view_distances`, and of `measure_isolations`.
+        Of `packed_distances`, and of `measure_isolations`.
     """
     share = CLOSED_SHARE if len(query) > 1 else OPEN_SHARE
     return distances * np.exp(share * (USUAL_ISOLATION - isolations))

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
@@ -138,9 +138,9 @@ def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:
     weights = shape.weights.max(axis=1).astype(np.float16)  # as `pack_points` stores them
     lengths = LENGTHS[nearest_lengths(shape.distances[:, :N_LANDMARKS])]
     return PatchPoints(
-        freeze(NUMBER_STEP * clipped.astype(np.float32)),
-        freeze(weights.astype(np.float32)),
-        freeze(distances_by_landmarks(lengths)),
+        NUMBER_STEP * clipped.astype(np.float32),
+        weights.astype(np.float32),
+        distances_by_landmarks(lengths),
         shape.vertices,
     )
 
@@ -214,7 +214,7 @@ def match_patches(first: PatchPoints, second: PatchPoints) -> PatchMatch:
     costs = costs + STRAIN_WEIGHT * np.median(costs) * _strain(first, second, start)
     points = _select_supported(_consistent(first, second, costs, start.step), LEAST_SUPPORT)
     vertices = np.column_stack([first.vertices[points[:, 0]], second.vertices[points[:, 1]]])
-    return PatchMatch(freeze(points), freeze(vertices), start.agreement, start.step)
+    return PatchMatch(points, vertices, start.agreement, start.step)
 
 
 @one_blas_thread()

@@ -5,7 +5,6 @@ import zlib
 import numpy as np
 from jaxtyping import Int8, UInt8
 
-from eigenshape._arrays import freeze
 from eigenshape.retrieval.patches.code_loops import unpack
 from eigenshape.retrieval.patches.matching import (
     LENGTHS,
@@ -67,6 +66,4 @@ def unpack_points(data: bytes) -> PatchPoints:
     vertices, weights = take(VERTEX, m).astype(np.int64), take(HALF, m).astype(np.float32)
     numbers = np.float32(NUMBER_STEP) * take(np.dtype("i1"), m * r * d).reshape(m, r, d)
     lengths = LENGTHS[take(np.dtype("u1"), m * min(m, N_LANDMARKS)).reshape(m, -1)]
-    return PatchPoints(
-        freeze(numbers), freeze(weights), freeze(distances_by_landmarks(lengths)), freeze(vertices)
-    )
+    return PatchPoints(numbers, weights, distances_by_landmarks(lengths), vertices)

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from scipy.sparse.csgraph import shortest_path
 
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._text import short_repr
 from eigenshape._threads import map_in_threads, one_blas_thread
@@ -162,14 +162,14 @@ def extract_patches(
             partial(_frame_patches, mesh, number, count, clean=clean) for number in range(n_shots)
         ]
     found = map_in_threads(lambda job: job(), jobs)
-    return [replace(each, vertices=freeze(whole[each.vertices])) for each in found]
+    return [replace(each, vertices=whole[each.vertices]) for each in found]
 
 
 def _view_patches(mesh: TriangleMesh, number: int, n_samples: int) -> Patches:
     """Describe what is visible of a shape from one of the viewpoints."""
     part = view_of(mesh, number)
     patches = surface_patches(part.mesh, n_samples=n_samples)
-    return replace(patches, vertices=freeze(part.source_vertices[patches.vertices]))
+    return replace(patches, vertices=part.source_vertices[patches.vertices])
 
 
 def _frame_patches(mesh: TriangleMesh, number: int, n_samples: int, *, clean: bool) -> Patches:
@@ -177,7 +177,7 @@ def _frame_patches(mesh: TriangleMesh, number: int, n_samples: int, *, clean: bo
     scan = simulate_scan(mesh, np.random.default_rng(number), view=viewpoint(number))
     patches = surface_patches(denoise(scan.mesh) if clean else scan.mesh, n_samples=n_samples)
     seen = mesh.faces[scan.source_faces[patches.vertices], 0]
-    return replace(patches, vertices=freeze(seen))
+    return replace(patches, vertices=seen)
 
 
 def surface_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patches:
@@ -209,10 +209,10 @@ def surface_patches(mesh: TriangleMesh, *, n_samples: int = N_SAMPLES) -> Patche
     near = rows[:, chosen]
     distances = np.asarray(shortest_path(np.minimum(near, near.T), directed=False))
     return Patches(
-        freeze(numbers),
-        freeze(weights.astype(np.float32)),
-        freeze(source[chosen]),
-        freeze(distances.astype(np.float32)),
+        numbers,
+        weights.astype(np.float32),
+        source[chosen],
+        distances.astype(np.float32),
     )
 
 

@@ -9,7 +9,6 @@ from scipy.cluster.vq import kmeans2
 from scipy.special import logsumexp
 
 from eigenshape._arguments import require_each
-from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import (
@@ -77,7 +76,7 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
             for base in BASES
         ]
     return PatchCodebook(
-        *(freeze(np.stack(parts).astype(np.float32)) for parts in zip(*books, strict=True))
+        *(np.stack(parts).astype(np.float32) for parts in zip(*books, strict=True))
     )
 
 

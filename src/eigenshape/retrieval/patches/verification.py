@@ -9,7 +9,7 @@ from jaxtyping import Float
 from eigenshape._arguments import require_each, require_type
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
-from eigenshape.retrieval.patches.distance import patch_distances, view_distances
+from eigenshape.retrieval.patches.distance import packed_distances, patch_distances
 from eigenshape.retrieval.patches.isolation import measure_isolations, scale_distances
 from eigenshape.retrieval.patches.matching import patch_agreement
 from eigenshape.retrieval.patches.packing import pack_codes
@@ -97,23 +97,17 @@ def patch_scores(
     require_type(query, PatchDescriptor, "query")
     require_each(others, PatchDescriptor, "others")
     with one_blas_thread():
+        packed = [pack_codes(other.codes.reshape(-1, other.codes.shape[-1])) for other in others]
+        # The isolation of each shape among the others, as in an index of them: copies count once.
+        checksums = np.array([crc32(rows.tobytes()) for rows in packed], dtype=np.int64)
+        distinct, firsts, inverse = np.unique(checksums, return_index=True, return_inverse=True)
+        isolations = measure_isolations(
+            lambda number: others[firsts[number]].codes[0], len(distinct), np.arange(len(distinct))
+        )
         distances = scale_distances(
-            query.codes,
-            view_distances(query.codes, [other.codes for other in others]),
-            _isolations(others),
+            query.codes, packed_distances(query.codes, packed), isolations[inverse]
         )
         return verified_scores(query, others.__getitem__, distances) if verify else distances
-
-
-def _isolations(others: Sequence[PatchDescriptor]) -> Float[np.ndarray, " k"]:
-    """Return the isolation of each shape among the others, as an index of them would."""
-    packed = [pack_codes(other.codes.reshape(-1, other.codes.shape[-1])) for other in others]
-    checksums = np.array([crc32(rows.tobytes()) for rows in packed], dtype=np.int64)
-    distinct, firsts, inverse = np.unique(checksums, return_index=True, return_inverse=True)
-    found = measure_isolations(
-        lambda number: others[firsts[number]].codes[0], len(distinct), np.arange(len(distinct))
-    )
-    return found[inverse]
 
 
 def shape_agreement(query: PatchDescriptor, other: PatchDescriptor) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, whole_numbers
+from eigenshape._arrays import ReadOnly, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
@@ -153,7 +153,18 @@ def eigenspace_angles(
     require_type(laplacian, Laplacian | None, "laplacian")
     require_lowest(one, "one")
     require_lowest(two, "two")
-    partners = _partners(one, two, points)
+    n_one, n_two = len(one.eigenvectors), len(two.eigenvectors)
+    if points is None and n_one != n_two:
+        raise InvalidParameterError(
+            f"Spectra on different numbers of points need corresponding points; one has {n_one} points and two has "
+            f"{n_two}. Pass points, the point of two that corresponds to each point of one."
+        )
+    given = np.arange(n_one) if points is None else points
+    partners = whole_numbers(given, "a point of two", 0, n_two - 1)
+    if len(partners) != n_one:
+        raise InvalidParameterError(
+            f"points must hold one point of two for each of {n_one} points of one; there are {len(partners)}."
+        )
     groups = [
         group
         for group in separated_groups(one.eigenvalues, ratio=ratio)
@@ -177,29 +188,12 @@ def eigenspace_angles(
         for end in ("start", "stop")
     )
     return EigenspaceAngles(
-        starts=freeze(starts),
-        stops=freeze(stops),
-        angles=freeze(angles),
-        gaps=freeze(np.minimum(steps[starts], steps[stops])),
-        bounds=None if exact is None else freeze(bounds),
+        starts=starts,
+        stops=stops,
+        angles=angles,
+        gaps=np.minimum(steps[starts], steps[stops]),
+        bounds=None if exact is None else bounds,
     )
-
-
-def _partners(one: Spectrum, two: Spectrum, points: ArrayLike | None) -> Int[np.ndarray, " n"]:
-    n_one, n_two = len(one.eigenvectors), len(two.eigenvectors)
-    if points is None and n_one != n_two:
-        raise InvalidParameterError(
-            f"Spectra on different numbers of points need corresponding points; one has {n_one} points and two has "
-            f"{n_two}. Pass points, the point of two that corresponds to each point of one."
-        )
-    partners = whole_numbers(
-        np.arange(n_one) if points is None else points, "a point of two", 0, n_two - 1
-    )
-    if len(partners) != n_one:
-        raise InvalidParameterError(
-            f"points must hold one point of two for each of {n_one} points of one; there are {len(partners)}."
-        )
-    return partners
 
 
 def _unit_pairs(one: Spectrum, laplacian: Laplacian) -> tuple[Pencil, Pairs]:

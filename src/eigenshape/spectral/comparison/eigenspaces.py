@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_values
+from eigenshape._arrays import finite_values, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -71,10 +71,27 @@ def eigenspace_errors(
     require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
     values = finite_values(eigenvalues, "eigenvalues")
-    _require_functions(spectrum, values, functions)
-    count = min(len(spectrum.eigenvalues), functions.shape[1])
+    n, j = len(spectrum.eigenvectors), functions.shape[1]
+    if len(functions) != n or not j:
+        raise InvalidParameterError(
+            f"functions must have one row for each of {n} points; the shape is {functions.shape}."
+        )
+    require_finite_rows(functions, "functions", "point")
+    _require_ascending(values)
+    if len(values) <= j:
+        raise InvalidParameterError(
+            f"There must be more eigenvalues than functions, to show that the last group is complete; there are "
+            f"{len(values)} eigenvalues and {j} functions. Pass one more eigenvalue."
+        )
+    start = _equal_runs(values[: j + 1])[-1].start
+    if start < j:
+        raise InvalidParameterError(
+            f"The last group of functions must be complete; eigenvalue {j} is {values[j]:.6g} as that of function "
+            f"{j - 1} is. Pass functions for the whole group, or the first {start}."
+        )
+    count = min(len(spectrum.eigenvalues), j)
     errors = np.empty(count)
-    for group in _equal_runs(values[: functions.shape[1]]):
+    for group in _equal_runs(values[:j]):
         found = spectrum.eigenvectors[:, group.start : min(group.stop, count)]
         if found.shape[1]:
             basis = orthonormal(
@@ -86,36 +103,12 @@ def eigenspace_errors(
     return np.minimum(errors, 1.0)
 
 
-def _require_functions(
-    spectrum: Spectrum, values: Float[np.ndarray, " v"], functions: Float[np.ndarray, "n j"]
-) -> None:
-    n, shape = len(spectrum.eigenvectors), functions.shape
-    if shape[0] != n or not shape[1]:
-        raise InvalidParameterError(
-            f"functions must have one row for each of {n} points; the shape is {shape}."
-        )
-    bad = np.flatnonzero(~np.isfinite(functions).all(axis=1))
-    if bad.size:
-        raise InvalidParameterError(
-            f"functions must be finite; row {bad[0]} is not ({bad.size} such)."
-        )
+def _require_ascending(values: Float[np.ndarray, " v"]) -> None:
     falling = np.flatnonzero(np.diff(values) < 0)
     if falling.size:
         i = int(falling[0])
         raise InvalidParameterError(
             f"eigenvalues must ascend; number {i} is {values[i]:.6g} and number {i + 1} is {values[i + 1]:.6g}."
-        )
-    j = shape[1]
-    if len(values) <= j:
-        raise InvalidParameterError(
-            f"There must be more eigenvalues than functions, to show that the last group is complete; there are "
-            f"{len(values)} eigenvalues and {j} functions. Pass one more eigenvalue."
-        )
-    start = _equal_runs(values[: j + 1])[-1].start
-    if start < j:
-        raise InvalidParameterError(
-            f"The last group of functions must be complete; eigenvalue {j} is {values[j]:.6g} as that of function "
-            f"{j - 1} is. Pass functions for the whole group, or the first {start}."
         )
 
 
@@ -165,12 +158,7 @@ def separated_groups(eigenvalues: ArrayLike, *, ratio: float = SEPARATED) -> lis
     values = finite_values(eigenvalues, "eigenvalues")
     if not ratio > 1:
         raise InvalidParameterError(f"ratio must be above 1; it is {ratio}.")
-    if (np.diff(values) < 0).any():
-        place = int(np.argmax(np.diff(values) < 0))
-        raise InvalidParameterError(
-            f"eigenvalues must ascend; number {place} is {values[place]:.6g} and number {place + 1} is "
-            f"{values[place + 1]:.6g}."
-        )
+    _require_ascending(values)
     gaps = np.concatenate([[np.inf], np.diff(values), [np.inf]])
     ends = [0]
     while ends[-1] < len(values):

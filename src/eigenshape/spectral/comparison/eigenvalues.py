@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, finite_values, freeze
+from eigenshape._arrays import ReadOnly, finite_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
@@ -151,12 +151,12 @@ def compare_spectra(
             for each, name in zip(brackets, ("one", "two"), strict=True)
         ]
     return SpectrumComparison(
-        one=freeze(values[0]),
-        two=freeze(values[1]),
-        intervals_one=freeze(bars[0]),
-        intervals_two=freeze(bars[1]),
-        relative=freeze(relative_change(*values, zero=zeros)),
-        zero=freeze(zeros[0] & zeros[1]),
+        one=values[0],
+        two=values[1],
+        intervals_one=bars[0],
+        intervals_two=bars[1],
+        relative=relative_change(*values, zero=zeros),
+        zero=zeros[0] & zeros[1],
         bracketed=brackets is not None,
     )
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_number
+from eigenshape._arrays import ReadOnly, freeze, point_functions, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
@@ -114,6 +114,7 @@ def modes_of_both(source: Spectrum, target: Spectrum, n_modes: Integer) -> int:
     function.
     """
     for spectrum, name in ((source, "source"), (target, "target")):
+        require_type(spectrum, Spectrum, name)
         require_one_constant(spectrum, name)
     return whole_number(
         n_modes, "n_modes", 2, min(len(source.eigenvalues), len(target.eigenvalues))
@@ -169,15 +170,7 @@ def transfer_function(mapping: FunctionalMap, values: ArrayLike) -> Float[np.nda
     (288, 3)
     """
     require_type(mapping, FunctionalMap, "mapping")
-    functions = real_numbers(values, "values").astype(np.float64)
-    n = len(mapping.source.eigenvectors)
-    if functions.ndim not in (1, 2) or len(functions) != n:
-        raise InvalidParameterError(
-            f"values must have one row for each of {n} vertices of the source; the shape is {functions.shape}."
-        )
-    bad = np.flatnonzero(~np.isfinite(functions.reshape(n, -1)).all(axis=1))
-    if bad.size:
-        raise InvalidParameterError(f"values must be finite; row {bad[0]} is {functions[bad[0]]}.")
+    functions = point_functions(values, "values", len(mapping.source.eigenvectors))
     k2, k1 = mapping.matrix.shape
     coefficients = mapping.matrix @ (unit_projector(mapping.source, k1).T @ functions)
     return np.asarray(unit_modes(mapping.target, k2) @ coefficients)

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import describe_value, require_type
+from eigenshape._arguments import describe_value
 from eigenshape._arrays import as_array, finite_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
@@ -148,8 +148,6 @@ def functional_map(  # noqa: PLR0913 - what is given, and the weight of each ter
     >>> bool((partners == range(len(mesh.vertices))).mean() > 0.9)
     True
     """
-    require_type(source, Spectrum, "source")
-    require_type(target, Spectrum, "target")
     k = modes_of_both(source, target, n_modes)
     if pairs is None and descriptors is None:
         raise InvalidParameterError(
@@ -189,7 +187,10 @@ def functional_map(  # noqa: PLR0913 - what is given, and the weight of each ter
             turns = orientation_operators(source, one, faces[0], k)
             turns_there = orientation_operators(target, two, faces[1], k)
             terms.append((weights[2], turns, turns_there))
-    penalties = weights[0] * _commutators(source, target, k) ** 2
+    # λ'_i - λ_j, relative to the largest eigenvalue
+    low, low_there = (each.eigenvalues[:k] * point_areas(each).sum() for each in (source, target))
+    commutators = (low_there[:, None] - low) / max(low[-1], low_there[-1])
+    penalties = weights[0] * commutators**2
     if not terms:
         return FunctionalMap(_solve_rows(ours, theirs, penalties), source, target)
     return FunctionalMap(_solve_all(ours, theirs, penalties, terms), source, target)
@@ -212,14 +213,6 @@ def _faces_of_both(
             )
         faces.append(mesh.faces)
     return faces
-
-
-def _commutators(source: Spectrum, target: Spectrum, k: int) -> Float[np.ndarray, "k k"]:
-    """Return λ'_i - λ_j, relative to the largest eigenvalue."""
-    ours, theirs = (
-        spectrum.eigenvalues[:k] * point_areas(spectrum).sum() for spectrum in (source, target)
-    )
-    return (theirs[:, None] - ours) / max(ours[-1], theirs[-1])
 
 
 def _solve_rows(

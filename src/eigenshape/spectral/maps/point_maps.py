@@ -1,6 +1,5 @@
 """Conversion between functional maps and maps of points, and refinement by alternating between them."""
 
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -121,8 +120,6 @@ def map_from_points(
     >>> bool(np.allclose(mapping.matrix, np.eye(9), atol=1e-8))
     True
     """
-    require_type(source, Spectrum, "source")
-    require_type(target, Spectrum, "target")
     k = modes_of_both(source, target, n_modes)
     places = as_array(points, "points")
     n1, n2 = len(source.eigenvectors), len(target.eigenvectors)
@@ -138,14 +135,6 @@ def map_from_points(
         )
     matrix = unit_projector(target, k).T @ unit_modes(source, k)[places]
     return FunctionalMap(matrix, source, target)
-
-
-@dataclass(frozen=True, eq=False)
-class _Samples:
-    """Vertices spread over a shape: their modes, and weights of area that sum to 1."""
-
-    modes: Float[np.ndarray, "s k"]
-    weights: sp.csr_array
 
 
 # Corresponding points: their weights, their modes on the source, and on the target.
@@ -231,9 +220,9 @@ def refine_map(
         else whole_number(n_samples, "n_samples", min(2 * k, n2), n2)
     )
     ours, theirs = (unit_modes(spectrum, k) for spectrum in ends)
-    sampled = _samples(start.target, wanted, k)
+    sampled, weights = _samples(start.target, wanted, k)
     if bijective:
-        sampled_back = _samples(start.source, min(wanted, len(ours)), k)
+        sampled_back, weights_back = _samples(start.source, min(wanted, len(ours)), k)
     forth, back = start.matrix, start.matrix.T
     sizes = [
         tuple(min(size + more, k) for size in first)
@@ -241,11 +230,11 @@ def refine_map(
     ]
     for number, (k2, k1) in enumerate(sizes):
         report(number / len(sizes), f"{len(forth)} modes")
-        partners = [(sampled.weights, ours[_carry(forth, ours, sampled.modes)], sampled.modes)]
+        partners = [(weights, ours[_carry(forth, ours, sampled)], sampled)]
         if bijective:
-            images = theirs[_carry(back, theirs, sampled_back.modes)]
-            partners.append((sampled_back.weights, sampled_back.modes, images))
-            back = _fit([(weights, two, one) for weights, one, two in partners], k1, k2)
+            images = theirs[_carry(back, theirs, sampled_back)]
+            partners.append((weights_back, sampled_back, images))
+            back = _fit([(areas, two, one) for areas, one, two in partners], k1, k2)
         forth = _fit(partners, k2, k1)
     report(1.0, f"{k} modes")
     return FunctionalMap(forth, *ends)
@@ -271,23 +260,18 @@ def _fit(partners: list[_Partners], k2: int, k1: int) -> Float[np.ndarray, "k2 k
     return np.asarray(sl.lstsq(left, right)[0])
 
 
-def _samples(spectrum: Spectrum, count: int, k: int) -> _Samples:
+def _samples(
+    spectrum: Spectrum, count: int, k: int
+) -> tuple[Float[np.ndarray, "s k"], sp.csr_array]:
+    """Return the modes of vertices spread over a shape, and weights of area that sum to 1."""
     modes, areas = unit_modes(spectrum, k), point_areas(spectrum)
     if count == len(modes):
-        return _Samples(modes, spectrum.mass / areas.sum())
-    chosen, cells = _spread_samples(spectrum, count)
-    shares = np.bincount(cells, weights=areas / areas.sum(), minlength=count)
-    return _Samples(modes[chosen], sp.diags_array(shares).tocsr())
-
-
-def _spread_samples(
-    spectrum: Spectrum, count: int
-) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " n"]]:
-    """Choose vertices one by one, each farthest from those before in φ/√λ; tell which is nearest to each vertex."""
-    k = min(SPREAD_MODES, len(spectrum.eigenvalues))
-    places = unit_modes(spectrum, k)[:, 1:] / np.sqrt(
-        spectrum.eigenvalues[1:k] / spectrum.eigenvalues[1]
-    )
+        return modes, spectrum.mass / areas.sum()
+    # Choose vertices one by one, each farthest from those before in φ/√λ, and note which of them
+    # is nearest to each vertex.
+    n_low = min(SPREAD_MODES, len(spectrum.eigenvalues))
+    scales = np.sqrt(spectrum.eigenvalues[1:n_low] / spectrum.eigenvalues[1])
+    places = unit_modes(spectrum, n_low)[:, 1:] / scales
     chosen, cells = np.empty(count, dtype=np.int64), np.zeros(len(places), dtype=np.int64)
     least, following = np.full(len(places), np.inf), int((places**2).sum(axis=1).argmax())
     for number in range(count):
@@ -296,4 +280,5 @@ def _spread_samples(
         nearer = gaps < least
         least[nearer], cells[nearer] = gaps[nearer], number
         following = int(least.argmax())
-    return chosen, cells
+    shares = np.bincount(cells, weights=areas / areas.sum(), minlength=count)
+    return modes[chosen], sp.diags_array(shares).tocsr()

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, positive_values, whole_number
+from eigenshape._arrays import ReadOnly, positive_values, whole_number
 from eigenshape._progress import Progress, silent
 from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
@@ -16,7 +16,6 @@ from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.multilevel.approximate import (
     MOST_ROUNDS,
     SINGLE,
-    Start,
     climb,
     on_level,
     require_accuracy,
@@ -89,6 +88,7 @@ class ApproximateSignature(ReadOnly):
     __repr__ = short_repr
 
 
+@one_blas_thread()
 def approximate_heat_signature(
     laplacian: Laplacian,
     k: Integer,
@@ -154,52 +154,40 @@ def approximate_heat_signature(
     require_accuracy("accuracy", accuracy, SINGLE)
     require_lumped(laplacian)
     report = progress or silent
-    with one_blas_thread():
-        pencil = normalize(laplacian)
-        start = climb(pencil, wanted, report)
-        if start is None:
-            return _certified_signature(laplacian, wanted, clock, report)
-        goal = Goal(
-            wanted, float(accuracy), np.inf, pencil.level / pencil.n, MOST_ROUNDS, strict=True
+    pencil = normalize(laplacian)
+    start = climb(pencil, wanted, report)
+    if start is None:  # too few points to gain from levels
+        found = solve_spectrum(laplacian, wanted, progress=report)
+        return ApproximateSignature(
+            values=heat_kernel_signature(found, clock),
+            times=clock,
+            errors=np.full(len(clock), SINGLE_ROUNDING),
+            eigenvalues=found.eigenvalues,
+            complete=True,
         )
-        return _approximate_signature(pencil, start, goal, clock, report)
-
-
-def _certified_signature(
-    laplacian: Laplacian, k: int, times: Float[np.ndarray, " q"], report: Progress
-) -> ApproximateSignature:
-    found = solve_spectrum(laplacian, k, progress=report)
-    values, errors = heat_kernel_signature(found, times), np.full(len(times), SINGLE_ROUNDING)
-    return ApproximateSignature(
-        freeze(values), freeze(times), freeze(errors), found.eigenvalues, complete=True
-    )
-
-
-def _approximate_signature(
-    pencil: Pencil, start: Start, goal: Goal, times: Float[np.ndarray, " q"], report: Progress
-) -> ApproximateSignature:
+    goal = Goal(wanted, float(accuracy), np.inf, pencil.level / pencil.n, MOST_ROUNDS, strict=True)
     # Eigenvectors of the second level may be good enough as they are.
     columns: Interpolated | Stored
     columns = Interpolated(start.tower, start.below[0].astype(np.float32))
     ritz = start.below[1]
-    estimate = _estimate(pencil, columns, ritz[: goal.k], times)
+    estimate = _estimate(pencil, columns, ritz[:wanted], clock)
     bound = goal.accuracy * goal.scale(ritz)
     if (
         estimate.fall > bound
         or (estimate.errors > goal.accuracy * estimate.means).any()
-        or misses_pairs(columns, ritz, goal.k, bound)
+        or misses_pairs(columns, ritz, wanted, bound)
     ):
         stored, ritz, _ = refine(
             start.tower, start.below, goal, on_level(report, 0, len(start.tower.levels))
         )
         columns = Stored(start.tower, stored)
-        estimate = _estimate(pencil, columns, ritz[: goal.k], times)
+        estimate = _estimate(pencil, columns, ritz[:wanted], clock)
     report(0.95, "heat")
-    heat = np.empty((pencil.n, len(times)))
+    heat = np.empty((pencil.n, len(clock)))
     decay = estimate.decay.astype(np.float32)
 
     def fill(rows: slice) -> None:
-        part = columns.rows(rows)[:, : goal.k]
+        part = columns.rows(rows)[:, :wanted]
         heat[rows] = (part * part) @ decay
 
     change_rows(start.tower, fill)
@@ -208,10 +196,10 @@ def _approximate_signature(
     values[start.order] = np.ldexp(heat, 2 * pencil.vector_exponent)
     report(1.0, "heat")
     return ApproximateSignature(
-        freeze(values),
-        freeze(times),
-        freeze(estimate.errors / sizes + SINGLE_ROUNDING),
-        freeze(estimate.eigenvalues),
+        values=values,
+        times=clock,
+        errors=estimate.errors / sizes + SINGLE_ROUNDING,
+        eigenvalues=estimate.eigenvalues,
         complete=False,
     )
 

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._arguments import describe_value, require_each, require_type
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import (
     FileFormatError,
     InvalidParameterError,
@@ -33,7 +33,6 @@ from eigenshape.geometry.conversion import ShapeLike, as_mesh, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.catalog import build_laplacian
-from eigenshape.operators.laplacian import Laplacian
 from eigenshape.sparse.frozen import freeze_sparse
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.cache import require_writable
@@ -184,14 +183,20 @@ def operator_bundle(
         require_writable(cache)  # before the work, not after it
 
     laplacian = build_laplacian(surface, name)
-    mass = _diagonal_mass(laplacian, surface)
+    mass = laplacian.mass.diagonal()
+    if laplacian.n_points != surface.n_points or laplacian.mass.count_nonzero() != len(mass):
+        raise InvalidParameterError(
+            "The operator of a bundle must have one unknown for each point and a diagonal mass; "
+            f"this one has {laplacian.n_points} unknowns on {surface.n_points} points. "
+            "Leave out operator, or pass 'robust'."
+        )
     edges = neighbor_edges(surface)
     frames = point_frames(surface, edges)
     gradient_x, gradient_y = fit_gradient(surface.points, frames, edges)
     spectrum = solve_spectrum(laplacian, count, progress=progress)
     bundle = OperatorBundle(
-        frames=freeze(frames),
-        mass=freeze(mass),
+        frames=frames,
+        mass=mass,
         stiffness=freeze_sparse(laplacian.stiffness),
         eigenvalues=spectrum.eigenvalues,
         eigenvectors=spectrum.eigenvectors,
@@ -250,13 +255,9 @@ def export_bundle(
         raise InvalidParameterError(f"form must be 'scipy', 'numpy' or 'torch'; it is {form!r}.")
     if precision not in get_args(Precision):
         raise InvalidParameterError(f"precision must be 'single' or 'double'; it is {precision!r}.")
-    convert = {"scipy": _for_scipy, "numpy": _for_numpy, "torch": _for_torch}[form]
     dtype = np.float32 if precision == "single" else np.float64
-    parts = (
-        bundle.frames, bundle.mass, bundle.stiffness, bundle.eigenvalues, bundle.eigenvectors,
-        bundle.gradient_x, bundle.gradient_y,
-    )  # fmt: skip
-    return tuple(convert(part.astype(dtype)) for part in parts)
+    # The attributes of a bundle stand in the order of DiffusionNet.
+    return tuple(_convert(part.astype(dtype), form) for part in vars(bundle).values())
 
 
 def cache_operator_bundles(  # noqa: PLR0913 - one keyword for each choice of a batch
@@ -351,18 +352,6 @@ def _require_surface(shape: Any) -> Shape3:
     return shape
 
 
-def _diagonal_mass(laplacian: Laplacian, shape: Shape3) -> Float[np.ndarray, " n"]:
-    """Return the diagonal of B if there is nothing beside it."""
-    mass = laplacian.mass.diagonal()
-    if laplacian.n_points != shape.n_points or laplacian.mass.count_nonzero() != len(mass):
-        raise InvalidParameterError(
-            "The operator of a bundle must have one unknown for each point and a diagonal mass; "
-            f"this one has {laplacian.n_points} unknowns on {shape.n_points} points. "
-            "Leave out operator, or pass 'robust'."
-        )
-    return mass
-
-
 def _content_key(shape: Shape3, k: int, operator: str) -> str:
     """Return the SHA-256 of the coordinates, the faces, the request and our version."""
     request = (FORMAT, version("eigenshape"), type(shape).__name__, k, operator)
@@ -373,18 +362,16 @@ def _content_key(shape: Shape3, k: int, operator: str) -> str:
     return digest.hexdigest()
 
 
-def _for_scipy(part: Any) -> Any:
-    return part
-
-
-def _for_numpy(part: Any) -> Any:
-    if not sp.issparse(part):
+def _convert(part: Any, form: Form) -> Any:
+    """Return an array or a sparse matrix as it is, as arrays, or as a tensor."""
+    is_sparse = sp.issparse(part)
+    if form == "scipy" or (form == "numpy" and not is_sparse):
         return part
-    entries = part.tocoo()
-    return np.stack([entries.row, entries.col]).astype(np.int64), entries.data
-
-
-def _for_torch(part: Any) -> Any:
+    if is_sparse:
+        entries = part.tocoo()
+        indices, values = np.stack([entries.row, entries.col]).astype(np.int64), entries.data
+    if form == "numpy":
+        return indices, values
     try:
         torch = import_module("torch")
     except ImportError as err:
@@ -392,9 +379,8 @@ def _for_torch(part: Any) -> Any:
             "torch must be installed for tensors; it is not. Run pip install torch, or pass "
             "form='numpy'."
         ) from err
-    if not sp.issparse(part):
+    if not is_sparse:
         return torch.from_numpy(part)
-    indices, values = _for_numpy(part)
     # torch 2.13 warns if nothing is said about the checks; they cost less than the conversion.
     tensor = torch.sparse_coo_tensor(
         torch.from_numpy(indices), torch.from_numpy(values), part.shape, check_invariants=True

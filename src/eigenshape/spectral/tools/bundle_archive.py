@@ -56,22 +56,7 @@ def read_bundle(path: Path) -> dict[str, Any]:
         raise FileFormatError(
             f"{path} must hold a bundle that eigenshape saved; {error}."
         ) from error
-    _require_sound(path, fields)
-    return {
-        name: freeze(part) if name in DENSE else freeze_sparse(part)
-        for name, part in fields.items()
-    }
-
-
-def _require_format(path: Path, found: object) -> None:
-    if found != FORMAT:
-        raise FileFormatError(
-            f"{path} must hold a bundle in format {FORMAT}; it is in format {found!r}."
-        )
-
-
-def _require_sound(path: Path, fields: Mapping[str, Any]) -> None:
-    n, k = len(fields["mass"]), fields["eigenvalues"].size
+    k = fields["eigenvalues"].size
     shapes = {"frames": (n, 3, 3), "mass": (n,), "eigenvalues": (k,), "eigenvectors": (n, k)}
     for name, part in fields.items():
         numbers = part.data if name in SPARSE else part
@@ -84,3 +69,14 @@ def _require_sound(path: Path, fields: Mapping[str, Any]) -> None:
             raise FileFormatError(
                 f"{path} must hold finite float64 numbers as {name}; there are others."
             )
+    return {
+        name: freeze(part) if name in DENSE else freeze_sparse(part)
+        for name, part in fields.items()
+    }
+
+
+def _require_format(path: Path, found: object) -> None:
+    if found != FORMAT:
+        raise FileFormatError(
+            f"{path} must hold a bundle in format {FORMAT}; it is in format {found!r}."
+        )

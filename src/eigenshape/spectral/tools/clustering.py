@@ -94,68 +94,45 @@ def spectral_clusters(
     if n_clusters is None:
         n_clusters = count_clusters(spectrum)
     n_clusters = whole_number(n_clusters, "n_clusters", 1, k)
-    if n_clusters < k:
-        _require_as_many_clusters(n_clusters, count_constant_modes(spectrum))
+    # The lowest modes must at least tell the components apart.
+    if n_clusters < k and n_clusters < (n_components := count_constant_modes(spectrum)):
+        raise InvalidParameterError(
+            f"n_clusters must be at least the number of components, {n_components}; it is "
+            f"{n_clusters}. Pass n_clusters={n_components}, or keep one component."
+        )
     if n_clusters == 1:
         return np.zeros(len(spectrum.eigenvectors), dtype=np.int64)
     modes = spectrum.eigenvectors[:, :n_clusters]
     lengths = np.linalg.norm(modes, axis=1)[:, None]
     rows = modes / np.maximum(lengths, np.finfo(np.float64).tiny)
-    starts = _orthogonal_rows(modes * np.sqrt(spectrum.mass.diagonal())[:, None])
-    if method == "k-means":
-        return _in_order_of_appearance(_k_means(rows, rows[starts]))
-    return _in_order_of_appearance(_rotate_to_axes(rows, rows[starts]))
+    # Start from rows that are long and nearly orthogonal to each other.
+    weighted = modes * np.sqrt(spectrum.mass.diagonal())[:, None]
+    _, pivots = sl.qr(weighted.T, mode="r", pivoting=True)
+    return _in_order_of_appearance(_move_centers(rows, rows[pivots[:n_clusters]], method))
 
 
-def _require_as_many_clusters(n_clusters: int, n_components: int) -> None:
-    """Raise an error if the lowest modes do not even tell the components apart."""
-    if n_clusters < n_components:
-        raise InvalidParameterError(
-            f"n_clusters must be at least the number of components, {n_components}; it is "
-            f"{n_clusters}. Pass n_clusters={n_components}, or keep one component."
-        )
-
-
-def _orthogonal_rows(modes: Float[np.ndarray, "n c"]) -> Int[np.ndarray, " c"]:
-    """Return c rows that are long and nearly orthogonal to each other."""
-    _, pivots = sl.qr(modes.T, mode="r", pivoting=True)
-    return np.asarray(pivots[: modes.shape[1]], dtype=np.int64)
-
-
-def _k_means(
-    rows: Float[np.ndarray, "n c"], centers: Float[np.ndarray, "c c"]
+def _move_centers(
+    rows: Float[np.ndarray, "n c"], centers: Float[np.ndarray, "c c"], method: ClusterMethod
 ) -> Int[np.ndarray, " n"]:
-    """Assign rows to the nearest center and move centers to their mean, until nothing changes."""
-    labels = vq(rows, centers)[0]
-    for _ in range(MAX_ROUNDS):
-        counts = np.bincount(labels, minlength=len(centers))
+    """Alternate between the closest center of each row and the best centers, until none changes."""
+    labels = np.full(len(rows), -1)
+    for _ in range(MAX_ROUNDS + 1):
+        before = labels
+        is_mean = method == "k-means"
+        labels = vq(rows, centers)[0] if is_mean else np.argmax(rows @ centers.T, axis=1)
+        if np.array_equal(before, labels):
+            break
         sums = np.stack(
             [np.bincount(labels, column, minlength=len(centers)) for column in rows.T], axis=1
         )
-        # A center that has lost all rows stays where it is.
-        centers = np.where(counts[:, None] > 0, sums / np.maximum(counts, 1)[:, None], centers)
-        before, labels = labels, vq(rows, centers)[0]
-        if np.array_equal(before, labels):
-            break
-    return labels.astype(np.int64)
-
-
-def _rotate_to_axes(
-    rows: Float[np.ndarray, "n c"], start: Float[np.ndarray, "c c"]
-) -> Int[np.ndarray, " n"]:
-    """Alternate between the closest axis of each row and the best rotation of rows to axes."""
-    rotation = start.T
-    labels = np.argmax(rows @ rotation, axis=1)
-    for _ in range(MAX_ROUNDS):
-        # The rotation closest to that which takes sums of rows to their axes (Procrustes).
-        sums = np.stack(
-            [np.bincount(labels, column, minlength=len(start)) for column in rows.T], axis=1
-        )
-        left, _, right = sl.svd(sums)
-        rotation = (left @ right).T
-        before, labels = labels, np.argmax(rows @ rotation, axis=1)
-        if np.array_equal(before, labels):
-            break
+        if is_mean:
+            # Centers move to the mean of their rows; one that has lost all rows stays.
+            counts = np.bincount(labels, minlength=len(centers))[:, None]
+            centers = np.where(counts > 0, sums / np.maximum(counts, 1), centers)
+        else:
+            # The rotation of the axes that is closest to the sums of their rows (Procrustes).
+            left, _, right = sl.svd(sums)
+            centers = left @ right
     return labels.astype(np.int64)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import describe_value
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import FileFormatError
 from eigenshape._memory import available_memory
 from eigenshape._progress import Progress, silent
@@ -195,7 +195,7 @@ def compress_mesh(
         to_varints(references),
         bytes(seeds),
         *to_bytes(np.diff(np.array(means), axis=0, prepend=0).astype(np.int64).T.ravel()),
-        *to_bytes(_by_frequency(coefficients)),
+        *to_bytes(np.concatenate(coefficients)[_frequency_order(patches)].ravel()),
     )
     packed = [pack(stream) for stream in streams]
     head = HEADER.pack(MAGIC, VERSION, len(points), len(faces), scale, step, *low)
@@ -203,7 +203,7 @@ def compress_mesh(
     report(1.0, "done")
     return CompressedMesh(
         data=body + sha256(body).digest()[:N_CHECK],
-        vertex_order=freeze(order),
+        vertex_order=order,
         n_connectivity_bytes=sum(map(len, packed[:2])),
         n_geometry_bytes=sum(map(len, packed[2:])),
         step=step * scale,
@@ -263,7 +263,9 @@ def decompress_mesh(data: bytes, *, progress: Progress | None = None) -> Triangl
             f"A compressed mesh must have a seed for each of {len(patches)} patches; it has "
             f"{len(seeds)}. The file is damaged."
         )
-    coefficients = _by_patch(numbers, [len(patch) for patch in patches])
+    coefficients = np.empty((n, 3), dtype=np.int64)
+    coefficients[_frequency_order(patches)] = numbers.reshape(-1, 3)
+    start = 0
     points = np.empty((n, 3))
     for number, (patch, laplacian) in enumerate(
         zip(patches, patch_laplacians(graph, patches), strict=True)
@@ -271,7 +273,9 @@ def decompress_mesh(data: bytes, *, progress: Progress | None = None) -> Triangl
         report(0.1 + 0.9 * number / len(patches), "coordinates")
         _, basis, _ = patch_basis(laplacian, seeds[number])
         with np.errstate(over="ignore", invalid="ignore"):  # the result is checked below
-            points[patch] = scale * (low + step * (means[number] + basis @ coefficients[number]))
+            rows = coefficients[start : start + len(patch)]
+            points[patch] = scale * (low + step * (means[number] + basis @ rows))
+        start += len(patch)
     if not np.isfinite(points).all():
         raise FileFormatError(
             f"A compressed mesh must have finite coordinates; with scale {scale} and step {step} "
@@ -281,23 +285,9 @@ def decompress_mesh(data: bytes, *, progress: Progress | None = None) -> Triangl
     return TriangleMesh(points, faces)
 
 
-def _by_frequency(coefficients: list[Int[np.ndarray, "_ 3"]]) -> Int[np.ndarray, " c"]:
-    """Return the lowest coefficients of all patches, axis by axis, then the second lowest, ..."""
-    sizes = [len(rows) for rows in coefficients]
-    return np.concatenate(coefficients)[_frequency_order(sizes)].ravel()
-
-
-def _by_patch(numbers: Int[np.ndarray, " c"], sizes: list[int]) -> list[np.ndarray]:
-    """Return the coefficients of each patch again."""
-    rows = np.empty((sum(sizes), 3), dtype=np.int64)
-    rows[_frequency_order(sizes)] = numbers.reshape(-1, 3)
-    ends = np.cumsum([0, *sizes])
-    return [rows[start:end] for start, end in pairwise(ends)]
-
-
-def _frequency_order(sizes: list[int]) -> Int[np.ndarray, " n"]:
-    """Return rows of all patches below one another in the order of their frequencies."""
-    frequencies = np.concatenate([np.arange(size) for size in sizes])
+def _frequency_order(patches: list[np.ndarray]) -> Int[np.ndarray, " n"]:
+    """Return the order of the rows of all patches in which each one's lowest comes first."""
+    frequencies = np.concatenate([np.arange(len(patch)) for patch in patches])
     return np.argsort(frequencies, kind="stable")
 
 

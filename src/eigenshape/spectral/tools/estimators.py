@@ -107,8 +107,7 @@ class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
     def fit(self, X: Any, y: object = None) -> SpectralEmbedder:
         """Compute the embedding of (n, d) points; `y` is ignored."""
         del y
-        _require_data_points(X)
-        points = validate_data(self, X, dtype=np.float64, ensure_min_samples=2)
+        points = _data_points(self, X)
         methods = get_args(EmbeddingMethod)
         if self.method not in methods:
             raise InvalidParameterError(
@@ -196,8 +195,7 @@ class SpectralClusterer(ClusterMixin, BaseEstimator):  # type: ignore[misc]
     def fit(self, X: Any, y: object = None) -> SpectralClusterer:
         """Compute the clusters of (n, d) points; `y` is ignored."""
         del y
-        _require_data_points(X)
-        points = validate_data(self, X, dtype=np.float64, ensure_min_samples=2)
+        points = _data_points(self, X)
         wanted = 1 if self.n_clusters is None else self.n_clusters
         whole_number(wanted, "n_clusters", 1, len(points))
         most = len(points) if self.n_clusters is None else wanted
@@ -214,13 +212,14 @@ class SpectralClusterer(ClusterMixin, BaseEstimator):  # type: ignore[misc]
         return self.fit(X, y).labels_
 
 
-def _require_data_points(X: Any) -> None:
-    """Raise an error for our own shapes: an estimator takes data points."""
+def _data_points(estimator: BaseEstimator, X: Any) -> Float[np.ndarray, "n d"]:
+    """Return data points as scikit-learn checks them; raise an error for our own shapes."""
     if isinstance(X, TriangleMesh | SimplicialMesh | PointCloud):
         raise InvalidParameterError(
             f"An estimator takes (n, d) data points; X is {describe_value(X)}. Pass its points, or use "
             f"es.spectral.spectral_embedding and es.spectral.spectral_clusters with the spectrum of the shape."
         )
+    return validate_data(estimator, X, dtype=np.float64, ensure_min_samples=2)
 
 
 def _graph_spectrum(

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import describe_value, require_type
-from eigenshape._arrays import point_functions, real_numbers
+from eigenshape._arrays import point_functions, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -89,32 +89,19 @@ def filter_values(
             "response must be a function of the eigenvalues, such as lambda values: values <= cutoff; "
             f"it is {describe_value(response)}."
         )
-    factors = _factors(response, spectrum.eigenvalues)
+    frequencies = spectrum.eigenvalues
+    factors = real_numbers(response(frequencies), "The factors of a filter").astype(np.float64)
+    if factors.shape != frequencies.shape:
+        raise InvalidParameterError(
+            f"A filter must return one factor per eigenvalue, shape {frequencies.shape}; the shape "
+            f"is {factors.shape}."
+        )
+    require_finite_rows(factors, "The factors of a filter", "eigenvalue")
     change = factors - 1 if keep_rest else factors
     coefficients = project(functions, spectrum)
     # A column for each function, or none: the transposes let one line serve both.
     filtered = reconstruct((change * coefficients.T).T, spectrum)
     return functions + filtered if keep_rest else filtered
-
-
-def _factors(response: Response, eigenvalues: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-    """Return the factor of each eigenvalue.
-
-    Raise InvalidParameterError if the response does not return one finite number per eigenvalue.
-    """
-    factors = real_numbers(response(eigenvalues), "The factors of a filter").astype(np.float64)
-    if factors.shape != eigenvalues.shape:
-        raise InvalidParameterError(
-            f"A filter must return one factor per eigenvalue, shape {eigenvalues.shape}; the shape "
-            f"is {factors.shape}."
-        )
-    bad = np.flatnonzero(~np.isfinite(factors))
-    if bad.size:
-        raise InvalidParameterError(
-            f"The factors of a filter must be finite; that of eigenvalue {bad[0]}, "
-            f"{eigenvalues[bad[0]]:.6g}, is {factors[bad[0]]}."
-        )
-    return factors
 
 
 def smooth_mesh(

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, vertex_values
+from eigenshape._arrays import ReadOnly, vertex_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
@@ -118,9 +118,9 @@ def nodal_domains(mesh: MeshLike, values: ArrayLike, *, zero: float = ZERO_SHARE
     labels = np.full(mesh.n_points, -1)
     labels[inside] = number[found]
     return NodalDomains(
-        freeze(labels),
-        freeze(signs[inside[np.sort(firsts)]]),
-        freeze(np.bincount(labels[inside], minlength=len(firsts))),
+        labels,
+        signs[inside[np.sort(firsts)]],
+        np.bincount(labels[inside], minlength=len(firsts)),
     )
 
 

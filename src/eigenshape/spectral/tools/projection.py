@@ -7,7 +7,7 @@ import scipy.linalg as sl
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import point_functions, real_numbers
+from eigenshape._arrays import point_functions, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -130,10 +130,5 @@ def reconstruct(coefficients: ArrayLike, spectrum: Spectrum) -> Float[np.ndarray
             f"coefficients must have one row per eigenvector, from 1 to {k}; the shape is "
             f"{weights.shape}. Compute more eigenpairs, or pass the first {k} rows."
         )
-    bad = np.argwhere(~np.isfinite(weights))
-    if len(bad):
-        raise InvalidParameterError(
-            f"coefficients must be finite; that of eigenvector {bad[0, 0]} is "
-            f"{weights[tuple(bad[0])]}."
-        )
+    require_finite_rows(weights, "coefficients", "eigenvector")
     return np.asarray(spectrum.eigenvectors[:, : len(weights)] @ weights)

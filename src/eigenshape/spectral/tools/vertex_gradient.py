@@ -42,9 +42,14 @@ def point_frames(shape: Shape3, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarr
 
     Raise InvalidShapeError if the normals of the faces at a vertex cancel.
     """
-    normals = (
-        mean_normals(shape) if isinstance(shape, TriangleMesh) else _fitted_normals(shape, edges)
-    )
+    if isinstance(shape, TriangleMesh):
+        normals = mean_normals(shape)
+    else:
+        # The direction in which the neighbors of a point spread least; its sign is free.
+        points, _ = size_one(shape.points)
+        near = points[edges[1].reshape(len(points), -1)] - points[:, None]
+        covariances = np.einsum("nki,nkj->nij", near, near)
+        normals = np.linalg.eigh(covariances)[1][:, :, 0]
     flat = np.flatnonzero(~normals.any(axis=1))
     if flat.size:
         raise InvalidShapeError(
@@ -56,14 +61,6 @@ def point_frames(shape: Shape3, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarr
     first = axis - (axis * normals).sum(axis=1, keepdims=True) * normals
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(normals, first), normals], axis=1)
-
-
-def _fitted_normals(cloud: PointCloud, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarray, "n 3"]:
-    """Return the direction in which the neighbors of each point spread least; its sign is free."""
-    points, _ = size_one(cloud.points)
-    near = points[edges[1].reshape(cloud.n_points, -1)] - points[:, None]
-    covariances = np.einsum("nki,nkj->nij", near, near)
-    return np.linalg.eigh(covariances)[1][:, :, 0]
 
 
 def fit_gradient(
