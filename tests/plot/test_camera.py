@@ -202,7 +202,7 @@ def test_figures_take_a_view_or_a_camera_but_not_both():
 @pytest.mark.long
 def test_every_figure_of_shapes_passes_its_view_on(monkeypatch):
     views = []
-    for module in (fields, poses, sheet):
+    for module in (fields, sheet):
         monkeypatch.setattr(
             module,
             "draw",

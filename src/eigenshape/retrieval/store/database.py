@@ -7,6 +7,7 @@ whole table notices each row that was changed, lost or doubled.
 
 import json
 import os
+import secrets
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
@@ -192,23 +193,31 @@ def create(folder: Path, *, exist_ok: bool = False) -> None:
             f"An index needs a folder; {folder} cannot be made: {err.strerror}. "
             "Choose another folder."
         ) from err
-    has_database = (folder / DATABASE).is_file()
-    if exist_ok and has_database:  # without the lock, which needs the right to write
-        with suppress(StoreError), closing(open_to_read(folder)):
-            return
-    others = [path for path in folder.iterdir() if not path.name.startswith(DATABASE)]
-    if others and not (exist_ok and has_database):
-        raise _not_empty(folder)
-    with explained(folder), closing(_connect(folder, "mode=rwc")) as database:
+    if not exist_ok or not (folder / DATABASE).is_file():
+        if any(not path.name.startswith(f"{DATABASE}.") for path in folder.iterdir()):
+            raise _not_empty(folder)
+        # The file gets its name when it is whole, so nobody sees half of an index; of several
+        # processes that come here at once, the first gives it.
+        fresh = folder / f"{DATABASE}.{secrets.token_hex(8)}"
+        try:
+            with explained(folder):
+                _make_tables(fresh)
+                _name(fresh, folder / DATABASE)
+        except FileExistsError:
+            if not exist_ok:
+                raise _not_empty(folder) from None
+        finally:
+            fresh.unlink(missing_ok=True)
+    with closing(open_to_read(folder)):  # which raises an error if the file is no index
+        return
+
+
+def _make_tables(path: Path) -> None:
+    with closing(_connect(path, "mode=rwc")) as database:
         database.execute(f"PRAGMA page_size = {PAGE}")
         # Free pages can be given back one by one: the file is never written anew.
         database.execute("PRAGMA auto_vacuum = INCREMENTAL")
-        # Of several processes that come here at once, the first makes the tables.
         database.execute("BEGIN IMMEDIATE")
-        if database.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,):
-            if exist_ok:
-                return
-            raise _not_empty(folder)
         for statement in SCHEMA:
             database.execute(statement)
         for table in TABLES:
@@ -220,6 +229,18 @@ def create(folder: Path, *, exist_ok: bool = False) -> None:
         database.execute(f"PRAGMA user_version = {FORMAT}")
         database.execute("COMMIT")
         database.execute(WRITE_AHEAD)
+
+
+def _name(fresh: Path, path: Path) -> None:
+    """Give a file its name, or raise FileExistsError if that is taken."""
+    try:
+        os.link(fresh, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a drive without links, where two that come at once are not told apart
+        if path.exists():
+            raise FileExistsError(path) from None
+        fresh.rename(path)
 
 
 def _not_empty(folder: Path) -> StoreError:
@@ -237,7 +258,7 @@ def writing(folder: Path) -> Iterator[sqlite3.Connection]:
     process is writing, or the disk is full.
     """
     require_database(folder)
-    with explained(folder), closing(_connect(folder, "mode=rw")) as database:
+    with explained(folder), closing(_connect(folder / DATABASE, "mode=rw")) as database:
         place = str(folder / DATABASE)
         require_format(place, database)
         database.execute(WRITE_AHEAD)
@@ -275,7 +296,7 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
     require_database(folder)
     with explained(folder):
         # Not mode=ro: whoever closes an index last moves the log into the database.
-        database = _connect(folder, "mode=rw")
+        database = _connect(folder / DATABASE, "mode=rw")
         try:
             database.execute("SELECT count(*) FROM sqlite_master")
         except sqlite3.OperationalError:
@@ -290,7 +311,7 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
                     f"{folder} must be writable to be read as long as {log.name} holds changes. "
                     "Read it once with the right to write, or copy it to a writable folder."
                 ) from None
-            database = _connect(folder, "mode=ro&immutable=1")
+            database = _connect(folder / DATABASE, "mode=ro&immutable=1")
         require_format(str(folder / DATABASE), database)
         database.execute("PRAGMA query_only = ON")
         database.execute(f"PRAGMA cache_size = -{CACHED}")
@@ -300,8 +321,8 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
         return database
 
 
-def _connect(folder: Path, mode: str) -> sqlite3.Connection:
-    uri = f"{(folder / DATABASE).absolute().as_uri()}?{mode}"
+def _connect(path: Path, mode: str) -> sqlite3.Connection:
+    uri = f"{path.absolute().as_uri()}?{mode}"
     return sqlite3.connect(
         uri, LONGEST_WAIT, isolation_level=None, check_same_thread=False, uri=True
     )
