@@ -162,18 +162,18 @@ def stoppable():
 @pytest.mark.long
 @pytest.mark.usefixtures("stoppable")
 def test_ctrl_c_ends_workers_that_hang(index, tmp_path):
-    todo = items(tmp_path, a="1", b="hang")
+    todo, done = items(tmp_path, a="1", b="hang"), threading.Event()
 
     def interrupt_soon():
         try:
             wait_until((tmp_path / "b.busy").exists)
-            wait_until(lambda: len(index))
+            wait_until(done.is_set)
         finally:  # without it the build would hang as long as its worker
             os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=interrupt_soon, daemon=True).start()
     with pytest.raises(KeyboardInterrupt):
-        build(index, todo, timeout=600)
+        build(index, todo, timeout=600, callback=lambda *_: done.set())
     with FileLock(tmp_path / "b.lock", timeout=20):  # let go by its death only
         assert [record.name for record in index.records()] == ["a"]
 
