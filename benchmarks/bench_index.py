@@ -97,11 +97,11 @@ def measure(folder: str) -> Row:
     n_shapes = len(reader)
     index.add_many(shapes(N_CHANGED, n_shapes, points))
     timed(f"refresh after {N_CHANGED} were added", reader.refresh)
-    timed("next query", lambda: reader.query(query))
+    timed("query after adding", lambda: reader.query(query))
     names = [match.name for match in reader.query(query, n_matches=N_CHANGED)]
     index.remove(*names)
     timed(f"refresh after {N_CHANGED} were removed", reader.refresh)
-    timed("next query", lambda: reader.query(query))
+    timed("query after removing", lambda: reader.query(query))
     name = reader.query(query)[0].name
     timed("descriptors of one shape", lambda: index.descriptors(name, RECIPE))
     timed("picture of one shape", lambda: index.thumbnail(name))

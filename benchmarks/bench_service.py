@@ -163,8 +163,8 @@ def measure(folder: Path, n_clients: int, seconds: float) -> list[Row]:
         ("errors", len(errors), "", 0),
         ("exit code at the end", code, "", 0),
         *[(name, float(count), "", None) for name, count in sorted(counts.items())],
-        ("requests", sum(counts.values()) / took, "a second", None),
-        ("queries", counts["queries"] / took, "a second", None),
+        ("rate of requests", sum(counts.values()) / took, "a second", None),
+        ("rate of queries", counts["queries"] / took, "a second", None),
         ("memory at the end", late[-1], "MiB", None),
         ("growth of the memory", growth, "%", 5),
     ]
