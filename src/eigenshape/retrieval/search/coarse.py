@@ -1,7 +1,6 @@
 """Short rows of all shapes of an index, kept in a file that can be made again at any time."""
 
 import os
-import secrets
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,6 +13,8 @@ from jaxtyping import Float32, Int, Int8, Int64
 from numpy.lib.format import read_array, read_array_header_1_0, read_magic
 
 from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._errors import FileFormatError
+from eigenshape._files import replacing
 from eigenshape._text import short_repr
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.distance import SIZE_PRICE
@@ -138,7 +139,7 @@ def coarse_rows(source: Rows, recipe: PatchRecipe, before: CoarseRows | None = N
     numbers.flags.writeable = False
     made = _in_order(found.axes, freeze(wanted), numbers, found.n_fitted)
     # A folder that cannot be written to, as on a read-only disk, is searched all the same.
-    with suppress(OSError):
+    with suppress(OSError, FileFormatError):
         _write(path, made)
         return _read(path) or made
     return made
@@ -202,18 +203,12 @@ def _no_rows(recipe: PatchRecipe, axes: PatchAxes) -> Int8[np.ndarray, "0 s q"]:
 
 
 def _write(path: Path, rows: CoarseRows) -> None:
-    """Write a file whole or not at all."""
-    beside = path.with_name(f"{path.name}.{secrets.token_hex(4)}")
     parts = _parts(rows)
-    try:
-        with beside.open("wb") as file:
-            np.save(file, np.array([FORMAT]))
-            np.save(file, np.array([_checksum(parts), rows.n_fitted], dtype=np.int64))
-            for part in parts:
-                np.save(file, part)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    with replacing(path) as file:
+        np.save(file, np.array([FORMAT]))
+        np.save(file, np.array([_checksum(parts), rows.n_fitted], dtype=np.int64))
+        for part in parts:
+            np.save(file, part)
 
 
 def _read(path: Path) -> CoarseRows | None:

@@ -1,14 +1,14 @@
 """How isolated each shape of an index is, kept in a file that can be made again at any time."""
 
-import secrets
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._errors import FileFormatError
+from eigenshape._files import replacing
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.isolation import N_REFERENCES, measure_isolations
 from eigenshape.retrieval.patches.packing import unpack_codes
@@ -51,17 +51,6 @@ def stored_isolations(
     found[missing] = measure_isolations(whole, len(distinct), missing)
     if len(missing) and len(distinct) >= FEWEST_TO_KEEP:
         # A folder that cannot be written to, as on a read-only disk, is searched all the same.
-        with suppress(OSError):
-            _write(path, distinct, found)
+        with suppress(OSError, FileFormatError), replacing(path) as fresh:
+            np.savez(fresh, checksums=distinct, isolations=found)
     return found[inverse]
-
-
-def _write(path: Path, checksums: np.ndarray, isolations: np.ndarray) -> None:
-    """Write a file whole or not at all."""
-    beside = path.with_name(f"{path.name}.{secrets.token_hex(4)}")
-    try:
-        with beside.open("wb") as file:
-            np.savez(file, checksums=checksums, isolations=isolations)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)

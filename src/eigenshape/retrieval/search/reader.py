@@ -235,8 +235,9 @@ class IndexReader:
                 allowed = snapshot.mask(chosen)
                 if left_out >= 0:
                     allowed &= snapshot.shape_of != left_out
-                usual = np.full(snapshot.n_shapes, USUAL_ISOLATION)
-                isolations = scan.isolations() if is_scaled else usual
+                isolations = (
+                    scan.isolations() if is_scaled else np.full(snapshot.n_shapes, USUAL_ISOLATION)
+                )
                 places = np.flatnonzero(allowed)
                 candidates = Candidates(places, "exact", len(places))
                 if isinstance(descriptor, PatchDescriptor):  # by heat all are compared

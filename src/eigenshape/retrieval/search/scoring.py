@@ -68,12 +68,12 @@ def search_candidates(
     order = order[np.sort(firsts)]
     if len(order) > n_matches:  # with all that score as the last one does, to be sorted by name
         order = order[scores[order] <= scores[order[n_matches - 1]]]
-    names = (facts.name for facts in snapshot.facts(places[order]))
-    best = sorted(zip(scores[order].tolist(), names, order.tolist(), strict=True))[:n_matches]
+    known = zip(scores[order].tolist(), snapshot.facts(places[order]), order.tolist(), strict=True)
+    best = sorted(known, key=lambda each: (each[0], each[1].name))[:n_matches]
     matches = []
-    for score, _, number in best:
+    for score, facts, number in best:
         place = int(places[number])
-        (facts,), stored = snapshot.facts(places[[number]]), snapshot.descriptor(place)
+        stored = snapshot.descriptor(place)
         view = int(columns["view"][place])
         match = Match(facts.name, facts.label, facts.source, score, query, stored, view)
         if isinstance(query, PatchDescriptor):

@@ -19,7 +19,7 @@ from eigenshape.retrieval.kinds import Descriptor, kind_of
 from eigenshape.retrieval.patches.verification import N_VERIFIED
 from eigenshape.retrieval.search.chances import chances
 from eigenshape.retrieval.search.matches import Match, Matches
-from eigenshape.retrieval.search.reader import IndexReader, choose_recipe
+from eigenshape.retrieval.search.reader import IndexReader
 from eigenshape.retrieval.store.database import DATABASE
 from eigenshape.retrieval.store.filters import choose_shapes
 
@@ -100,7 +100,7 @@ def query_indexes(
     if isinstance(shape, Descriptor):
         descriptor = shape
     else:
-        recipe = choose_recipe(list(_open_reader(paths[0]).state.recipes.values()))
+        recipe = _open_reader(paths[0]).default_recipe()
         descriptor = kind_of(recipe).describe_query(as_mesh(shape, "shape"), recipe)
     ask = partial(
         _ask, descriptor=descriptor, n_matches=wanted + N_VERIFIED, where=where, exact=exact

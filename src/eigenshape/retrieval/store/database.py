@@ -193,23 +193,24 @@ def create(folder: Path, *, exist_ok: bool = False) -> None:
             f"An index needs a folder; {folder} cannot be made: {err.strerror}. "
             "Choose another folder."
         ) from err
-    if not exist_ok or not (folder / DATABASE).is_file():
-        if any(not path.name.startswith(f"{DATABASE}.") for path in folder.iterdir()):
-            raise _not_empty(folder)
-        # The file gets its name when it is whole, so nobody sees half of an index; of several
-        # processes that come here at once, the first gives it.
-        fresh = folder / f"{DATABASE}.{secrets.token_hex(8)}"
-        try:
-            with explained(folder):
-                _make_tables(fresh)
-                _name(fresh, folder / DATABASE)
-        except FileExistsError:
-            if not exist_ok:
-                raise _not_empty(folder) from None
-        finally:
-            fresh.unlink(missing_ok=True)
-    with closing(open_to_read(folder)):  # which raises an error if the file is no index
+    # Before the database is looked for: what another process writes beside it comes after it.
+    others = [path for path in folder.iterdir() if not path.name.startswith(DATABASE)]
+    if exist_ok and (folder / DATABASE).is_file():  # whoever opens it sees whether it is an index
         return
+    if others:
+        raise _not_empty(folder)
+    # The file gets its name when it is whole, so nobody sees half of an index; of several
+    # processes that come here at once, the first gives it.
+    fresh = folder / f"{DATABASE}.{secrets.token_hex(8)}"
+    try:
+        with explained(folder):
+            _make_tables(fresh)
+            _name(fresh, folder / DATABASE)
+    except FileExistsError:
+        if not exist_ok:
+            raise _not_empty(folder) from None
+    finally:
+        fresh.unlink(missing_ok=True)
 
 
 def _make_tables(path: Path) -> None:

@@ -3,7 +3,7 @@
 import json
 import zipfile
 from collections.abc import Iterator, Sequence
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,7 @@ import numpy as np
 from eigenshape._errors import StoreError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.retrieval.store.damage import Damage, warn_of_damage
-from eigenshape.retrieval.store.database import (
-    DAMAGE,
-    DATABASE,
-    TABLES,
-    open_to_read,
-    writing,
-)
+from eigenshape.retrieval.store.database import DAMAGE, DATABASE, TABLES, writing
 from eigenshape.retrieval.store.records import Record
 from eigenshape.retrieval.store.state import DamagedEntryError, IndexState, read_state
 from eigenshape.retrieval.store.writing import Writer
@@ -108,17 +102,13 @@ def compact_index(folder: Path) -> int:
 
     Raise StoreError if another process is writing, the disk is full, or pages are damaged.
     """
-    before = _n_pages(folder)
     with writing(folder) as database:
         (page_size,) = database.execute("PRAGMA page_size").fetchone()
+        (before,) = database.execute("PRAGMA page_count").fetchone()
         # A script: `execute` would move one page alone.
         database.executescript("PRAGMA incremental_vacuum; PRAGMA wal_checkpoint(TRUNCATE);")
-    return int(page_size) * (before - _n_pages(folder))
-
-
-def _n_pages(folder: Path) -> int:
-    with closing(open_to_read(folder)) as database:
-        return int(database.execute("PRAGMA page_count").fetchone()[0])
+        (after,) = database.execute("PRAGMA page_count").fetchone()
+    return int(page_size) * (before - after)
 
 
 def merge_indexes(folder: Path, others: Sequence[Path], *, replace: bool = False) -> int:
