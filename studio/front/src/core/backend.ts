@@ -96,6 +96,14 @@ export function backendOver(send: Send): Backend {
     if (answer.meta.error) throw new Error(answer.meta.error.message); // of the library
     return answer;
   }
+  // The library answers side by side, in any order. What changes its state is asked one after the
+  // other: of two regions that are bound in a hurry, the last must be the one that moves.
+  let last: Promise<unknown> = Promise.resolve();
+  function askInTurn(call: keyof Backend, meta: unknown, arrays?: Arrays) {
+    const answer = last.then(() => ask(call, meta, arrays));
+    last = answer.catch(() => {}); // whoever asked hears of it
+    return answer;
+  }
   return {
     meta: async () => (await ask("meta")).meta,
     array: async (name, start, stop) =>
@@ -104,11 +112,11 @@ export function backendOver(send: Send): Backend {
       const named = regions.map((region, number) => [`region${number}`, region] as const);
       const request = { n_modes, n_regions: regions.length, fixed: fixed !== null };
       const arrays = { ...Object.fromEntries(named), ...(fixed && { fixed }) };
-      const answer = await ask("rig", request, arrays);
+      const answer = await askInTurn("rig", request, arrays);
       return { ...answer.meta, ...answer.arrays };
     },
     async finish(change, files) {
-      const answer = await ask("finish", change, files);
+      const answer = await askInTurn("finish", change, files);
       return { ...answer.meta, ...answer.arrays };
     },
     async query(n_matches) {
