@@ -99,6 +99,43 @@ def test_a_long_job_of_one_tab_does_not_stop_another(browser, page, url, path, t
         wait_until(busy, "eigenshape.state.name === 'quadruped.ply'")
 
 
+def test_undo_takes_back_what_the_hand_did_last(page, mesh, tmp_path):
+    chosen = choose_above(page, HEAD)
+    turn(page, 40)
+    find(page, "clear").click()
+    assert len(region(page)) == 0
+    other = tmp_path / "ball.ply"
+    es.write_mesh(es.icosphere(2), other)
+    find(page, "tab-shape").click()
+    open_file(page, "open", other)
+    wait_until(page, "eigenshape.state.name === 'ball.ply'")
+    page.keyboard.press("Control+z")
+    wait_until(page, "eigenshape.state.name === 'quadruped.ply'")
+    wait_for_edits(page, 1)
+    page.keyboard.press("Control+z")
+    wait_for_edits(page, 0)
+    np.testing.assert_array_equal(positions(page), mesh.vertices.astype("f4"))
+    page.keyboard.press("Control+y")
+    wait_for_edits(page, 1)
+    # Regions belong to the shape that was replaced; strokes on the present one come and go.
+    find(page, "tab-deform").click()
+    again = choose_above(page, HEAD + 0.2)
+    assert 0 < len(again) < len(chosen)
+    find(page, "clear").click()
+    assert len(region(page)) == 0
+    page.keyboard.press("Control+z")
+    np.testing.assert_array_equal(region(page), again)
+    page.keyboard.press("Control+y")
+    assert len(region(page)) == 0
+    assert page.evaluate("eigenshape.state.deformation.n_edits") == 1
+
+
+def test_a_broken_file_of_edits_is_named(page, tmp_path):
+    (tmp_path / "edits.json").write_text('{"edits": [')
+    open_file(page, "load-edits", tmp_path / "edits.json")
+    wait_until(page, f"{PANEL}.app.status.textContent.includes('edits.json is not a JSON file')")
+
+
 def test_the_pose_is_carried_to_a_file(page, mesh, rig, tmp_path):
     chosen = choose_above(page, HEAD)
     turn(page, 40)

@@ -314,6 +314,24 @@ def test_a_pose_is_transferred_to_another_shape():
     assert error < 0.15 * np.linalg.norm(expected - larger.vertices)
 
 
+def test_a_file_that_is_opened_leaves_the_shape_before_with_its_edits(page, top):
+    assert "nothing was opened" in page.error("finish", kind="swap")["message"]
+    bend(page, top)
+    bent = page.workspace.mesh.vertices
+    tetrahedron = es.TriangleMesh(np.eye(4, 3), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    page.call("finish", {"kind": "open", "name": "t.ply"}, {"file": file_of(tetrahedron)})
+    assert page.workspace.mesh.n_vertices == 4
+    facts, _ = page.call("finish", kind="swap")
+    assert facts["state"]["name"] == "ball.ply"
+    assert facts["state"]["deformation"]["n_edits"] == 1
+    np.testing.assert_array_equal(page.workspace.mesh.vertices, bent)
+    page.call("finish", kind="undo")
+    facts, _ = page.call("finish", kind="swap")
+    assert (facts["state"]["name"], facts["state"]["shape"]) == ("t.ply", 3)
+    assert page.workspace.analysis.rig.wait(60)
+    assert page.workspace.analysis.spectrum.status == "ready"  # its jobs go on or begin anew
+
+
 def test_values_are_shown_with_their_unit():
     mesh = es.icosphere(2)
     page = Page(Workspace(mesh, values={"height (m)": mesh.vertices[:, 2]}))

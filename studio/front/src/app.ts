@@ -2,7 +2,8 @@
 
 import type { Backend, Change, State } from "./core/backend";
 import markup from "./app.html?raw";
-import { download, Form, h, type NamedFile } from "./core/dom";
+import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile } from "./core/dom";
+import { History, type Step } from "./core/history";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
 import style from "./style.css?inline";
@@ -38,13 +39,15 @@ export interface Panel {
   hidden?(): void;
 }
 
+const NEW_SHAPES = ["open", "repair", "transfer"]; // changes that replace the shape
 const POLL = 300; // ms between two questions while the server computes
 
 export class Studio {
   readonly viewer: Viewer;
+  readonly history = new History();
   state!: State;
   private readonly page = new Form(markup);
-  private readonly main = this.page.root;
+  readonly main = this.page.root;
   private readonly status = this.page.get("status");
   private readonly help = this.page.get<HTMLDialogElement>("help");
   private readonly shortcuts = new Map<string, { text: string; action: () => void }>();
@@ -55,6 +58,11 @@ export class Studio {
   private shown = { shape: -1, pose: -1 }; // what the viewer shows
   private mesh: Promise<[Float32Array, Uint32Array]>; // requested, of a shape not shown yet
   private readonly first: Promise<State>;
+  /** The last edit of the server's session, as a step. */
+  private readonly edit: Step = {
+    undo: () => this.change({ kind: "undo" }, "Undoing"),
+    redo: () => this.change({ kind: "redo" }, "Redoing"),
+  };
 
   constructor(
     readonly backend: Backend,
@@ -87,6 +95,7 @@ export class Studio {
     this.shortcut("T", "Dark or light", () => this.switchTheme());
     this.shortcut("Ctrl+Z", "Undo the last edit", () => this.step("undo"));
     this.shortcut("Ctrl+Shift+Z", "Redo", () => this.step("redo"));
+    this.shortcut("Ctrl+Y", "Redo", () => this.step("redo"));
   }
 
   async start(): Promise<void> {
@@ -111,10 +120,40 @@ export class Studio {
   async change(change: Change, text: string, files?: Arrays): Promise<boolean> {
     const done = await this.run(text, this.backend.finish(change, files));
     if (!done) return false;
+    this.note(change.kind);
     await this.show(done.state, done.vertices);
     this.refreshPanels();
     if (done.warnings.length) this.say(done.warnings.join(" "));
     return true;
+  }
+
+  /** Note what Ctrl+Z undoes. */
+  private note(kind: Change["kind"]): void {
+    if (NEW_SHAPES.includes(kind)) {
+      this.history.forget();
+      const back = () => this.change({ kind: "swap" }, "Returning to the other shape");
+      this.history.did({ undo: back, redo: back });
+    } else if (kind === "commit") this.history.did(this.edit);
+    else if (kind === "replay" || kind === "reset") this.history.forget();
+  }
+
+  /** Let the person choose files; none if one cannot be read, and the status says why. */
+  choose(suffixes = this.state.suffixes, multiple = false): Promise<NamedFile[]> {
+    return this.orFail(chooseFiles(suffixes, this.state.most_bytes, multiple));
+  }
+
+  /** Let a file be dropped on an element. */
+  acceptDrops(element: HTMLElement, onFile: (file: NamedFile) => void): void {
+    acceptDrops(element, async (file) =>
+      (await this.orFail(readFiles([file], this.state.most_bytes))).forEach(onFile),
+    );
+  }
+
+  private orFail(files: Promise<NamedFile[]>): Promise<NamedFile[]> {
+    return files.catch((error) => {
+      this.fail(error);
+      return [];
+    });
   }
 
   /** Let a file become the shape; return whether it did. */
@@ -250,10 +289,16 @@ export class Studio {
     for (const { panel } of this.pages.values()) panel.refresh(this.state);
   }
 
-  step(kind: "undo" | "redo"): void {
+  can(kind: keyof Step): boolean {
     const { n_edits, n_redoable } = this.state.deformation;
-    if (kind === "undo" ? n_edits : n_redoable)
-      this.change({ kind }, kind === "undo" ? "Undoing" : "Redoing");
+    return this.history.can(kind) || (kind === "undo" ? n_edits : n_redoable) > 0;
+  }
+
+  /** Undo or redo what the hand did last; after a reload, the edits that the server has. */
+  async step(kind: keyof Step): Promise<void> {
+    if (!this.can(kind)) return;
+    await this.history.go(kind, this.edit);
+    this.refreshPanels();
   }
 
   private setTheme(dark: boolean): void {

@@ -71,6 +71,15 @@ class Analysis:
             if job is not None:
                 job.cancel()
 
+    def resume(self) -> "Analysis":
+        """Return this analysis, or one that begins anew if its jobs were stopped."""
+        jobs = (self.health, self.spectrum, self.rig)
+        if all(job.shared or job.status == "ready" for job in jobs):
+            return self
+        again = Analysis(self.mesh, self.name, n_modes=self._n_modes)
+        again.look_from(*self.side)
+        return again
+
     def fork(self) -> "Analysis":
         """Return an analysis of the same mesh that shares the jobs which have been started."""
         return copy.copy(self)

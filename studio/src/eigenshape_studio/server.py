@@ -85,6 +85,7 @@ def make_app(first: Workspace, rules: Rules) -> App:
         What new tabs show.
     rules : Rules
     """
+    first.most_bytes = rules.most_bytes
     tabs = Tabs(first)
     limiter = anyio.CapacityLimiter(N_THREADS)
 

@@ -26,6 +26,8 @@ N_BRACKETS = 20  # bracketing costs a solve with three times as many unknowns
 CAPABILITIES = ("rig", "finish", "query", "open", "repair", "solve")
 CALLS = ("meta", "array", "rig", "finish", "query")
 MODES = ("graded", "uncrossed", "thesis")
+# What a workspace holds of one shape
+OF_A_SHAPE = ("analysis", "session", "mode", "fields", "attributes")
 # The filters of warnings belong to the whole process, so only one thread may listen at a time.
 # Only the mode "uncrossed" warns.
 LISTENING = threading.Lock()
@@ -110,8 +112,10 @@ class Workspace:
         self.shelf = None if index is None else Shelf(index)
         self.session: es.DeformationSession | None = None
         self.bound: Bound | None = None
+        self.most_bytes = 256 << 20  # of a file; the server has a limit of its own
         self.matches: list[str] = []  # names, of the last query
         self.mode = "graded"
+        self._before: dict[str, Any] | None = None  # the shape before this one, as OF_A_SHAPE
         # How often the vertices, and how often the mesh, has changed.
         self.pose, self.shape = 0, 0
         self._changing = threading.RLock()
@@ -124,7 +128,7 @@ class Workspace:
         twin = object.__new__(Workspace)
         twin.__dict__.update(self.__dict__)
         twin.analysis, twin.fields = self.analysis.fork(), dict(self.fields)
-        twin.session, twin.bound, twin.mode = None, None, "graded"
+        twin.session, twin.bound, twin.mode, twin._before = None, None, "graded", None
         twin._changing, twin._painting = threading.RLock(), threading.Lock()
         return twin
 
@@ -171,6 +175,7 @@ class Workspace:
             "n_faces": analysis.mesh.n_faces,
             **analysis.view(),
             "capabilities": capabilities,
+            "most_bytes": self.most_bytes,
             "suffixes": ",".join(es.io.SHAPE_FORMATS),
             "health": analysis.health_facts(),
             "values": [_field_facts(name, field) for name, field in self.fields.items()],
@@ -415,6 +420,7 @@ class Workspace:
             "solve": self._solve,
             "parts": lambda *_: self.analysis.find_parts(),
             "transfer": self._transfer,
+            "swap": self._swap,
         }
         if not isinstance(kind, str) or kind not in works:
             raise RequestError(f"kind must be one of {', '.join(works)}; it is {kind!r:.80}.")
@@ -536,11 +542,25 @@ class Workspace:
         self._show(bent, name)
 
     def _show(self, mesh: es.TriangleMesh, name: str) -> None:
-        """Replace the shape."""
+        """Replace the shape; the one before is kept with its edits, to return to."""
         self.analysis.cancel()
+        self._before = {name: getattr(self, name) for name in OF_A_SHAPE}
         self.analysis = Analysis(mesh, name)
         self.session, self.bound, self.mode, self.fields = None, None, "graded", {}
         self.attributes = None
+        self.pose += 1
+        self.shape += 1
+
+    def _swap(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+        """Return to the shape before, and keep the present one in its place."""
+        if self._before is None:
+            raise RequestError("There must be a shape before this one; nothing was opened yet.")
+        self.analysis.cancel()
+        present = {name: getattr(self, name) for name in OF_A_SHAPE}
+        self.__dict__.update(self._before)
+        self._before = present
+        self.analysis = self.analysis.resume()
+        self.bound = None
         self.pose += 1
         self.shape += 1
 

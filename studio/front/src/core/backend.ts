@@ -22,7 +22,8 @@ export interface State {
   up: Vec3;
   towards: Vec3; // the viewer
   capabilities: string[]; // rig, finish, query, open, repair, solve
-  suffixes: string; // of the files that can be opened, as a file dialog takes them
+  suffixes: string;
+  most_bytes: number; // of a file // of the files that can be opened, as a file dialog takes them
   health: {
     status: Progress["status"]; // all else is null or empty until it is ready
     area: number;

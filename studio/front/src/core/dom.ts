@@ -109,29 +109,48 @@ export interface NamedFile {
   bytes: Uint8Array<ArrayBuffer>;
 }
 
-const readFiles = (files: FileList | null | undefined) =>
-  Promise.all(
-    [...(files ?? [])].map(async (file) => ({
+/** Read files, unless one is larger than the server takes: the tab would die of it. */
+export async function readFiles(files: Iterable<File>, most: number): Promise<NamedFile[]> {
+  const megabytes = (bytes: number) => `${Math.ceil(bytes / 2 ** 20).toLocaleString("en")} MB`;
+  for (const { name, size } of files)
+    if (size > most)
+      throw new Error(
+        `${name} has ${megabytes(size)}, and the page takes ${megabytes(most)}. ` +
+          "Open it from the command line, or make it smaller with eigenshape decimate.",
+      );
+  return Promise.all(
+    [...files].map(async (file) => ({
       name: file.name,
       bytes: new Uint8Array(await file.arrayBuffer()),
     })),
   );
+}
 
-/** Let the person choose files, and return their names and bytes. */
-export function chooseFiles(accept: string, multiple = false): Promise<NamedFile[]> {
+/** Let the person choose files of at most so many bytes, and return their names and bytes. */
+export function chooseFiles(accept: string, most: number, multiple = false): Promise<NamedFile[]> {
   const input = h("input", { type: "file", accept, multiple });
   return new Promise((resolve) => {
-    input.addEventListener("change", () => resolve(readFiles(input.files)));
+    input.addEventListener("change", () => resolve(readFiles(input.files ?? [], most)));
     input.click();
   });
 }
 
-/** Let files be dropped on an element. */
-export function acceptDrops(element: HTMLElement, onFile: (file: NamedFile) => void): void {
+/** Return what a JSON file holds, or null if it is none. */
+export function parseJson({ bytes }: NamedFile): unknown {
+  try {
+    return JSON.parse(new TextDecoder().decode(bytes));
+  } catch {
+    return null;
+  }
+}
+
+/** Let a file be dropped on an element. */
+export function acceptDrops(element: HTMLElement, onFile: (file: File) => void): void {
   for (const type of ["dragover", "dragleave", "drop"] as const)
-    element.addEventListener(type, async (event) => {
+    element.addEventListener(type, (event) => {
       event.preventDefault(); // otherwise the browser leaves the page for the file
+      event.stopPropagation(); // the innermost element takes it
       element.classList.toggle("dropping", type === "dragover");
-      if (type === "drop") (await readFiles(event.dataTransfer?.files)).slice(0, 1).forEach(onFile);
+      if (type === "drop") [...(event.dataTransfer?.files ?? [])].slice(0, 1).forEach(onFile);
     });
 }

@@ -3,7 +3,7 @@
 import type { Panel, Studio } from "../app";
 import type { Change, Handle, State, Vec3 } from "../core/backend";
 import { partColors, rgbOf } from "../core/colors";
-import { chooseFiles, Form, h } from "../core/dom";
+import { Form, h, parseJson } from "../core/dom";
 import { cutParts } from "../core/parts";
 import { FIXED, Regions } from "../core/regions";
 import { BoxTool, MotionTool, type MotionKind } from "../core/tools";
@@ -38,6 +38,7 @@ export class DeformPanel implements Panel {
   private box!: BoxTool;
   private mover!: MotionTool;
   private regions = new Regions(0);
+  private kept = ""; // the regions after the last selection, as text
   private region = 0; // that the tools change
   private tool: Tool = "brush";
   private labels: Int32Array | null = null; // part of each vertex
@@ -59,7 +60,7 @@ export class DeformPanel implements Panel {
     this.box = new BoxTool(
       viewer,
       () => this.boxMoved(),
-      () => this.bind(),
+      () => this.selected(),
     );
     this.mover = new MotionTool(viewer, {
       canDrag: (vertex) => this.canDrag(vertex),
@@ -126,8 +127,8 @@ export class DeformPanel implements Panel {
     const { form } = this;
     const { deformation, parts } = state;
     form.progress("rig-progress", deformation);
-    form.get("undo").disabled = form.get("reset").disabled = !deformation.n_edits;
-    form.get("redo").disabled = !deformation.n_redoable;
+    form.get("reset").disabled = !deformation.n_edits;
+    this.showSteps();
     const pose = `${state.shape} ${state.pose} ${deformation.status}`;
     if (pose === this.pose) {
       if (this.tool === "part" && !this.labels && parts.status === "ready") this.loadParts();
@@ -163,6 +164,7 @@ export class DeformPanel implements Panel {
       this.regions.read(kept.text);
       [this.tool, this.region] = [kept.tool, kept.region];
     }
+    this.kept = this.regions.write();
     this.form.press("region", String(this.region));
     // The first box holds what is above the middle, and nothing touches its other sides.
     const { box, extent } = this.app.viewer;
@@ -199,7 +201,7 @@ export class DeformPanel implements Panel {
     this.showTools();
     if (tool !== "box") return;
     if (!this.regions.vertices(this.region).length) this.boxMoved();
-    this.bind();
+    this.selected();
   }
 
   /** Show what belongs to the tool: its options, its handles, the cursor. */
@@ -261,8 +263,23 @@ export class DeformPanel implements Panel {
 
   /** A selection has ended: keep it, and bind the regions. */
   private selected(): void {
+    const [before, after] = [this.kept, this.regions.write()];
+    if (after !== before)
+      this.app.history.did({ undo: () => this.select(before), redo: () => this.select(after) });
+    this.select(after);
+  }
+
+  private select(kept: string): void {
+    this.kept = kept;
+    this.regions.read(kept);
+    this.showSteps();
     this.remember();
     this.bind();
+  }
+
+  private showSteps(): void {
+    for (const kind of ["undo", "redo"] as const)
+      this.form.get(kind).disabled = !this.app.can(kind);
   }
 
   private boxMoved(): void {
@@ -357,7 +374,7 @@ export class DeformPanel implements Panel {
   }
 
   private pickPart({ vertex }: Hit, { shiftKey }: PointerEvent): void {
-    if (!this.labels) return;
+    if (!this.labels) return this.app.say("The parts are still being found …");
     const part = this.labels[vertex];
     const vertices = [...this.labels.keys()].filter((each) => this.labels![each] === part);
     if (shiftKey) this.regions.remove(this.region, vertices);
@@ -456,7 +473,9 @@ export class DeformPanel implements Panel {
   private async moveExactly(): Promise<void> {
     const kind = this.form.get<HTMLSelectElement>("exact-kind").selectedIndex;
     const amount = this.form.number("exact-amount");
-    if (!amount || !this.ready || !this.rows.includes(this.region)) return;
+    if (!this.ready || !this.rows.includes(this.region))
+      return this.app.say("Choose a region first: paint on the shape, or draw a box around it.");
+    if (!amount) return this.app.say("Write by how much it should move.");
     const axis = AXES.map((each) => Number(each === kind % 3)) as Vec3;
     const pivot = this.pivotOf(this.region);
     if (kind < 3) this.moved({ type: "rotation", pivot, axis, angle: (amount * Math.PI) / 180 });
@@ -485,17 +504,21 @@ export class DeformPanel implements Panel {
   }
 
   private async replay(): Promise<void> {
-    const files = await chooseFiles(`.json,${this.app.state.suffixes}`, true);
+    const files = await this.app.choose(`.json,${this.app.state.suffixes}`, true);
     const written = files.find(({ name }) => name.endsWith(".json"));
     const source = files.find((file) => file !== written);
-    if (!written) return this.app.say("Choose a JSON file of edits.");
-    const edits = JSON.parse(new TextDecoder().decode(written.bytes));
+    if (files.length && !written) this.app.say("Choose a JSON file of edits.");
+    if (!written) return;
+    const edits = parseJson(written);
+    if (!edits) return this.app.fail(new Error(`${written.name} is not a JSON file of edits.`));
     const change = { kind: "replay", edits, source: source?.name };
     await this.app.change(change, "Applying the edits", source && { source: source.bytes });
   }
 
   private async transfer(): Promise<void> {
-    const { name, bytes } = (await chooseFiles(this.app.state.suffixes))[0]!;
+    const [file] = await this.app.choose();
+    if (!file) return;
+    const { name, bytes } = file;
     await this.app.change({ kind: "transfer", name }, "Carrying the pose over", { file: bytes });
   }
 }

@@ -2,7 +2,7 @@
 
 import type { Panel, Studio } from "../app";
 import type { Match, Matches, State } from "../core/backend";
-import { acceptDrops, chooseFiles, Form, h, type NamedFile } from "../core/dom";
+import { Form, h, type NamedFile } from "../core/dom";
 import { Viewer } from "../core/viewer";
 import markup from "./search.html?raw";
 
@@ -24,9 +24,9 @@ export class SearchPanel implements Panel {
     this.app = app;
     this.form.on({
       search: () => this.search(),
-      "search-file": async () => this.searchFile((await chooseFiles(app.state.suffixes))[0]!),
+      "search-file": async () => (await app.choose()).forEach((file) => this.searchFile(file)),
     });
-    acceptDrops(this.form.root, (file) => this.searchFile(file));
+    app.acceptDrops(this.form.root, (file) => this.searchFile(file));
     return this.form.root;
   }
 

@@ -2,7 +2,7 @@
 
 import type { Studio } from "../app";
 import type { State } from "../core/backend";
-import { acceptDrops, chooseFiles, download, Form, h } from "../core/dom";
+import { download, Form, h } from "../core/dom";
 import { ColoringPanel } from "./coloring";
 import markup from "./shape.html?raw";
 
@@ -15,7 +15,7 @@ export class ShapePanel extends ColoringPanel {
     const { form } = this;
     const can = app.state.capabilities;
     this.app = app;
-    const choose = async () => this.app.openFile((await chooseFiles(app.state.suffixes))[0]!);
+    const choose = async () => (await app.choose()).forEach((file) => app.openFile(file));
     form.on({
       open: choose,
       values: () => this.start(),
@@ -25,7 +25,7 @@ export class ShapePanel extends ColoringPanel {
     form.get("opening").hidden = !can.includes("open");
     if (can.includes("open")) {
       app.shortcut("O", "Open a file", choose);
-      acceptDrops(app.viewer.stage, (file) => this.app.openFile(file));
+      app.acceptDrops(app.main, (file) => app.openFile(file));
     }
     return form.root;
   }
