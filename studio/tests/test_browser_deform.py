@@ -147,6 +147,7 @@ def test_the_rings_turn_about_the_middle_of_the_rim(page, mesh, rig):
     handles = page.evaluate(f"{PANEL}.rowHandles()")
     assert abs(handles[0]["angle"]) == pytest.approx(0.5, abs=0.02)
     bent, moved = bend_by(mesh, rig, chosen, handles)
+    wait_until(page, "eigenshape.viewer.motion.blend.value === 1")  # the pointer rests
     page.evaluate("eigenshape.viewer.motion.blend.value = 0")
     np.testing.assert_allclose(positions(page), moved, atol=SHADER)
     page.mouse.up()

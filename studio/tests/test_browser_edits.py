@@ -136,6 +136,14 @@ def test_a_broken_file_of_edits_is_named(page, tmp_path):
     wait_until(page, f"{PANEL}.app.status.textContent.includes('edits.json is not a JSON file')")
 
 
+def test_a_file_that_is_too_large_is_not_read(page, path):
+    page.evaluate("eigenshape.state.most_bytes = 2 ** 10")
+    find(page, "tab-shape").click()
+    open_file(page, "open", path)
+    wait_until(page, f"{PANEL}.app.status.textContent.includes('the page takes 1 MB')")
+    assert page.evaluate("eigenshape.state.shape") == 0
+
+
 def test_the_pose_is_carried_to_a_file(page, mesh, rig, tmp_path):
     chosen = choose_above(page, HEAD)
     turn(page, 40)
@@ -243,6 +251,8 @@ def test_an_arrow_moves_the_region_along_its_axis(page, mesh, rig):
     (handle,) = page.evaluate(f"{PANEL}.rowHandles()")
     assert handle["vector"][1] > 0.1
     assert handle["vector"][0] == handle["vector"][2] == 0
+    # At rest the exact result replaces the motion by shares, which is what is compared here.
+    wait_until(page, "eigenshape.viewer.motion.blend.value === 1")
     page.evaluate("eigenshape.viewer.motion.blend.value = 0")
     binding = bind(rig, [chosen])
     motion = es.Translation(handle["vector"])
