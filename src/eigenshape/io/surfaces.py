@@ -11,10 +11,10 @@ from eigenshape.geometry.repairs.repair import repair, suggest_repairs
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.io.attributes import naming, open_file
 from eigenshape.io.formats import pcd
 from eigenshape.io.formats.registry import SHAPE_FORMATS
 from eigenshape.io.mesh_files import parse_file, require_finite, require_surface
-from eigenshape.io.sources import naming, open_file
 from eigenshape.scans.frames import triangulate_frame
 from eigenshape.scans.reconstruction import reconstruct_surface
 

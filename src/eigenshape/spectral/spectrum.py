@@ -1,4 +1,4 @@
-"""A spectrum and the proof that nothing is missing from it."""
+"""A spectrum, the proof that nothing is missing from it, and how fast its modes lose heat."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,9 +7,11 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arguments import require_type
+from eigenshape._arrays import ReadOnly, freeze, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
+from eigenshape._typing import ArrayLike
 from eigenshape.spectral.archive import read_archive, write_archive
 from eigenshape.spectral.certificate import Certificate
 
@@ -133,3 +135,25 @@ def require_lowest(spectrum: Spectrum, name: str) -> None:
             f"{name} must begin with the lowest eigenvalue; it begins with number "
             f"{spectrum.certificate.first}. Use solve_spectrum without above."
         )
+
+
+def exponential_decay(
+    eigenvalues: Float[np.ndarray, " k"], times: ArrayLike
+) -> Float[np.ndarray, "k q"]:
+    """Return exp(-t λ_i) for each eigenvalue and each time, without any check."""
+    return np.exp(-np.outer(eigenvalues, np.asarray(times)))
+
+
+def decay_factors(
+    spectrum: Spectrum, times: ArrayLike, name: str = "times"
+) -> Float[np.ndarray, "k q"]:
+    """Return exp(-t λ_i), the share of eigenfunction i that is left after each time t.
+
+    `name` is what messages call the times.
+
+    Raises an InvalidParameterError if a time is not positive and finite, or the spectrum does not
+    begin with the lowest eigenvalue.
+    """
+    require_type(spectrum, Spectrum, "spectrum")
+    require_lowest(spectrum, "spectrum")
+    return exponential_decay(spectrum.eigenvalues, positive_values(times, name))

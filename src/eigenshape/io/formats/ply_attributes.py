@@ -16,6 +16,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
+    SourceFile,
     WriteJob,
     corner_normals,
     plain_attributes,
@@ -34,7 +35,6 @@ from eigenshape.io.formats.ply import (
     read_lists,
     read_tables,
 )
-from eigenshape.io.sources import SourceFile
 
 IMAGE = re.compile(rb"(?m)^comment TextureFile[ \t]+(.+?)[ \t\r]*$")  # as MeshLab writes it
 TINTS = ("red", "green", "blue")

@@ -13,9 +13,8 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian, find_zero_row_sums, require_matrix
 from eigenshape.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
-from eigenshape.spectral.diffusion.decay import decay_factors
 from eigenshape.spectral.solver.pencil import Pencil, normalize
-from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.spectral.spectrum import Spectrum, decay_factors
 
 # Largest error by default, relative to the norm of the values: 25 to 30 solves for each factor.
 DEFAULT_ACCURACY = 1e-10

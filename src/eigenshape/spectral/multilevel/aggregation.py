@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape.sparse.largest import largest_ritz_value
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, smooth_columns
+from eigenshape.spectral.solver.chebyshev import largest_ritz_value
 
 LARGEST = 256  # most points in an aggregate, on average
 TOO_LITTLE = 1.5  # ratio of points between levels below which another level is not worth its cost
