@@ -8,11 +8,11 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, positive_values
+from eigenshape._arrays import ReadOnly, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
-from eigenshape.spectral.archive import read_archive, write_archive
+from eigenshape.spectral.archive import read_spectrum, write_spectrum
 from eigenshape.spectral.certificate import Certificate
 
 # An eigenvalue counts as 0 up to this share of the largest one, or up to this many times its own
@@ -86,12 +86,7 @@ class Spectrum(ReadOnly):
         OSError
             If the file cannot be written.
         """
-        arrays = {
-            "eigenvalues": self.eigenvalues,
-            "eigenvectors": self.eigenvectors,
-            "residuals": self.residuals,
-        }
-        write_archive(path, arrays, self.mass, self.certificate, key)
+        write_spectrum(path, vars(self), key)
 
     @classmethod
     def load(cls, path: str | Path, *, key: str | None = None) -> "Spectrum":
@@ -111,11 +106,7 @@ class Spectrum(ReadOnly):
             If the file is not a spectrum, is truncated, its parts do not fit together, its numbers
             are not finite, its eigenvalues are negative or not ascending, or its key differs.
         """
-        parts = read_archive(path, key)
-        arrays = {
-            name: freeze(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")
-        }
-        return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])
+        return cls(**read_spectrum(path, key))
 
 
 def count_zero_modes(spectrum: Spectrum) -> int:

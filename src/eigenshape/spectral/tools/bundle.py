@@ -1,10 +1,8 @@
 """Operators for learning: what DiffusionNet and its relatives take of a shape, computed once."""
 
 import hashlib
-import json
 import warnings
-import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -18,14 +16,14 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._arguments import describe_value, require_each, require_type
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import (
     FileFormatError,
     InvalidParameterError,
     InvalidShapeError,
     MissingExtraError,
 )
-from eigenshape._files import as_path, replacing, require_regular
+from eigenshape._files import as_path
 from eigenshape._progress import Callback, Progress
 from eigenshape._text import short_repr
 from eigenshape._typing import Integer
@@ -36,7 +34,12 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.catalog import build_laplacian
 from eigenshape.operators.laplacian import freeze_sparse
-from eigenshape.spectral.archive import require_uncompressed
+from eigenshape.spectral.archive import (
+    open_archive,
+    require_finite_floats,
+    take_arrays,
+    write_arrays,
+)
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.cache import require_writable
 from eigenshape.spectral.tools.vertex_gradient import (
@@ -49,6 +52,11 @@ from eigenshape.spectral.tools.vertex_gradient import (
 Form = Literal["scipy", "numpy", "torch"]
 Precision = Literal["single", "double"]
 Read = Callable[[Path], ShapeLike]
+# Version of the file format; a file of another version is refused.
+FORMAT = 1
+# What a file holds as arrays, and what as sparse matrices.
+DENSE = ("frames", "mass", "eigenvalues", "eigenvectors")
+SPARSE = ("stiffness", "gradient_x", "gradient_y")
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +184,7 @@ def operator_bundle(
         path = as_path(cache, "cache") / f"{_content_key(surface, count, name)}.npz"
         if path.exists():
             try:
-                return OperatorBundle(**read_bundle(path))
+                return OperatorBundle(**_read_bundle(path))
             except FileFormatError as error:
                 warnings.warn(
                     f"A bundle in the cache cannot be used and is computed again: {error}",
@@ -207,7 +215,8 @@ def operator_bundle(
     )
     if cache is not None:
         try:
-            write_bundle(path, vars(bundle))
+            fields = {name: getattr(bundle, name) for name in (*DENSE, *SPARSE)}
+            write_arrays(path, {"eigenshape_bundle": FORMAT}, fields)
         except OSError as error:
             warnings.warn(
                 f"A bundle was computed and could not be kept in the cache: {error}", stacklevel=2
@@ -390,68 +399,21 @@ def _convert(part: Any, form: Form) -> Any:
     return tensor.coalesce()
 
 
-# Version of the file format; a file of another version is refused.
-FORMAT = 1
-DENSE = ("frames", "mass", "eigenvalues", "eigenvectors")
-SPARSE = ("stiffness", "gradient_x", "gradient_y")
-PARTS = ("data", "indices", "indptr")
-
-
-def write_bundle(path: Path, fields: Mapping[str, Any]) -> None:
-    """Write the arrays of a bundle; the file is written completely or not at all."""
-    arrays = {name: fields[name] for name in DENSE}
-    for name in SPARSE:
-        arrays |= {f"{name}_{part}": getattr(fields[name], part) for part in PARTS}
-    head = np.array(json.dumps({"eigenshape_bundle": FORMAT}))
-    with replacing(path) as file:
-        np.savez(file, **{**arrays, "head": head})
-
-
-def read_bundle(path: Path) -> dict[str, Any]:
+def _read_bundle(path: Path) -> dict[str, Any]:
     """Read the arrays of a bundle.
 
     Raise FileFormatError if the file is not a bundle, is damaged or of another version, or its
     arrays do not fit together or are not finite.
     """
-    require_regular(path)
-    try:
-        with path.open("rb") as file:
-            require_uncompressed(path, file, "a bundle")
-            with np.load(file, allow_pickle=False) as archive:
-                _require_format(path, json.loads(str(archive["head"]))["eigenshape_bundle"])
-                fields: dict[str, Any] = {name: archive[name] for name in DENSE}
-                n = len(fields["mass"])
-                for name in SPARSE:
-                    parts = tuple(archive[f"{name}_{part}"] for part in PARTS)
-                    fields[name] = sp.csr_array(parts, shape=(n, n))
-                    fields[name].check_format()
-    except FileFormatError:
-        raise
-    except (KeyError, TypeError, ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
-        raise FileFormatError(
-            f"{path} must hold a bundle that eigenshape saved; {error}."
-        ) from error
-    k = fields["eigenvalues"].size
+    with open_archive(path, "bundle", FORMAT) as (_, archive):
+        n, k = len(archive["mass"]), archive["eigenvalues"].size
+        fields = take_arrays(archive, DENSE, SPARSE, n)
     shapes = {"frames": (n, 3, 3), "mass": (n,), "eigenvalues": (k,), "eigenvectors": (n, k)}
-    for name, part in fields.items():
-        numbers = part.data if name in SPARSE else part
-        if part.shape != shapes.get(name, (n, n)):
+    for name, shape in shapes.items():
+        if fields[name].shape != shape:
             raise FileFormatError(
-                f"{path} must hold arrays that fit together; {name} has shape {part.shape} for "
+                f"{path} must hold arrays that fit together; {name} has shape {fields[name].shape} for "
                 f"{n} points and {k} eigenvalues."
             )
-        if numbers.dtype != np.float64 or not np.isfinite(numbers).all():
-            raise FileFormatError(
-                f"{path} must hold finite float64 numbers as {name}; there are others."
-            )
-    return {
-        name: freeze(part) if name in DENSE else freeze_sparse(part)
-        for name, part in fields.items()
-    }
-
-
-def _require_format(path: Path, found: object) -> None:
-    if found != FORMAT:
-        raise FileFormatError(
-            f"{path} must hold a bundle in format {FORMAT}; it is in format {found!r}."
-        )
+    require_finite_floats(path, fields)
+    return fields
