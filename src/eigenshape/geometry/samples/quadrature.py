@@ -165,7 +165,18 @@ def shape_quadrature(shape: ShapeLike, *, n_neighbors: Integer | None = None) ->
     weights = np.empty(cloud.n_points)
     for first in range(0, cloud.n_points, POINTS_AT_ONCE):
         rows = slice(first, first + POINTS_AT_ONCE)
-        tangent = _tangent_coordinates(points, neighbors[rows], distances[rows], dim)
+        # Project the neighbors of each point onto its tangent space, nearest neighbor first.
+        near_ones, reach = neighbors[rows], distances[rows]
+        around = (points[near_ones[:, 1:]] - points[near_ones[:, :1]]) / reach[:, -1:, None]
+        centered = around - around.mean(axis=1, keepdims=True)
+        _, spreads, axes = np.linalg.svd(centered, full_matrices=False)
+        projected = around @ axes[:, :dim].transpose(0, 2, 1)
+        lengths = np.linalg.norm(projected, axis=2)
+        # A neighbor on the normal of its point has no direction in the plane; any direction is as good.
+        projected[lengths == 0, 0] = lengths[lengths == 0] = 1
+        projected[spreads[:, dim - 1] <= FLATTEST * spreads[:, 0]] = 0
+        # Projecting a curved neighborhood shrinks it, so each neighbor is put back at its distance.
+        tangent = projected * (reach[:, 1:] / lengths)[..., None]
         weights[rows] = _cell_volumes(tangent)
     flat = np.flatnonzero(~(weights > 0))
     if flat.size:
@@ -188,25 +199,6 @@ def require_different_points(
             f"Points must differ; points {equal[0]} and {other} are both "
             f"{cloud.points[equal[0]].tolist()} ({equal.size} such). {try_auto('cloud')}"
         )
-
-
-def _tangent_coordinates(
-    points: Float[np.ndarray, "n d"], neighbors: np.ndarray, distances: np.ndarray, dim: int
-) -> Float[np.ndarray, "r k m"]:
-    """Project the neighbors of each point onto its tangent space, nearest neighbor first.
-
-    Rows are zero where the neighbors do not span `dim` dimensions.
-    """
-    around = (points[neighbors[:, 1:]] - points[neighbors[:, :1]]) / distances[:, -1:, None]
-    centered = around - around.mean(axis=1, keepdims=True)
-    _, spreads, axes = np.linalg.svd(centered, full_matrices=False)
-    projected = around @ axes[:, :dim].transpose(0, 2, 1)
-    lengths = np.linalg.norm(projected, axis=2)
-    # A neighbor on the normal of its point has no direction in the plane; any direction is as good.
-    projected[lengths == 0, 0] = lengths[lengths == 0] = 1
-    projected[spreads[:, dim - 1] <= FLATTEST * spreads[:, 0]] = 0
-    # Projecting a curved neighborhood shrinks it, so each neighbor is put back at its distance.
-    return projected * (distances[:, 1:] / lengths)[..., None]
 
 
 def _cell_volumes(neighbors: Float[np.ndarray, "r k m"]) -> Float[np.ndarray, " r"]:
