@@ -7,7 +7,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.laplacian import Laplacian
 
 TETRAHEDRON = TriangleMesh(

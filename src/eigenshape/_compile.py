@@ -91,7 +91,16 @@ class _CompilationListener(event.Listener):  # type: ignore[misc]
         gc.disable()
         if not self.noticed:
             self.noticed = True
-            _print_notice()
+            # To a terminal, and only from the process that the user started
+            if (
+                multiprocessing.parent_process() is None
+                and sys.stderr is not None
+                and sys.stderr.isatty()
+            ):
+                sys.stderr.write(
+                    "eigenshape compiles its loops the first time that they run; this takes some seconds.\n"
+                )
+                sys.stderr.flush()
 
     def on_end(self, event: Any) -> None:
         """Let the garbage collector run again."""
@@ -104,15 +113,6 @@ class _CompilationListener(event.Listener):  # type: ignore[misc]
 
 def _is_ours(event: Any) -> bool:
     return event.data["dispatcher"] in _LOOPS
-
-
-def _print_notice() -> None:
-    """Print to a terminal that compilation takes some seconds; only in the process that the user started."""
-    if multiprocessing.parent_process() is None and sys.stderr is not None and sys.stderr.isatty():
-        sys.stderr.write(
-            "eigenshape compiles its loops the first time that they run; this takes some seconds.\n"
-        )
-        sys.stderr.flush()
 
 
 @cache

@@ -207,7 +207,10 @@ def start_pool(
     prepare : callable, optional
         Called in each new process before its first work. It must not raise.
     """
-    _require_main_guard()
+    # A worker that is still importing its script would start workers in turn; multiprocessing itself
+    # tells by this attribute. It ends without a message: the process that waits for it has the reason.
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise SystemExit(1)
     pool = ProcessPool(
         max_workers=count,
         initializer=_start_worker,
@@ -272,16 +275,6 @@ def _ctrl_c_held() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
         if interrupted.is_set():
             signal.raise_signal(signal.SIGINT)
-
-
-def _require_main_guard() -> None:
-    """End a worker that is still importing its script, and would start workers in turn.
-
-    It ends without a message: the process that waits for it reports the reason.
-    """
-    # multiprocessing itself tells by this attribute.
-    if getattr(multiprocessing.current_process(), "_inheriting", False):
-        raise SystemExit(1)
 
 
 def _require_started(first: "Future[Outcome[T]]") -> None:

@@ -8,7 +8,7 @@ from eigenshape.calculus.geodesic_rays import trace_geodesic
 from eigenshape.calculus.log_map import logarithmic_map
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.connection import tangent_frames
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.surfaces import grid, icosphere, torus

@@ -3,7 +3,7 @@ import pytest
 import scipy.sparse as sp
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.calculus.grounded import factorize_definite, factorize_grounded
+from eigenshape.calculus.linear_solver import factorize_definite, factorize_grounded
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import interval
 

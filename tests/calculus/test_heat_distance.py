@@ -10,7 +10,7 @@ from eigenshape.calculus.heat_distance import (
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.clouds.neighbors import neighbor_graph
 from eigenshape.shapes.domains import box, interval
 from eigenshape.shapes.spheres import fibonacci_sphere

@@ -8,7 +8,7 @@ from eigenshape.calculus.signed_heat import signed_heat_distance
 from eigenshape.calculus.vector_heat import prepare_vector_heat
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.resolution.subdivision import subdivide
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.shapes.surfaces import grid, torus
 
 

@@ -10,7 +10,7 @@ from eigenshape.calculus.vector_heat import (
 )
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.choices import require_choice
 from eigenshape.operators.connection import tangent_frames
 from eigenshape.shapes.surfaces import grid, icosphere, torus

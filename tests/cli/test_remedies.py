@@ -20,7 +20,7 @@ from eigenshape.cli import app
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.io.shape_files import write_points
 from eigenshape.io.surfaces import read_surface

@@ -8,7 +8,7 @@ from eigenshape.deformation.deform import bend, deform
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.shapes.surfaces import icosphere
 
 TOP, BOTTOM = (tube().vertices[:, 2] >= 4.5, tube().vertices[:, 2] <= 1.5)

@@ -21,8 +21,7 @@ from eigenshape.deformation.thesis import (
 from eigenshape.geometry.distances.crossings import self_intersections
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union, edge_table
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.surfaces import torus

@@ -11,7 +11,7 @@ from eigenshape.deformation.region import (
     require_boundary,
 )
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.shapes.surfaces import grid, icosphere
 
 GRID = grid(4, 4, width=4.0, height=4.0)  # vertex 5 x + y

@@ -7,7 +7,7 @@ from eigenshape.deformation.binding import bind
 from eigenshape.deformation.rig import eigen_skeleton, pose_rig, project_on_modes, rig_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.graph import graph_laplacian

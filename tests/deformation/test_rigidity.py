@@ -18,8 +18,7 @@ from eigenshape.deformation.rigidity import (
 )
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union, edge_table
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere
 

@@ -6,8 +6,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import non_manifold_vertices, submesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union, non_manifold_vertices, submesh
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

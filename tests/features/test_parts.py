@@ -16,8 +16,7 @@ from eigenshape.geometry.facets import facet_components, facet_table
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.resolution.subdivision import subdivide
-from eigenshape.geometry.topology import edge_table, face_pairs, submesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union, edge_table, face_pairs, submesh
 from eigenshape.operators.anisotropic import curvature_tensors
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.creatures import make_creature

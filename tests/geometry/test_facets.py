@@ -13,8 +13,7 @@ from eigenshape.geometry.facets import (
 )
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_vertices, edge_table
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import boundary_vertices, disjoint_union, edge_table
 from eigenshape.shapes.domains import ball, box, interval
 from eigenshape.shapes.surfaces import grid, icosphere
 

@@ -5,8 +5,7 @@ from broken_meshes import moebius
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.homology import betti_numbers
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import euler_characteristic
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union, euler_characteristic
 from eigenshape.shapes.domains import ball, box, disc, interval
 from eigenshape.shapes.surfaces import icosphere, torus
 

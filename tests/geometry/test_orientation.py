@@ -9,7 +9,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward, outward_vote
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_steps import orient
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.cotangent import mean_curvature
 from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.scans.partial import (

@@ -23,8 +23,8 @@ from eigenshape.geometry.distances.geodesic import average_geodesic_distance
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import REPAIRS, repair
 from eigenshape.geometry.requirements import require_joined
-from eigenshape.geometry.samples.cloud_measure import shape_quadrature
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.samples.quadrature import shape_quadrature
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.anisotropic import curvature_tensors
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -42,7 +42,7 @@ from eigenshape.scans.partial import partial_scan, viewpoint
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
-from eigenshape.spectral.comparison.shape_dna import shape_dna
+from eigenshape.spectral.comparison.eigenvalues import shape_dna
 from eigenshape.spectral.solve import solve_spectrum
 
 BALL = icosphere(2)

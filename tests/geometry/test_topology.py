@@ -8,6 +8,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import (
     boundary_edges,
     boundary_loops,
+    disjoint_union,
     edge_table,
     euler_characteristic,
     half_edges,
@@ -19,7 +20,6 @@ from eigenshape.geometry.topology import (
     unreferenced_vertices,
     vertex_components,
 )
-from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 

@@ -19,8 +19,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import drop_duplicate_faces
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_vertices
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import boundary_vertices, disjoint_union
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
 from eigenshape.operators.catalog import OPERATORS
 from eigenshape.operators.clouds.cloud_kernel import point_cloud_laplacian

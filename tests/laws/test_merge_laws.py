@@ -9,8 +9,7 @@ from scipy.sparse.csgraph import maximum_bipartite_matching
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import submesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union, submesh
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 seeds = st.integers(0, 2**32 - 1)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import enclosed_volume, face_areas, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

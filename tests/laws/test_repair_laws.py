@@ -22,8 +22,7 @@ from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair, suggest_repairs
 from eigenshape.geometry.requirements import require_describable, require_oriented, require_sound
-from eigenshape.geometry.topology import is_closed
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union, is_closed
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import binary_fill_holes
 
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import unreferenced_vertices
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union, unreferenced_vertices
 from eigenshape.scans.partial import cut_by_planes, partial_scan, random_planes, rotation_towards
 from eigenshape.scans.raster import rasterize
 from eigenshape.shapes.surfaces import grid, icosphere, torus

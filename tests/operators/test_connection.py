@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import surface_area, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import boundary_vertices
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import boundary_vertices, disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.connection import connection_laplacian, flatten_turns, tangent_frames
 from eigenshape.operators.cotangent import cotangent_laplacian

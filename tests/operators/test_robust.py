@@ -14,7 +14,7 @@ from eigenshape._errors import (
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import drop_duplicate_faces
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.plot import fields, shape_pairs, sheet
 from eigenshape.plot.camera import aim_camera, in_picture, three_quarter_view

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape.geometry.repairs.fragments import fragment_vertices
+from eigenshape.geometry.repairs.repair_steps import fragment_vertices
 from eigenshape.retrieval.patches.patches import surface_patches
 from eigenshape.scans.partial import views_of
 

@@ -4,8 +4,7 @@ import pytest
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import boundary_loops, vertex_components
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import boundary_loops, disjoint_union, vertex_components
 from eigenshape.scans.partial import (
     cut_by_planes,
     partial_scan,

@@ -5,8 +5,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import enclosed_volume, face_normals, surface_area
 from eigenshape.geometry.resolution.subdivision import subdivide
-from eigenshape.geometry.topology import boundary_loops, is_closed, is_manifold
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import boundary_loops, disjoint_union, is_closed, is_manifold
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 

@@ -12,7 +12,6 @@ from eigenshape.shapes.domains import box
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.sparse.elimination import analyze_pattern
 from eigenshape.sparse.front_loops import WIDE
-from eigenshape.sparse.sort_loops import sort_part
 from eigenshape.sparse.symmetric_factor import factorize_symmetric
 
 
@@ -75,14 +74,6 @@ def test_fronts_have_the_rows_of_their_definition_and_the_room_for_them(n, densi
         for rows, width in zip(expected, np.diff(e.first), strict=True)
     ]
     assert np.diff(e.places).tolist() == sizes
-
-
-@pytest.mark.parametrize("count", [0, 1, 2, 5, 40, 3000])
-def test_a_part_is_sorted_and_nothing_beside_it(count):
-    values = np.random.default_rng(count).permutation(count + 20)
-    expected = np.concatenate([values[:7], np.sort(values[7 : 7 + count]), values[7 + count :]])
-    sort_part(values, 7, 7 + count)
-    np.testing.assert_array_equal(values, expected)
 
 
 @pytest.mark.parametrize("mesh", [fibonacci_sphere(5000), box(9, 9, 9)])

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.solve import solve_spectrum

@@ -10,7 +10,7 @@ from eigenshape._arrays import ReadOnly, positive_values, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.grounded import (
+from eigenshape.calculus.linear_solver import (
     GroundedFactor,
     factorize_definite,
     factorize_grounded,

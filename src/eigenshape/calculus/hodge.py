@@ -12,7 +12,7 @@ from eigenshape._progress import Progress, silent
 from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.derivatives import sum_at_nodes
-from eigenshape.calculus.grounded import factorize_grounded
+from eigenshape.calculus.linear_solver import factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.homology import betti_numbers

@@ -7,8 +7,8 @@ from jaxtyping import Int
 from eigenshape._arrays import real_numbers, require_finite_rows
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.grounded import factorize_definite, factorize_grounded
 from eigenshape.calculus.hodge import HodgeDecomposition, Rim
+from eigenshape.calculus.linear_solver import factorize_definite, factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.homology import edges_of

@@ -15,12 +15,12 @@ from eigenshape._arrays import (
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.grounded import (
+from eigenshape.calculus.heat_distance import require_heat, require_sources
+from eigenshape.calculus.linear_solver import (
     GroundedFactor,
     factorize_definite,
     factorize_grounded,
 )
-from eigenshape.calculus.heat_distance import require_heat, require_sources
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import edge_lengths, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh

@@ -1,7 +1,6 @@
 """As-rigid-as-possible deformation: local fits of rotations and global solves, alternating."""
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -222,7 +221,14 @@ def relax(
             # Solved for displacements, so that vertices without rotation or pull do not move.
             solved = rest[free] + part.factor.solve(sums + force, scratch)
             steps.append((solved - tried, solved))
-            tried = _anderson_step(steps)
+            # The combination of solutions whose combined change is smallest (Anderson 1965)
+            changes = np.array([change.ravel() for change, _ in steps])
+            differences = changes[-1] - changes[:-1]
+            gram, right = differences @ differences.T, differences @ changes[-1]
+            shares, *_ = np.linalg.lstsq(gram, right, rcond=PARALLEL_CHANGES)
+            last = steps[-1][1]
+            pairs = zip(shares, steps, strict=False)
+            tried = last - sum((share * (last - old) for share, (_, old) in pairs), np.zeros(3))
     found[free] = solved
     return found
 
@@ -242,14 +248,3 @@ def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray,
     # A reflection becomes a rotation by a change of sign along the smallest singular value.
     left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
     return np.asarray(left @ right)
-
-
-def _anderson_step(steps: Sequence[Step]) -> Points:
-    """Return the combination of solutions whose combined change is smallest (Anderson 1965)."""
-    changes = np.array([change.ravel() for change, _ in steps])
-    differences = changes[-1] - changes[:-1]
-    gram, right = differences @ differences.T, differences @ changes[-1]
-    shares, *_ = np.linalg.lstsq(gram, right, rcond=PARALLEL_CHANGES)
-    last = steps[-1][1]
-    pairs = zip(shares, steps, strict=False)
-    return last - sum((share * (last - old) for share, (_, old) in pairs), np.zeros(3))

@@ -94,7 +94,20 @@ def transfer_deformation(
     target = as_mesh(target, "target")
     require_poses(before, after)
     if not isinstance(mapping, FunctionalMap):
-        mapping = _map_of_vertices(before, target, mapping)
+        # The functional map of 50 modes, or fewer on small meshes, of corresponding vertices
+        partners = whole_numbers(
+            real_numbers(mapping, "mapping"), "mapping", 0, before.n_vertices - 1
+        )
+        if len(partners) != target.n_vertices:
+            raise InvalidParameterError(
+                "mapping must be a FunctionalMap or hold a vertex of `before` for each vertex of the "
+                f"target; it has {len(partners)} for {target.n_vertices}."
+            )
+        n_shared = min(POSE_MODES, before.n_vertices // 2, target.n_vertices // 2)
+        source, other = (
+            solve_spectrum(cotangent_laplacian(mesh), n_shared) for mesh in (before, target)
+        )
+        mapping = map_from_points(source, other, partners, n_modes=n_shared)
     for mesh, spectrum, name in (
         (before, mapping.source, "source"),
         (target, mapping.target, "target"),
@@ -123,21 +136,6 @@ def transfer_deformation(
     size = np.sqrt(theirs.sum() / ours.sum())
     shift = size * stand @ (_center(after.vertices, ours) - _center(before.vertices, ours))
     return TriangleMesh(turned + shift, target.faces)
-
-
-def _map_of_vertices(
-    before: TriangleMesh, target: TriangleMesh, vertices: ArrayLike
-) -> FunctionalMap:
-    """Return the functional map of 50 modes, or fewer on small meshes, of corresponding vertices."""
-    places = whole_numbers(real_numbers(vertices, "mapping"), "mapping", 0, before.n_vertices - 1)
-    if len(places) != target.n_vertices:
-        raise InvalidParameterError(
-            "mapping must be a FunctionalMap or hold a vertex of `before` for each vertex of the "
-            f"target; it has {len(places)} for {target.n_vertices}."
-        )
-    k = min(POSE_MODES, before.n_vertices // 2, target.n_vertices // 2)
-    source, other = (solve_spectrum(cotangent_laplacian(mesh), k) for mesh in (before, target))
-    return map_from_points(source, other, places, n_modes=k)
 
 
 def _center(

@@ -17,7 +17,7 @@ from eigenshape.features.segmentation import Segmentation, segment
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_closed_outward
-from eigenshape.geometry.repairs.fragments import fragment_vertices
+from eigenshape.geometry.repairs.repair_steps import fragment_vertices
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors

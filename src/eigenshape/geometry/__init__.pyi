@@ -36,8 +36,8 @@ from .repairs.repair_report import RepairedMesh as RepairedMesh
 from .resolution.decimation import DecimatedMesh as DecimatedMesh
 from .resolution.decimation import decimate as decimate
 from .resolution.subdivision import subdivide as subdivide
-from .samples.cloud_measure import shape_quadrature as shape_quadrature
 from .samples.quadrature import Quadrature as Quadrature
+from .samples.quadrature import shape_quadrature as shape_quadrature
 from .samples.surface_points import SurfacePoints as SurfacePoints
 from .samples.surface_points import sample_surface as sample_surface
 from .simplices import dual_volumes as dual_volumes
@@ -49,9 +49,9 @@ from .topology import EdgeTable as EdgeTable
 from .topology import boundary_edges as boundary_edges
 from .topology import boundary_loops as boundary_loops
 from .topology import boundary_vertices as boundary_vertices
+from .topology import disjoint_union as disjoint_union
 from .topology import edge_table as edge_table
 from .topology import euler_characteristic as euler_characteristic
 from .topology import is_closed as is_closed
 from .topology import is_manifold as is_manifold
 from .topology import vertex_components as vertex_components
-from .union import disjoint_union as disjoint_union

@@ -196,7 +196,20 @@ def principal_curvatures(mesh: MeshLike) -> PrincipalCurvatures:
         rows = np.arange(start, min(start + VERTICES_AT_ONCE, mesh.n_vertices))
         near = (links[rows] @ links).tocsr()
         jets = _fit_jets(points, frames[rows], rows, near)
-        values[rows], directions[rows] = _shape_operator(jets, frames[rows])
+        # The shape operator of each graph, by its two fundamental forms
+        fu, fv, fuu, fuv, fvv = jets.T
+        metric = np.stack([1 + fu * fu, fu * fv, fu * fv, 1 + fv * fv], axis=1).reshape(-1, 2, 2)
+        # The sign makes a graph that bends away from its normal, as a sphere does, positive.
+        bending = -np.stack([fuu, fuv, fuv, fvv], axis=1).reshape(-1, 2, 2)
+        bending /= np.sqrt(1 + fu * fu + fv * fv)[:, None, None]
+        lower = np.linalg.inv(np.linalg.cholesky(metric))
+        curvatures, vectors = np.linalg.eigh(lower @ bending @ lower.transpose(0, 2, 1))
+        along = lower.transpose(0, 2, 1) @ vectors  # orthonormal in the first fundamental form
+        rise = np.einsum("ra,rac->rc", jets[:, :2], along)
+        in_frame = np.concatenate([along, rise[:, None]], axis=1)
+        axes = np.einsum("rac,rai->rci", in_frame, frames[rows])
+        # The larger curvature first
+        values[rows], directions[rows] = curvatures[:, ::-1], axes[:, ::-1]
     return PrincipalCurvatures(in_length(values, scale, -1), directions)
 
 
@@ -230,21 +243,3 @@ def _fit_jets(
     return np.concatenate(
         [fitted[:, 1:3], fitted[:, 3:6] * np.array([2.0, 1.0, 2.0]) * by_radius], axis=1
     )
-
-
-def _shape_operator(
-    jets: Float[np.ndarray, "r 5"], frames: Float[np.ndarray, "r 3 3"]
-) -> tuple[Float[np.ndarray, "r 2"], Float[np.ndarray, "r 2 3"]]:
-    """Return the eigenvalues of the shape operator of graphs, the larger first, and directions."""
-    fu, fv, fuu, fuv, fvv = jets.T
-    first = np.stack([1 + fu * fu, fu * fv, fu * fv, 1 + fv * fv], axis=1).reshape(-1, 2, 2)
-    # The sign makes a graph that bends away from its normal, as a sphere does, positive.
-    second = -np.stack([fuu, fuv, fuv, fvv], axis=1).reshape(-1, 2, 2)
-    second /= np.sqrt(1 + fu * fu + fv * fv)[:, None, None]
-    lower = np.linalg.inv(np.linalg.cholesky(first))
-    curvatures, vectors = np.linalg.eigh(lower @ second @ lower.transpose(0, 2, 1))
-    along = lower.transpose(0, 2, 1) @ vectors  # orthonormal in the first fundamental form
-    rise = np.einsum("ra,rac->rc", jets[:, :2], along)
-    in_frame = np.concatenate([along, rise[:, None]], axis=1)
-    directions = np.einsum("rac,rai->rci", in_frame, frames)
-    return curvatures[:, ::-1], directions[:, ::-1]

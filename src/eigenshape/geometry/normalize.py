@@ -3,7 +3,6 @@
 from typing import Literal, get_args
 
 import numpy as np
-from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import cdist
 
@@ -13,7 +12,6 @@ from eigenshape.geometry.measure import area_vectors, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
 
-Points = Float[np.ndarray, "n 3"]
 Measure = Literal["box", "area", "diameter"]
 
 
@@ -58,7 +56,19 @@ def normalize_mesh(mesh: MeshLike, measure: Measure) -> TriangleMesh:
         sound = np.delete(mesh.faces, degenerate_simplices(mesh), axis=0)
         size = float(np.linalg.norm(area_vectors(points[sound]), axis=1).sum()) ** 0.5
     elif measure == "diameter":
-        size = _diameter(points)
+        # The ends of a diameter are corners of the convex hull: of the space, of a plane, or of a line.
+        axes = np.linalg.svd(points, full_matrices=False)[2]
+        along = points @ axes[0]
+        corners = points[[np.argmin(along), np.argmax(along)]]
+        for dimension in (3, 2):
+            try:
+                corners = points[ConvexHull(points @ axes[:dimension].T).vertices]
+                break
+            except QhullError:  # flat or straight: no hull with volume, or with area
+                continue
+        # All points of a sphere lie on its hull, so distances are computed for a thousand at a time.
+        blocks = np.split(corners, range(1000, len(corners), 1000))
+        size = max(float(cdist(rows, corners).max()) for rows in blocks)
     else:
         raise InvalidParameterError(
             f"measure must be one of {', '.join(get_args(Measure))}; it is {measure!r}."
@@ -69,19 +79,3 @@ def normalize_mesh(mesh: MeshLike, measure: Measure) -> TriangleMesh:
             f"its {mesh.n_vertices} vertices give size {size}."
         )
     return TriangleMesh(points / size, mesh.faces)
-
-
-def _diameter(points: Points) -> float:
-    # The ends of a diameter are corners of the convex hull: of the space, of a plane, or of a line.
-    axes = np.linalg.svd(points, full_matrices=False)[2]
-    along = points @ axes[0]
-    corners = points[[np.argmin(along), np.argmax(along)]]
-    for dimension in (3, 2):
-        try:
-            corners = points[ConvexHull(points @ axes[:dimension].T).vertices]
-            break
-        except QhullError:  # flat or straight: no hull with volume, or with area
-            continue
-    # All points of a sphere lie on its hull, so distances are computed for a thousand at a time.
-    blocks = np.split(corners, range(1000, len(corners), 1000))
-    return max(float(cdist(rows, corners).max()) for rows in blocks)

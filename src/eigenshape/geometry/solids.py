@@ -1,7 +1,6 @@
 """Hexahedra, wedges and pyramids, split into tetrahedra whose faces match."""
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
@@ -75,8 +74,27 @@ def split_solids(points: ArrayLike, solids: ArrayLike) -> SimplicialMesh:
             f"Corners of solids must be indices of the {len(places)} points; solid {beyond[0]} is "
             f"{corners[beyond[0]].tolist()} ({beyond.size} such)."
         )
-    tetrahedra = _cut(corners.astype(np.int64))
-    volumes = _signed_volumes(size_one(places)[0], tetrahedra)
+    # Join the smallest corner of each solid to the triangles of the faces that it does not touch.
+    corners = corners.astype(np.int64)
+    n_corners = corners.shape[1]
+    lowest = corners.argmin(axis=1)
+    tetrahedra = np.empty((len(corners), N_TETRAHEDRA[n_corners], 4), dtype=np.int64)
+    for tip in range(n_corners):
+        rows = np.flatnonzero(lowest == tip)
+        some = corners[rows]
+        triangles = []
+        for face in FACES[n_corners]:
+            if tip in face:
+                continue
+            ring = some[:, face]
+            turn = ring.argmin(axis=1)[:, None] + np.arange(len(face))
+            ring = np.take_along_axis(ring, turn % len(face), axis=1)
+            triangles += [ring[:, [0, i, i + 1]] for i in range(1, len(face) - 1)]
+        tetrahedra[rows, :, 0] = some[:, [tip]]
+        tetrahedra[rows, :, 1:] = np.stack(triangles, axis=1)
+    # Volumes with a sign: positive where the corners turn as those of the formats do
+    tip, a, b, c = np.moveaxis(size_one(places)[0][tetrahedra], 2, 0)
+    volumes = np.einsum("ctd,ctd->ct", np.cross(b - a, c - a), a - tip) / 6
     if volumes.sum() < 0:  # all are mirrored
         volumes = -volumes
         tetrahedra = tetrahedra[:, :, [0, 2, 1, 3]]
@@ -89,31 +107,3 @@ def split_solids(points: ArrayLike, solids: ArrayLike) -> SimplicialMesh:
             "such). No repair mends that; leave it out, or mesh the solid anew."
         )
     return SimplicialMesh(places, tetrahedra.reshape(-1, 4))
-
-
-def _cut(solids: Int[np.ndarray, "c corners"]) -> Int[np.ndarray, "c t 4"]:
-    """Join the smallest corner of each solid to the triangles of the faces that it does not touch."""
-    n_corners = solids.shape[1]
-    lowest = solids.argmin(axis=1)
-    tetrahedra = np.empty((len(solids), N_TETRAHEDRA[n_corners], 4), dtype=np.int64)
-    for tip in range(n_corners):
-        rows = np.flatnonzero(lowest == tip)
-        some = solids[rows]
-        triangles = []
-        for face in FACES[n_corners]:
-            if tip in face:
-                continue
-            ring = some[:, face]
-            turn = ring.argmin(axis=1)[:, None] + np.arange(len(face))
-            ring = np.take_along_axis(ring, turn % len(face), axis=1)
-            triangles += [ring[:, [0, i, i + 1]] for i in range(1, len(face) - 1)]
-        tetrahedra[rows, :, 0] = some[:, [tip]]
-        tetrahedra[rows, :, 1:] = np.stack(triangles, axis=1)
-    return tetrahedra
-
-
-def _signed_volumes(
-    points: Float[np.ndarray, "n 3"], tetrahedra: Int[np.ndarray, "c t 4"]
-) -> Float[np.ndarray, "c t"]:
-    tip, a, b, c = np.moveaxis(points[tetrahedra], 2, 0)
-    return np.einsum("ctd,ctd->ct", np.cross(b - a, c - a), a - tip) / 6

@@ -1,4 +1,4 @@
-"""Connectivity of meshes: edges, boundaries, components, manifoldness and orientation."""
+"""Connectivity of meshes: edges, boundaries, components, manifoldness, parts and unions."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arrays import ReadOnly
-from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
 from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.facet_lists import label_components, shared_facets
@@ -432,3 +432,43 @@ def submesh(
     faces = mesh.faces[keep_faces]
     vertices, renumbered = np.unique(faces, return_inverse=True)
     return TriangleMesh(mesh.vertices[vertices], renumbered.reshape(-1, 3)), vertices
+
+
+def disjoint_union(*meshes: MeshLike) -> TriangleMesh:
+    """Combine meshes into one mesh, in which they are separate components.
+
+    Coordinates do not change, and no vertices are joined.
+
+    Parameters
+    ----------
+    *meshes : MeshLike
+        At least one mesh.
+
+    Returns
+    -------
+    TriangleMesh
+        The vertices and faces of the first mesh, then those of the second, and so on.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is no mesh.
+
+    See Also
+    --------
+    repair : "weld" joins vertices at the same place.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.geometry.disjoint_union(es.icosphere(0), es.shapes.grid(1, 1))
+    TriangleMesh(16 vertices, 22 faces)
+    """
+    if not meshes:
+        raise InvalidParameterError(
+            "disjoint_union must be given at least one mesh; it was given none."
+        )
+    parts = [as_mesh(mesh, f"meshes[{index}]") for index, mesh in enumerate(meshes)]
+    starts = np.cumsum([0, *(mesh.n_vertices for mesh in parts)])[:-1]
+    faces = [mesh.faces + start for mesh, start in zip(parts, starts, strict=True)]
+    return TriangleMesh(np.concatenate([mesh.vertices for mesh in parts]), np.concatenate(faces))

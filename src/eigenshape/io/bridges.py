@@ -142,7 +142,12 @@ def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
     kinds = np.asarray(grid.celltypes)
     starts = np.asarray(pyvista.convert_array(grid.GetCells().GetOffsetsArray()), dtype=np.int64)
     corners = np.asarray(grid.cell_connectivity, dtype=np.int64)
-    _require_simplices(kinds)
+    others = np.setdiff1d(kinds, [*POINTS, *LINES, *VTK_CELLS.values()])
+    if others.size:
+        count = np.count_nonzero(kinds == others[0])
+        raise InvalidShapeError(
+            f"Cells must be simplices; {count} are of VTK's type {others[0]}. Triangulate them first."
+        )
     for dim_of_cells in (3, 2):
         at = starts[:-1][kinds == VTK_CELLS[dim_of_cells]]
         if at.size:
@@ -150,24 +155,12 @@ def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
             return (
                 TriangleMesh(points, cells) if dim_of_cells == 2 else SimplicialMesh(points, cells)
             )
-    segments = _segments(kinds, np.diff(starts), corners)
-    return SimplicialMesh(points, segments) if segments.size else PointCloud(points, dim)
-
-
-def _segments(kinds: np.ndarray, sizes: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return the pairs of successive points of segments and polylines."""
+    # The pairs of successive points of segments and polylines
+    sizes = np.diff(starts)
     cell = np.repeat(np.arange(len(sizes)), sizes)
     chained = (cell[1:] == cell[:-1]) & np.isin(kinds, LINES)[cell[1:]]
-    return np.column_stack([corners[:-1][chained], corners[1:][chained]])
-
-
-def _require_simplices(kinds: np.ndarray) -> None:
-    others = np.setdiff1d(kinds, [*POINTS, *LINES, *VTK_CELLS.values()])
-    if others.size:
-        count = np.count_nonzero(kinds == others[0])
-        raise InvalidShapeError(
-            f"Cells must be simplices; {count} are of VTK's type {others[0]}. Triangulate them first."
-        )
+    segments = np.column_stack([corners[:-1][chained], corners[1:][chained]])
+    return SimplicialMesh(points, segments) if segments.size else PointCloud(points, dim)
 
 
 def to_pyvista(shape: ShapeLike) -> Any:

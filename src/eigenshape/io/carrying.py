@@ -62,7 +62,11 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
     old = attributes.mesh
     if np.array_equal(old.faces, mesh.faces) and np.array_equal(old.vertices, mesh.vertices):
         return attributes
-    places = _places(old, mesh)
+    # The numbers of the places where the corners of all faces lie, the old faces first. Adding 0.0
+    # makes -0.0 equal to 0.0.
+    both = np.concatenate([old.vertices, mesh.vertices]) + 0.0
+    numbers = np.unique(both, axis=0, return_inverse=True)[1].ravel()
+    places = numbers[np.concatenate([old.faces, mesh.faces + old.n_vertices])]
     starts, is_old = _nearest_faces(old, mesh, places)
     # A face at the places of an old one has its very values; corners of others lie on old faces.
     faces, weights = np.column_stack([starts] * 3), np.zeros((mesh.n_faces, 3, 3))
@@ -119,14 +123,6 @@ def interpolate(corners: csr_array, values: np.ndarray, *, blend: bool = True) -
         return values[corners.indices[order[ends - 1]]]
     found = corners @ values.astype(np.float64)
     return (np.rint(found) if values.dtype.kind in "iu" else found).astype(values.dtype)
-
-
-def _places(old: TriangleMesh, new: TriangleMesh) -> Int[np.ndarray, "g 3"]:
-    """Return the numbers of the places where the corners of all faces lie, the old faces first."""
-    # Adding 0.0 makes -0.0 equal to 0.0.
-    points = np.concatenate([old.vertices, new.vertices]) + 0.0
-    numbers = np.unique(points, axis=0, return_inverse=True)[1].ravel()
-    return numbers[np.concatenate([old.faces, new.faces + old.n_vertices])]
 
 
 def _nearest_faces(

@@ -13,9 +13,8 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.io.attributes import MeshAttributes, plain_attributes
+from eigenshape.io.attributes import MeshAttributes, SourceFile, naming, open_file, plain_attributes
 from eigenshape.io.formats.registry import FIELD_FORMATS, format_of, suffix_of
-from eigenshape.io.sources import SourceFile, naming, open_file
 
 WRITABLE = ("f8", "f4", "i8", "i4", "u1")  # numpy's types of fields that are written as they are
 Fields = dict[str, np.ndarray]

@@ -89,7 +89,16 @@ def find_items(
             f"There must be meshes or points ({', '.join(SHAPE_FORMATS)}) to index; "
             f"{', '.join(map(str, folders)) or 'an empty list'} holds none."
         )
-    items = _different_items(items)
+    # A file that is given twice counts once.
+    by_name: dict[str, Item] = {}
+    for item in items:
+        other = by_name.setdefault(item.name, item)
+        if other.path != item.path:
+            raise InvalidParameterError(
+                f"Names of shapes must differ; {item.name!r} is the name of both {other.path} and "
+                f"{item.path}. Give one folder that holds both."
+            )
+    items = list(by_name.values())
     if labels is not None:
         items = _labeled(items, Path(labels))
     return items if part is None else _part_of(items, *part)
@@ -131,19 +140,6 @@ def _files_below(folder: Path) -> Iterator[Path]:
             folders.sort()
             waiting += [here / name for name in folders if (here / name).is_symlink()]
             yield from (here / name for name in files)
-
-
-def _different_items(items: Sequence[Item]) -> list[Item]:
-    """Drop files that are given twice; raise an error if two files would have one name."""
-    by_name: dict[str, Item] = {}
-    for item in items:
-        other = by_name.setdefault(item.name, item)
-        if other.path != item.path:
-            raise InvalidParameterError(
-                f"Names of shapes must differ; {item.name!r} is the name of both {other.path} and "
-                f"{item.path}. Give one folder that holds both."
-            )
-    return list(by_name.values())
 
 
 def _part_of(items: Sequence[Item], part: Integer, n_parts: Integer) -> list[Item]:

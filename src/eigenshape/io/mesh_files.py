@@ -15,8 +15,11 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import PLURALS, count_nouns
 from eigenshape.io.attributes import (
     MeshAttributes,
+    SourceFile,
     WriteJob,
     label_attributes,
+    naming,
+    open_file,
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
@@ -31,7 +34,6 @@ from eigenshape.io.formats.registry import (
     suffix_of,
     suffixes_with,
 )
-from eigenshape.io.sources import SourceFile, naming, open_file
 
 KINDS = {2: SEGMENTS, 3: "triangles"}  # of cells, by their number of corners
 

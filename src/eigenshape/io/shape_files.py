@@ -9,10 +9,10 @@ from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.io.attributes import naming, open_file
 from eigenshape.io.formats.cells import require_kind
 from eigenshape.io.formats.registry import SHAPE_FORMATS, WRITTEN_CLOUDS, CellKind, format_of
 from eigenshape.io.mesh_files import parse_file, require_finite
-from eigenshape.io.sources import naming, open_file
 
 
 def read_shape(

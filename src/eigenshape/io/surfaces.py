@@ -11,10 +11,10 @@ from eigenshape.geometry.repairs.repair import repair, suggest_repairs
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.io.attributes import naming, open_file
 from eigenshape.io.formats import pcd
 from eigenshape.io.formats.registry import SHAPE_FORMATS
 from eigenshape.io.mesh_files import parse_file, require_finite, require_surface
-from eigenshape.io.sources import naming, open_file
 from eigenshape.scans.frames import triangulate_frame
 from eigenshape.scans.reconstruction import reconstruct_surface
 
@@ -70,36 +70,28 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
     with naming(source.path):
         points, simplices = parse_file(source, None)
         if len(simplices):
-            return _surface_of_cells(points, simplices)
+            points, simplices, kept, report = require_finite(points, simplices, drop_missing=True)
+            if simplices.shape[1] == 4:
+                solid = SimplicialMesh(points, simplices)
+                surface = boundary_surface(solid)
+                taken = (
+                    f"boundary_surface took the {surface.n_faces:,} triangles around "
+                    f"{solid.n_simplices:,} tetrahedra"
+                )
+                return RepairedMesh(surface, (*report, taken), kept[boundary_vertices(solid)])
+            if simplices.shape[1] == 3 and points.shape[1] == 2:
+                points = np.column_stack([points, np.zeros(len(points))])
+                report = (*report, "a mesh in the plane was taken at z = 0")
+            require_surface(points, simplices)
+            return RepairedMesh(TriangleMesh(points, simplices), report, kept)
         n_rows = pcd.n_rows(source.data) if source.suffix == ".pcd" else 1
         if n_rows > 1:
             return triangulate_frame(points.reshape(n_rows, -1, 3))
-        return _surface_of_cloud(points)
-
-
-def _surface_of_cells(points: np.ndarray, simplices: np.ndarray) -> RepairedMesh[TriangleMesh]:
-    points, simplices, kept, report = require_finite(points, simplices, drop_missing=True)
-    if simplices.shape[1] == 4:
-        solid = SimplicialMesh(points, simplices)
-        surface = boundary_surface(solid)
-        taken = (
-            f"boundary_surface took the {surface.n_faces:,} triangles around "
-            f"{solid.n_simplices:,} tetrahedra"
+        points, _, finite, lost = require_finite(
+            points, np.empty((0, 3), dtype=np.int64), drop_missing=True
         )
-        return RepairedMesh(surface, (*report, taken), kept[boundary_vertices(solid)])
-    if simplices.shape[1] == 3 and points.shape[1] == 2:
-        points = np.column_stack([points, np.zeros(len(points))])
-        report = (*report, "a mesh in the plane was taken at z = 0")
-    require_surface(points, simplices)
-    return RepairedMesh(TriangleMesh(points, simplices), report, kept)
-
-
-def _surface_of_cloud(points: np.ndarray) -> RepairedMesh[TriangleMesh]:
-    points, _, finite, lost = require_finite(
-        points, np.empty((0, 3), dtype=np.int64), drop_missing=True
-    )
-    cloud = PointCloud(points)
-    different = repair(cloud, suggest_repairs(cloud))
-    made = reconstruct_surface(different.cloud)
-    source = finite[different.source_points[made.source_vertices]]
-    return RepairedMesh(made.mesh, (*lost, *different.report, *made.report), source)
+        cloud = PointCloud(points)
+        different = repair(cloud, suggest_repairs(cloud))
+        made = reconstruct_surface(different.cloud)
+        sources = finite[different.source_points[made.source_vertices]]
+        return RepairedMesh(made.mesh, (*lost, *different.report, *made.report), sources)

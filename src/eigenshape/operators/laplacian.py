@@ -16,7 +16,16 @@ from eigenshape._arrays import ReadOnly, as_array
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
-from eigenshape.sparse.frozen import freeze_sparse
+
+
+def freeze_sparse(matrix: sp.csr_array) -> sp.csr_array:
+    """Return a copy with sorted indices whose arrays are read-only."""
+    copy = matrix.copy()
+    copy.sum_duplicates()  # sorts, too: SciPy would do so later in place, where it no longer can
+    for part in (copy.data, copy.indices, copy.indptr):
+        part.flags.writeable = False
+    return copy
+
 
 # Largest difference of W_ij and W_ji, relative to the largest entry, that is accepted as rounding.
 ASYMMETRY = 1e-12

@@ -210,7 +210,24 @@ def upward_direction(mesh: TriangleMesh, up: Up) -> Float[np.ndarray, "3"]:
     Raise InvalidParameterError if `up` is neither a name nor a direction.
     """
     if isinstance(up, str) and up == "auto":
-        up = _upright_axis(mesh)
+        points = scale_to_unit(mesh)[0]
+        areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
+        weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
+        points = points - weights @ points[mesh.faces].mean(axis=1)
+        stands, sizes = [], []
+        for axis in (1, 2):
+            # Where the lowest points would touch the ground
+            height = points[:, axis] - points[:, axis].min()
+            lowest = height <= SOLE * np.ptp(points, axis=0).max()
+            base = np.delete(points, axis, axis=1)[lowest]
+            # What stands on points around its center does not fall over.
+            around = np.sort(np.arctan2(base[:, 1], base[:, 0]))
+            stands.append(np.diff(around, append=around[0] + 2 * np.pi).max() < np.pi)
+            try:
+                sizes.append(float(ConvexHull(base).volume))
+            except QhullError:  # fewer than three points, or all on a line
+                sizes.append(0.0)
+        up = "z" if stands[1] and not stands[0] and sizes[1] > WIDER * sizes[0] else "y"
     return _direction(up, "up", UP_NAMES)
 
 
@@ -289,28 +306,6 @@ def _guess_front(
     viewers = np.stack([towards, behind])
     before, after = bending @ np.maximum((one + two) @ viewers.T, 0)
     return (-front, behind) if before < LESS * after else (front, towards)
-
-
-def _upright_axis(mesh: TriangleMesh) -> Literal["y", "z"]:
-    """Return z if a shape would fall over along y and would stand on a much larger base along z."""
-    points = scale_to_unit(mesh)[0]
-    areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
-    weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
-    points = points - weights @ points[mesh.faces].mean(axis=1)
-    stands, sizes = [], []
-    for axis in (1, 2):
-        # Where the lowest points would touch the ground
-        height = points[:, axis] - points[:, axis].min()
-        lowest = height <= SOLE * np.ptp(points, axis=0).max()
-        base = np.delete(points, axis, axis=1)[lowest]
-        # What stands on points around its center does not fall over.
-        around = np.sort(np.arctan2(base[:, 1], base[:, 0]))
-        stands.append(np.diff(around, append=around[0] + 2 * np.pi).max() < np.pi)
-        try:
-            sizes.append(float(ConvexHull(base).volume))
-        except QhullError:  # fewer than three points, or all on a line
-            sizes.append(0.0)
-    return "z" if stands[1] and not stands[0] and sizes[1] > WIDER * sizes[0] else "y"
 
 
 def in_picture(mesh: TriangleMesh, camera: Camera) -> Float[np.ndarray, "n 3"]:

@@ -4,8 +4,6 @@ In a compiled loop np.dot copies arrays that are not contiguous, and subtracting
 another pass.
 """
 
-from typing import Any
-
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -27,19 +25,19 @@ def addresses() -> tuple[int, int]:
 
 @intrinsic
 def subtract_product(
-    context: Any,
-    address: Any,
-    size: Any,
-    left: Any,
-    left_at: Any,
-    left_wide: Any,
-    right: Any,
-    right_at: Any,
-    right_wide: Any,
-    taken: Any,
-    taken_at: Any,
-    taken_wide: Any,
-) -> Any:
+    context,
+    address,
+    size,
+    left,
+    left_at,
+    left_wide,
+    right,
+    right_at,
+    right_wide,
+    taken,
+    taken_at,
+    taken_wide,
+):
     """Subtract A Bᵀ from C, where all three are parts of matrices in C order.
 
     A part is given by the flat index of its first entry, and by the number of entries from one row
@@ -49,7 +47,7 @@ def subtract_product(
     parts = left, whole, whole, right, whole, whole, taken, whole, whole
     signature = types.void(whole, size, *parts)
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context, builder, signature, arguments):
         address, size = arguments[:2]
         rows, columns, terms = (
             _store_whole(builder, builder.extract_value(size, i)) for i in range(3)
@@ -67,16 +65,16 @@ def subtract_product(
 
 @intrinsic
 def solve_triangle(
-    context: Any,
-    address: Any,
-    size: Any,
-    triangle: Any,
-    triangle_at: Any,
-    triangle_wide: Any,
-    right: Any,
-    right_at: Any,
-    right_wide: Any,
-) -> Any:
+    context,
+    address,
+    size,
+    triangle,
+    triangle_at,
+    triangle_wide,
+    right,
+    right_at,
+    right_wide,
+):
     """Replace X by X L⁻ᵀ, where L is unit lower triangular and both are parts of matrices.
 
     Parts are given as in `subtract_product`; size = (rows of X, columns).
@@ -84,7 +82,7 @@ def solve_triangle(
     whole = types.int64
     signature = types.void(whole, size, triangle, whole, whole, right, whole, whole)
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context, builder, signature, arguments):
         address, size = arguments[:2]
         rows, columns = (_store_whole(builder, builder.extract_value(size, i)) for i in range(2))
         triangle, right = (_part(context, builder, signature, arguments, i) for i in (2, 5))
@@ -96,24 +94,24 @@ def solve_triangle(
     return signature, generate
 
 
-def _store_whole(builder: Any, number: Any) -> Any:
+def _store_whole(builder, number):
     return cgutils.alloca_once_value(builder, builder.trunc(number, WHOLE))
 
 
-def _store_real(builder: Any, value: float) -> Any:
+def _store_real(builder, value):
     return cgutils.alloca_once_value(builder, ir.Constant(REAL, value))
 
 
-def _letter(builder: Any, letter: str) -> Any:
+def _letter(builder, letter):
     return cgutils.alloca_once_value(builder, ir.Constant(CHARACTER, ord(letter)))
 
 
-def _part(context: Any, builder: Any, signature: Any, arguments: Any, i: int) -> tuple[Any, Any]:
+def _part(context, builder, signature, arguments, i):
     """Return the address of a part, and the number of entries from one row to the next."""
     array = context.make_array(signature.args[i])(context, builder, arguments[i])
     return builder.gep(array.data, [arguments[i + 1]]), _store_whole(builder, arguments[i + 2])
 
 
-def _call(builder: Any, address: Any, given: list[Any]) -> None:
+def _call(builder, address, given):
     kind = ir.FunctionType(ir.VoidType(), [pointer.type for pointer in given])
     builder.call(builder.inttoptr(address, kind.as_pointer()), given)

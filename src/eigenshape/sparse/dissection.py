@@ -147,7 +147,13 @@ class _Dissection:
         low, high = key[points].min(), key[points].max()
         counts = np.zeros((3, high - low + 2), dtype=np.int64)
         n_joined = count_cuts(*graph, points, owner, name, key, low, *counts)
-        cut_at, above = _cheapest_cut(counts.cumsum(axis=1))
+        # The cheapest cut: the points on it, over those on its smaller side
+        sums = counts.cumsum(axis=1)
+        smaller = np.minimum(sums[0], sums[0, -1] - sums[0])
+        costs = np.full((len(smaller), 2), np.inf)
+        np.divide(sums[1:].T + 1, smaller[:, None], out=costs, where=smaller[:, None] > 0)
+        cut_at, from_below = divmod(int(costs.argmin()), 2)
+        above = not from_below
         side = np.empty(size, dtype=np.int8)
         take_sides(*graph, points, owner, name, key, low + cut_at, above, side)
         n_first, _, n_cut = np.bincount(side, minlength=3).tolist()
@@ -186,17 +192,3 @@ def _find_pieces(
             total += found
             ends.append(total)
     return ends
-
-
-def _cheapest_cut(counts: Int[np.ndarray, "3 v"]) -> tuple[int, bool]:
-    """Return the value of the cheapest cut, and whether the cut is taken from above.
-
-    A cut separates key < value from key ≥ value. For each value, `counts` has the number of points
-    below it, on the cut from above, and on the cut from below. The cheapest cut has the fewest
-    points relative to its smaller side.
-    """
-    smaller = np.minimum(counts[0], counts[0, -1] - counts[0])
-    costs = np.full((len(smaller), 2), np.inf)
-    np.divide(counts[1:].T + 1, smaller[:, None], out=costs, where=smaller[:, None] > 0)
-    value, from_below = divmod(int(costs.argmin()), 2)
-    return value, not from_below

@@ -4,8 +4,6 @@ The compiler would use eight scalars, so the vector instructions are written out
 the vectors into the sizes of the machine.
 """
 
-from typing import Any
-
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -20,7 +18,7 @@ VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 AHEAD = 32
 
 
-def _summation(n_targets: int, change: str, *, kept: bool = True, ahead: int = 0) -> Any:
+def _summation(n_targets: int, change: str, *, kept: bool = True, ahead: int = 0):
     """Return the intrinsic that changes `n_targets` rows at once by sums: "fadd" or "fsub".
 
     Rows that are not kept count as 0. More rows use the multipliers better, as long as all fit into
@@ -29,17 +27,17 @@ def _summation(n_targets: int, change: str, *, kept: bool = True, ahead: int = 0
 
     @intrinsic
     def summation(
-        context: Any,
-        shares: Any,
-        at: Any,
-        stride: Any,
-        apart: Any,
-        given: Any,
-        start: Any,
-        count: Any,
-        taken: Any,
-        to: Any,
-    ) -> Any:
+        context,
+        shares,
+        at,
+        stride,
+        apart,
+        given,
+        start,
+        count,
+        taken,
+        to,
+    ):
         """Change each target row q by a weighted sum of rows.
 
         To taken[to + q] goes Σ_t shares[at + t stride + q apart] given[start + t].
@@ -47,7 +45,7 @@ def _summation(n_targets: int, change: str, *, kept: bool = True, ahead: int = 0
         whole = types.int64
         signature = types.void(shares, whole, whole, whole, given, whole, whole, taken, whole)
 
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        def generate(context, builder, signature, arguments):
             arrays = [
                 context.make_array(signature.args[place])(context, builder, arguments[place]).data
                 for place in (0, 4, 7)
@@ -82,15 +80,15 @@ def _summation(n_targets: int, change: str, *, kept: bool = True, ahead: int = 0
     return summation
 
 
-def _pointer(builder: Any, data: Any, offset: Any) -> Any:
+def _pointer(builder, data, offset):
     return builder.bitcast(builder.gep(data, [offset]), VECTOR.as_pointer())
 
 
-def _load(builder: Any, data: Any, offset: Any) -> Any:
+def _load(builder, data, offset):
     return builder.load(_pointer(builder, data, offset), align=8)
 
 
-def _fetch(builder: Any, data: Any, offset: Any) -> None:
+def _fetch(builder, data, offset):
     byte, flag = ir.IntType(8).as_pointer(), ir.IntType(32)
     kind = ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag])
     fetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
@@ -99,14 +97,14 @@ def _fetch(builder: Any, data: Any, offset: Any) -> None:
     builder.call(fetch, [builder.bitcast(builder.gep(data, [offset]), byte), *flags])
 
 
-def _repeat_scalar(builder: Any, scalar: Any) -> Any:
+def _repeat_scalar(builder, scalar):
     zero = ir.Constant(ir.IntType(32), 0)
     one = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), scalar, zero)
     mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), None)
     return builder.shuffle_vector(one, ir.Constant(VECTOR, ir.Undefined), mask)
 
 
-def _multiply_add(builder: Any, a: Any, b: Any, c: Any) -> Any:
+def _multiply_add(builder, a, b, c):
     return builder.fadd(builder.fmul(a, b, flags=["contract"]), c, flags=["contract"])
 
 
@@ -119,15 +117,15 @@ add_eight_sums = _summation(8, "fadd", ahead=AHEAD)
 
 @intrinsic
 def write_row_product(
-    context: Any,
-    entries: Any,
-    indices: Any,
-    start: Any,
-    stop: Any,
-    given: Any,
-    taken: Any,
-    to: Any,
-) -> Any:
+    context,
+    entries,
+    indices,
+    start,
+    stop,
+    given,
+    taken,
+    to,
+):
     """Write Σ entries[p] given[indices[p]] for p from start to stop - 1 to row `to` of `taken`.
 
     Even and odd terms are summed separately, so that an addition need not wait for the one before.
@@ -135,7 +133,7 @@ def write_row_product(
     whole = types.int64
     signature = types.void(entries, indices, whole, whole, given, taken, whole)
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context, builder, signature, arguments):
         entries, indices, given, taken = (
             context.make_array(signature.args[place])(context, builder, arguments[place]).data
             for place in (0, 1, 4, 5)
@@ -146,7 +144,7 @@ def write_row_product(
             cgutils.alloca_once_value(builder, ir.Constant(VECTOR, None)) for _ in range(2)
         )
 
-        def add_term(place: Any, total: Any) -> None:
+        def add_term(place, total):
             index = builder.load(builder.gep(indices, [place]))
             index = builder.sext(index, start.type)
             row = _load(builder, given, builder.mul(index, eight))
@@ -169,28 +167,28 @@ def write_row_product(
 
 
 @intrinsic
-def fetch_row(context: Any, rows: Any, at: Any) -> Any:
+def fetch_row(context, rows, at):
     """Ask memory for row `at` of `rows`, which may lie beyond the end."""
     return _row_action(rows, _fetch)
 
 
 @intrinsic
-def copy_row(context: Any, given: Any, start: Any, taken: Any, to: Any) -> Any:
+def copy_row(context, given, start, taken, to):
     """Copy row `start` of `given` to row `to` of `taken`."""
     return _row_change(given, taken, lambda builder, row, old: row)
 
 
 @intrinsic
-def add_row(context: Any, given: Any, start: Any, taken: Any, to: Any) -> Any:
+def add_row(context, given, start, taken, to):
     """Add row `start` of `given` to row `to` of `taken`."""
     return _row_change(given, taken, lambda builder, row, old: builder.fadd(old, row))
 
 
 @intrinsic
-def clear_row(context: Any, rows: Any, at: Any) -> Any:
+def clear_row(context, rows, at):
     """Set row `at` of `rows` to zero."""
 
-    def clear(builder: Any, data: Any, offset: Any) -> None:
+    def clear(builder, data, offset):
         zeros = ir.Constant(VECTOR, None)
         builder.store(zeros, _pointer(builder, data, offset), align=8)
 
@@ -198,10 +196,10 @@ def clear_row(context: Any, rows: Any, at: Any) -> Any:
 
 
 @intrinsic
-def divide_row(context: Any, rows: Any, at: Any, divisor: Any) -> Any:
+def divide_row(context, rows, at, divisor):
     """Divide row `at` of `rows` by a number that is not 0."""
 
-    def divide(builder: Any, data: Any, offset: Any, divisor: Any) -> None:
+    def divide(builder, data, offset, divisor):
         pointer = _pointer(builder, data, offset)
         row, divisors = builder.load(pointer, align=8), _repeat_scalar(builder, divisor)
         builder.store(builder.fdiv(row, divisors), pointer, align=8)
@@ -209,11 +207,11 @@ def divide_row(context: Any, rows: Any, at: Any, divisor: Any) -> Any:
     return _row_action(rows, divide, types.float64)
 
 
-def _row_action(rows: Any, act: Any, *kinds: Any) -> Any:
+def _row_action(rows, act, *kinds):
     """Return the intrinsic that does something to one row, given further numbers of some kinds."""
     signature = types.void(rows, types.int64, *kinds)
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context, builder, signature, arguments):
         rows, at, *numbers = arguments
         data = context.make_array(signature.args[0])(context, builder, rows).data
         act(builder, data, builder.mul(at, ir.Constant(at.type, LANES)), *numbers)
@@ -222,11 +220,11 @@ def _row_action(rows: Any, act: Any, *kinds: Any) -> Any:
     return signature, generate
 
 
-def _row_change(given: Any, taken: Any, change: Any) -> Any:
+def _row_change(given, taken, change):
     whole = types.int64
     signature = types.void(given, whole, taken, whole)
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context, builder, signature, arguments):
         eight = ir.Constant(arguments[1].type, LANES)
         given, taken = (
             _pointer(

@@ -7,7 +7,7 @@ from .comparison.eigenspaces import eigenspace_errors as eigenspace_errors
 from .comparison.eigenspaces import separated_groups as separated_groups
 from .comparison.eigenvalues import SpectrumComparison as SpectrumComparison
 from .comparison.eigenvalues import compare_spectra as compare_spectra
-from .comparison.shape_dna import shape_dna as shape_dna
+from .comparison.eigenvalues import shape_dna as shape_dna
 from .diffusion.heat_flow import apply_heat as apply_heat
 from .diffusion.heat_kernel import HeatTrace as HeatTrace
 from .diffusion.heat_kernel import heat_kernel as heat_kernel
@@ -53,13 +53,13 @@ from .tools.embedding import spectral_embedding as spectral_embedding
 from .tools.estimators import SpectralClusterer as SpectralClusterer
 from .tools.estimators import SpectralEmbedder as SpectralEmbedder
 from .tools.filters import filter_values as filter_values
+from .tools.filters import project as project
+from .tools.filters import reconstruct as reconstruct
 from .tools.filters import smooth_mesh as smooth_mesh
 from .tools.nodal import NodalDomains as NodalDomains
 from .tools.nodal import courant_bounds as courant_bounds
 from .tools.nodal import nodal_domains as nodal_domains
 from .tools.nodal import nodal_set as nodal_set
-from .tools.projection import project as project
-from .tools.projection import reconstruct as reconstruct
 from .tools.watermark import WatermarkTest as WatermarkTest
 from .tools.watermark import detect_watermark as detect_watermark
 from .tools.watermark import embed_watermark as embed_watermark

@@ -1,4 +1,4 @@
-"""A spectrum and the proof that nothing is missing from it."""
+"""A spectrum, the proof that nothing is missing from it, and how fast its modes lose heat."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,10 +7,12 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arguments import require_type
+from eigenshape._arrays import ReadOnly, positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import short_repr
-from eigenshape.spectral.archive import read_archive, write_archive
+from eigenshape._typing import ArrayLike
+from eigenshape.spectral.archive import read_spectrum, write_spectrum
 from eigenshape.spectral.certificate import Certificate
 
 # An eigenvalue counts as 0 up to this share of the largest one, or up to this many times its own
@@ -84,12 +86,7 @@ class Spectrum(ReadOnly):
         OSError
             If the file cannot be written.
         """
-        arrays = {
-            "eigenvalues": self.eigenvalues,
-            "eigenvectors": self.eigenvectors,
-            "residuals": self.residuals,
-        }
-        write_archive(path, arrays, self.mass, self.certificate, key)
+        write_spectrum(path, vars(self), key)
 
     @classmethod
     def load(cls, path: str | Path, *, key: str | None = None) -> "Spectrum":
@@ -109,11 +106,7 @@ class Spectrum(ReadOnly):
             If the file is not a spectrum, is truncated, its parts do not fit together, its numbers
             are not finite, its eigenvalues are negative or not ascending, or its key differs.
         """
-        parts = read_archive(path, key)
-        arrays = {
-            name: freeze(parts[name]) for name in ("eigenvalues", "eigenvectors", "residuals")
-        }
-        return cls(**arrays, mass=parts["mass"], certificate=parts["certificate"])
+        return cls(**read_spectrum(path, key))
 
 
 def count_zero_modes(spectrum: Spectrum) -> int:
@@ -133,3 +126,25 @@ def require_lowest(spectrum: Spectrum, name: str) -> None:
             f"{name} must begin with the lowest eigenvalue; it begins with number "
             f"{spectrum.certificate.first}. Use solve_spectrum without above."
         )
+
+
+def exponential_decay(
+    eigenvalues: Float[np.ndarray, " k"], times: ArrayLike
+) -> Float[np.ndarray, "k q"]:
+    """Return exp(-t λ_i) for each eigenvalue and each time, without any check."""
+    return np.exp(-np.outer(eigenvalues, np.asarray(times)))
+
+
+def decay_factors(
+    spectrum: Spectrum, times: ArrayLike, name: str = "times"
+) -> Float[np.ndarray, "k q"]:
+    """Return exp(-t λ_i), the share of eigenfunction i that is left after each time t.
+
+    `name` is what messages call the times.
+
+    Raises an InvalidParameterError if a time is not positive and finite, or the spectrum does not
+    begin with the lowest eigenvalue.
+    """
+    require_type(spectrum, Spectrum, "spectrum")
+    require_lowest(spectrum, "spectrum")
+    return exponential_decay(spectrum.eigenvalues, positive_values(times, name))

@@ -12,7 +12,7 @@ from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.repairs.repair import repair
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

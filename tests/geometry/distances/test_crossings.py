@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from eigenshape.geometry.distances.crossings import self_intersections
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

@@ -12,7 +12,7 @@ from eigenshape.geometry.distances.geodesic import (
 )
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.shapes.surfaces import grid, icosphere
 
 

@@ -11,12 +11,12 @@ from eigenshape.geometry.repairs.holes import fill_holes
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.simplices import degenerate_simplices
 from eigenshape.geometry.topology import (
+    disjoint_union,
     euler_characteristic,
     is_closed,
     is_manifold,
     non_manifold_edges,
 )
-from eigenshape.geometry.union import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

@@ -9,12 +9,12 @@ from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.repairs.one_sided import cut_edges, cut_one_sided
 from eigenshape.geometry.topology import (
     boundary_loops,
+    disjoint_union,
     edge_table,
     euler_characteristic,
     is_manifold,
     vertex_components,
 )
-from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.surfaces import grid, icosphere
 
 

@@ -21,14 +21,14 @@ from eigenshape.geometry.repairs.repair_steps import (
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import (
     boundary_edges,
+    disjoint_union,
     euler_characteristic,
     is_closed,
     is_manifold,
 )
-from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere
-from eigenshape.spectral.comparison.shape_dna import shape_dna
+from eigenshape.spectral.comparison.eigenvalues import shape_dna
 
 
 def test_the_names_that_help_lists_are_those_of_the_repairs():

@@ -11,8 +11,12 @@ from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import suggest_repairs
 from eigenshape.geometry.resolution.decimation import decimate
-from eigenshape.geometry.topology import boundary_loops, euler_characteristic, vertex_components
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import (
+    boundary_loops,
+    disjoint_union,
+    euler_characteristic,
+    vertex_components,
+)
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 
 BALL = icosphere(3)

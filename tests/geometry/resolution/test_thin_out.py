@@ -11,13 +11,13 @@ from eigenshape.geometry.simplices import degenerate_simplices
 from eigenshape.geometry.topology import (
     boundary_loops,
     boundary_vertices,
+    disjoint_union,
     euler_characteristic,
     is_closed,
     is_manifold,
     repeated_simplices,
     vertex_components,
 )
-from eigenshape.geometry.union import disjoint_union
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

@@ -7,7 +7,7 @@ from scipy.spatial import SphericalVoronoi
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.measure import surface_area
-from eigenshape.geometry.samples.cloud_measure import _cell_volume, _cell_volumes, shape_quadrature
+from eigenshape.geometry.samples.quadrature import _cell_volume, _cell_volumes, shape_quadrature
 from eigenshape.shapes.domains import disc
 from eigenshape.shapes.spheres import fibonacci_sphere, random_sphere, three_sphere, uneven_sphere
 

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape.geometry.samples.cloud_measure import shape_quadrature
-from eigenshape.geometry.samples.quadrature import Quadrature
+from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.shapes.surfaces import grid
 
 

@@ -11,7 +11,7 @@ from eigenshape.operators.clouds.cells import (
     gaussian_differences,
     gaussian_rows,
 )
-from eigenshape.operators.clouds.pair_loops import component_labels
+from eigenshape.operators.clouds.pair_loops import component_labels, sort_part
 
 
 def dense_kernel(points, weights, t, reach):
@@ -86,3 +86,11 @@ def test_powers_of_two_change_no_digit(scale):
         count_partners(cell_grid(points * scale, 0.3 * scale)),
     )
     np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5, 40, 3000])
+def test_a_part_is_sorted_and_nothing_beside_it(count):
+    values = np.random.default_rng(count).permutation(count + 20)
+    expected = np.concatenate([values[:7], np.sort(values[7 : 7 + count]), values[7 + count :]])
+    sort_part(values, 7, 7 + count)
+    np.testing.assert_array_equal(values, expected)

@@ -9,11 +9,10 @@ from scipy.special import eval_legendre
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.samples.cloud_measure import shape_quadrature
-from eigenshape.geometry.samples.quadrature import Quadrature
+from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.clouds import kernel
 from eigenshape.operators.clouds.gaussian import (
     functional_laplacian,

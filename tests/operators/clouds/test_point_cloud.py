@@ -3,7 +3,7 @@ import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.samples.cloud_measure import shape_quadrature
+from eigenshape.geometry.samples.quadrature import shape_quadrature
 from eigenshape.operators.clouds import cloud_kernel
 from eigenshape.operators.clouds.cloud_kernel import cloud_width, point_cloud_laplacian
 from eigenshape.operators.clouds.gaussian import gaussian_laplacian

@@ -5,7 +5,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.plot.sheet import figure_label_transfer
 from eigenshape.retrieval.labels import transfer
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape

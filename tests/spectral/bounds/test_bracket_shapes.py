@@ -7,7 +7,7 @@ from intervals import assert_around, finer
 from eigenshape.geometry.facets import without_pinches
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.shape_files import read_shape
 from eigenshape.operators.fem import fem_laplacian

@@ -11,7 +11,7 @@ from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian, ma
 from eigenshape.shapes.domains import ball, interval
 from eigenshape.shapes.surfaces import grid, icosphere
 from eigenshape.sparse.symmetric_factor import EPS
-from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
+from eigenshape.spectral.bounds.nonconforming import enclose, relative_rounding
 from eigenshape.spectral.solve import solve_spectrum
 
 EQUILATERAL = TriangleMesh([[0, 0, 0], [1, 0, 0], [0.5, 0.75**0.5, 0]], [[0, 1, 2]])

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import boundary_vertices
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import boundary_vertices, disjoint_union
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian

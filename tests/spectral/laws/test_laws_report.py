@@ -17,8 +17,12 @@ from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import mean_side_length
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_vertices, edge_table, vertex_components
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import (
+    boundary_vertices,
+    disjoint_union,
+    edge_table,
+    vertex_components,
+)
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian
 from eigenshape.operators.graph import graph_laplacian

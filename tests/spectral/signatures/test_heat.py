@@ -3,8 +3,7 @@ import pytest
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import boundary_edges
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import boundary_edges, disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.signatures.heat import (

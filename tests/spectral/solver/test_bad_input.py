@@ -7,7 +7,7 @@ from pencils import cycle, dense_eigenvalues, graph, path
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.shapes.surfaces import icosphere

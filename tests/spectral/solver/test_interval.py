@@ -11,7 +11,7 @@ from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver import certified, interval, slices
+from eigenshape.spectral.solver import certified, slices
 from eigenshape.spectral.solver import strategy as roads
 from eigenshape.spectral.solver.pencil import normalize
 from eigenshape.spectral.spectrum import Spectrum
@@ -186,8 +186,8 @@ def test_where_counts_and_finds_never_agree_nothing_is_returned(monkeypatch):
     pencil = normalize(laplacian)
     values = dense_eigenvalues(laplacian) * np.ldexp(1.0, -pencil.value_exponent)
     low, high = middle(values, 90, 130)
-    counted = interval.count_interval(pencil, low, high)
-    pairs, certificate = interval.solve_interval(pencil, counted, lambda done: None)
+    counted = certified.count_interval(pencil, low, high)
+    pairs, certificate = certified.solve_interval(pencil, counted, lambda done: None)
     assert certificate.count == certificate.n_found
 
     def forgetful(*arguments):
@@ -195,17 +195,17 @@ def test_where_counts_and_finds_never_agree_nothing_is_returned(monkeypatch):
         return np.delete(vectors, vectors.shape[1] // 2, axis=1), factor
 
     monkeypatch.setattr(interval, "walk_on", forgetful)
-    _, again = interval.solve_interval(pencil, counted, lambda done: None)
+    _, again = certified.solve_interval(pencil, counted, lambda done: None)
     assert again.count == again.n_found == certificate.count
     monkeypatch.setattr(interval, "INTERVAL_RUNS", 1)
     with pytest.raises(
         ConvergenceError, match=r"Every eigenvalue that inertia counts .* in the interval were"
     ):
-        interval.solve_interval(pencil, counted, lambda done: None)
+        certified.solve_interval(pencil, counted, lambda done: None)
     monkeypatch.setattr(interval, "_clear_gaps", lambda values, interval: None)
     monkeypatch.setattr(interval, "walk_on", lambda pencil, factor, *rest: (pairs.vectors, factor))
     with pytest.raises(ConvergenceError, match="An interval must end in a gap between eigenvalues"):
-        interval.solve_interval(pencil, counted, lambda done: None)
+        certified.solve_interval(pencil, counted, lambda done: None)
 
 
 def test_an_interval_that_fails_alone_is_found_with_all_below_it(monkeypatch, thin):

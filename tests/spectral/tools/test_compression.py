@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape.spectral.tools import compression, connectivity, packing, patch_basis
+from eigenshape.spectral.tools import compression, connectivity, patch_basis
 
 BALL = es.icosphere(3)
 SMALL = es.icosphere(2)
@@ -187,10 +187,12 @@ HOSTILE = {
     "symbols end at face": with_header(20, 2000),
     "symbols are left over": with_header(20, 1270),
     "must name vertices 0..": with_header(12, 600),
-    "must have 6 means": with_streams(means=packing.pack(b"")),
-    "The seeds of a compressed mesh must unpack": with_streams(seeds=packing.pack(b"\0" * 9)),
-    "must have a seed for each of 2": with_streams(seeds=packing.pack(b"\0")),
-    "large numbers; 0 could be read": with_streams(**{"large means": packing.pack(b"\x80" * 4)}),
+    "must have 6 means": with_streams(means=compression.pack(b"")),
+    "The seeds of a compressed mesh must unpack": with_streams(seeds=compression.pack(b"\0" * 9)),
+    "must have a seed for each of 2": with_streams(seeds=compression.pack(b"\0")),
+    "large numbers; 0 could be read": with_streams(
+        **{"large means": compression.pack(b"\x80" * 4)}
+    ),
     "The symbols of a compressed mesh are damaged": with_streams(symbols=b"\x05\x05\x05"),
 }
 
@@ -228,19 +230,19 @@ def test_sealed_nonsense_is_refused_or_read_and_never_crashes():
 
 
 def test_a_bomb_is_not_unpacked():
-    bomb = packing.pack(b"\1" * 1_000_000)
+    bomb = compression.pack(b"\1" * 1_000_000)
     assert len(bomb) < 1_000
     with pytest.raises(es.FileFormatError, match="must unpack to at most 100 bytes"):
-        packing.unpack(bomb, 100, "symbols")
+        compression.unpack(bomb, 100, "symbols")
     with pytest.raises(es.FileFormatError, match="must unpack to at most 100 bytes"):
-        packing.unpack(packing.pack(b"abc")[:-2], 100, "symbols")
-    assert packing.unpack(packing.pack(b"a" * 100), 100, "symbols") == b"a" * 100
-    assert packing.unpack(packing.pack(b""), 0, "symbols") == b""
+        compression.unpack(compression.pack(b"abc")[:-2], 100, "symbols")
+    assert compression.unpack(compression.pack(b"a" * 100), 100, "symbols") == b"a" * 100
+    assert compression.unpack(compression.pack(b""), 0, "symbols") == b""
 
 
 def test_numbers_of_any_size_come_back():
     numbers = np.array([0, -1, 1, 126, 127, -127, -128, 128, 10**6, -(2**40), 2**55])
-    np.testing.assert_array_equal(packing.from_bytes(*packing.to_bytes(numbers)), numbers)
+    np.testing.assert_array_equal(compression.from_bytes(*compression.to_bytes(numbers)), numbers)
 
 
 def test_bad_arguments_are_named():

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import eigenshape as es
 from eigenshape import _memory
-from eigenshape.geometry.union import disjoint_union
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.spectral.tools.embedding import component_labels
 
 BALL = es.icosphere(2)

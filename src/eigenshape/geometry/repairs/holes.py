@@ -1,8 +1,7 @@
 """The repair of holes: their triangulation between the vertices around them."""
 
 import numpy as np
-import scipy.sparse as sp
-from jaxtyping import Bool, Int
+from jaxtyping import Int
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
@@ -47,7 +46,16 @@ def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[Tr
         else:
             points, _ = size_one(mesh.vertices[loop] - mesh.vertices[loop[0]])
             triangles = np.empty((len(loop) - 2, 3), dtype=np.int64)
-            good = triangulate(points, _mark_existing_edges(graph, loop, added), triangles)
+            # An edge of the mesh, or of faces that were added, must not become one of another face.
+            taken = np.array(graph[loop][:, loop].toarray(), dtype=bool)
+            if added:
+                faces = np.concatenate(added)
+                place_of = {vertex: place for place, vertex in enumerate(loop.tolist())}
+                drawn = np.concatenate([faces[:, :2], faces[:, 1:], faces[:, ::2]])
+                for one, other in drawn[np.isin(drawn, loop).all(axis=1)].tolist():
+                    here, there = place_of[one], place_of[other]
+                    taken[here, there] = taken[there, here] = True
+            good = triangulate(points, taken, triangles)
             added += [loop[triangles]] if good else []
             n_open += not good
     sealed = TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *added]))
@@ -60,17 +68,3 @@ def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[Tr
     if n_open:
         report += f", left {n_open} that good faces do not close"
     return RepairedMesh(sealed, (report,), np.arange(mesh.n_vertices))
-
-
-def _mark_existing_edges(
-    graph: sp.csr_array, loop: Int[np.ndarray, " k"], added: list[Int[np.ndarray, "_ 3"]]
-) -> Bool[np.ndarray, "k k"]:
-    """Mark the pairs of loop vertices that are edges already, of the mesh or of added faces."""
-    taken = np.array(graph[loop][:, loop].toarray(), dtype=bool)
-    if added:
-        faces = np.concatenate(added)
-        places = {vertex: place for place, vertex in enumerate(loop.tolist())}
-        drawn = np.concatenate([faces[:, :2], faces[:, 1:], faces[:, ::2]])
-        for one, other in drawn[np.isin(drawn, loop).all(axis=1)].tolist():
-            taken[places[one], places[other]] = taken[places[other], places[one]] = True
-    return taken

@@ -92,7 +92,22 @@ def parse(data: bytes, folder: Path | None = None) -> tuple[np.ndarray, np.ndarr
 def read_gltf(data: bytes, folder: Path | None = None) -> Gltf:
     """Read the tree and the buffers of a file; see `parse`."""
     if folder is None:
-        chunks = _chunks(data)
+        version, length = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8))
+        if data[:4] != b"glTF" or version != 2 or length != len(data):
+            raise FileFormatError(
+                f"A GLB file must begin with glTF, version 2 and its length; it begins with "
+                f"{quote_line((1, data[:4]))}, {version} and {length}, and has {len(data)} bytes."
+            )
+        chunks: dict[bytes, bytes] = {}
+        start = 12
+        while start < length:
+            end = start + 8 + int.from_bytes(data[start : start + 4], "little")
+            if start + 8 > length or end > length:
+                raise FileFormatError(
+                    f"A chunk of a GLB file must end within it; one ends at {end} of {length} bytes."
+                )
+            chunks.setdefault(data[start + 4 : start + 8], data[start + 8 : end])
+            start = end
         tree = _tree(chunks.get(JSON_CHUNK, b""))
         buffers = decode_buffers(tree, chunks.get(BINARY_CHUNK, b""))
     else:
@@ -107,26 +122,6 @@ def read_scene(gltf: Gltf) -> Scene:
     if not len(scene.piece.faces):
         raise FileFormatError("A glTF file must hold triangles; it holds none.")
     return scene
-
-
-def _chunks(data: bytes) -> dict[bytes, bytes]:
-    version, length = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8))
-    if data[:4] != b"glTF" or version != 2 or length != len(data):
-        raise FileFormatError(
-            f"A GLB file must begin with glTF, version 2 and its length; it begins with {quote_line((1, data[:4]))}, "
-            f"{version} and {length}, and has {len(data)} bytes."
-        )
-    chunks: dict[bytes, bytes] = {}
-    start = 12
-    while start < length:
-        end = start + 8 + int.from_bytes(data[start : start + 4], "little")
-        if start + 8 > length or end > length:
-            raise FileFormatError(
-                f"A chunk of a GLB file must end within it; one ends at {end} of {length} bytes."
-            )
-        chunks.setdefault(data[start + 4 : start + 8], data[start + 8 : end])
-        start = end
-    return chunks
 
 
 def _tree(text: bytes) -> dict[str, Any]:

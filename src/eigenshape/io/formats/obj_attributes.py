@@ -16,6 +16,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
+    SourceFile,
     WriteJob,
     corner_normals,
     plain_attributes,
@@ -24,7 +25,6 @@ from eigenshape.io.attributes import (
 from eigenshape.io.formats.cells import fans
 from eigenshape.io.formats.obj import Corner, ObjSheet, read_sheet
 from eigenshape.io.formats.text import rows_text
-from eigenshape.io.sources import SourceFile
 
 MAP = re.compile(r"(?im)^([ \t]*(?:map_\w+|bump|disp|decal|norm|refl)[ \t]+)(.+?)[ \t\r]*$")
 PLAIN_MATERIAL = {"newmtl", "kd", "d", "tr", "map_kd", "ka", "ke", "ks", "ns", "ni", "illum"}

@@ -39,7 +39,20 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray]:
         rows = np.frombuffer(body, record, n_points)
         columns = [rows[axis] for axis in "xyz"]
     elif kind == b"binary_compressed":  # by field instead of by point
-        body = _unpack_body(header, body)
+        if len(body) < 8:
+            raise FileFormatError(
+                f"Compressed points must begin with two sizes; the file ends after {len(body)} bytes."
+            )
+        packed, size = struct.unpack_from("<II", body)
+        needed = header.n_points * header.record.itemsize
+        if len(body) - 8 < packed or size > MOST_TIMES * packed or size < needed:
+            raise FileFormatError(
+                f"Compressed points must have the size they declare; {packed} bytes that unpack to {size} are "
+                f"declared, {len(body) - 8} are there, and {header.n_points} points take {needed}."
+            )
+        require_reasonable(size, len(body))
+        body = decompress(body[8 : 8 + packed], size)
+        _require_bytes(header, body)
         fields = [record.fields[axis] for axis in "xyz"] if record.fields else []
         columns = [
             np.frombuffer(body, kind_of, n_points, n_points * offset)
@@ -147,24 +160,6 @@ def _require_bytes(header: Header, body: bytes) -> None:
             f"A PCD file must hold the points it declares; it declares {header.n_points} of {header.record.itemsize} "
             f"bytes and holds {len(body)} bytes."
         )
-
-
-def _unpack_body(header: Header, body: bytes) -> bytes:
-    if len(body) < 8:
-        raise FileFormatError(
-            f"Compressed points must begin with two sizes; the file ends after {len(body)} bytes."
-        )
-    packed, size = struct.unpack_from("<II", body)
-    needed = header.n_points * header.record.itemsize
-    if len(body) - 8 < packed or size > MOST_TIMES * packed or size < needed:
-        raise FileFormatError(
-            f"Compressed points must have the size they declare; {packed} bytes that unpack to {size} are declared, "
-            f"{len(body) - 8} are there, and {header.n_points} points take {needed}."
-        )
-    require_reasonable(size, len(body))
-    unpacked = decompress(body[8 : 8 + packed], size)
-    _require_bytes(header, unpacked)
-    return unpacked
 
 
 def decompress(data: bytes, size: int) -> bytes:

@@ -16,6 +16,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
+    SourceFile,
     WriteJob,
     corner_normals,
     plain_attributes,
@@ -26,7 +27,6 @@ from eigenshape.io.formats.ply import (
     AXES,
     CORNERS,
     LABEL,
-    Column,
     Table,
     format_binary,
     format_text,
@@ -34,7 +34,6 @@ from eigenshape.io.formats.ply import (
     read_lists,
     read_tables,
 )
-from eigenshape.io.sources import SourceFile
 
 IMAGE = re.compile(rb"(?m)^comment TextureFile[ \t]+(.+?)[ \t\r]*$")  # as MeshLab writes it
 TINTS = ("red", "green", "blue")
@@ -94,7 +93,11 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         column = columns[element, name]
         is_of_faces = element == "face" and are_faces and mesh.n_faces != mesh.n_vertices
         if not column.length_kind and name not in fields and (element == "vertex" or is_of_faces):
-            values = _typed(tables[element][name], column)
+            # As one of the types that PLY files are written in
+            kinds = {"B": np.uint8, "b": np.int32, "h": np.int32, "H": np.int32, "i": np.int32}
+            values = (
+                _numbers(tables[element][name]).ravel().astype(kinds.get(column.kind, np.float64))
+            )
             fields[name] = values[polygon_of] if is_of_faces else values
             del left[element, name]
     others = [f"{name} of {element}" for element, name in left]
@@ -130,12 +133,6 @@ def _wedges(rows: Any, polygons: Any) -> Float[np.ndarray, "f 3 2"]:
 
 def _numbers(values: Any) -> Float[np.ndarray, "..."]:
     return np.asarray(values).astype(np.float64)
-
-
-def _typed(values: Any, column: Column) -> np.ndarray:
-    """Return a column in a type that PLY files are written in."""
-    kinds = {"B": np.uint8, "b": np.int32, "h": np.int32, "H": np.int32, "i": np.int32}
-    return _numbers(values).ravel().astype(kinds.get(column.kind, np.float64))
 
 
 def write(job: WriteJob) -> dict[Path, bytes]:

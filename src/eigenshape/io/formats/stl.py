@@ -19,7 +19,30 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     is_text = data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:HEADER]
     # Many binary files also begin with "solid".
     if is_text and (len(data) < HEADER or len(data) != expected):
-        corners = _parse_text(data)
+        lines = lines_of(data)
+        words = [text.split(None, 1)[0].lower() for _, text in lines]
+        n_open, n_closed = words.count(b"solid"), words.count(b"endsolid")
+        if n_open != n_closed:
+            raise FileFormatError(
+                f"A text STL file must close what it opens; it has {n_open} solid, {n_closed} endsolid."
+            )
+        facets = [
+            pair
+            for pair in zip(lines, words, strict=True)
+            if pair[1] not in (b"solid", b"endsolid")
+        ]
+        for place, (line, word) in enumerate(facets):
+            if word != FACET[place % len(FACET)]:
+                raise FileFormatError(
+                    f"A facet must be lines of {b' '.join(FACET).decode()}; line {line[0]} is {quote_line(line)}."
+                )
+        if len(facets) % len(FACET):
+            raise FileFormatError(
+                f"A text STL file must end with a whole facet; its last line is {quote_line(facets[-1][0])}."
+            )
+        corners = coordinates(
+            [(line[0], line[1][len(word) :]) for line, word in facets if word == b"vertex"]
+        )
     elif len(data) < HEADER:
         raise FileFormatError(
             f"A binary STL file must have {HEADER} bytes of header; it has {len(data)} in all."
@@ -36,31 +59,6 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
         raise FileFormatError("An STL file must hold triangles; it holds none.")
     welded = weld(TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3))).mesh
     return welded.vertices, welded.faces
-
-
-def _parse_text(data: bytes) -> np.ndarray:
-    lines = lines_of(data)
-    words = [text.split(None, 1)[0].lower() for _, text in lines]
-    n_open, n_closed = words.count(b"solid"), words.count(b"endsolid")
-    if n_open != n_closed:
-        raise FileFormatError(
-            f"A text STL file must close what it opens; it has {n_open} solid, {n_closed} endsolid."
-        )
-    rows = [
-        pair for pair in zip(lines, words, strict=True) if pair[1] not in (b"solid", b"endsolid")
-    ]
-    for place, (line, word) in enumerate(rows):
-        if word != FACET[place % len(FACET)]:
-            raise FileFormatError(
-                f"A facet must be lines of {b' '.join(FACET).decode()}; line {line[0]} is {quote_line(line)}."
-            )
-    if len(rows) % len(FACET):
-        raise FileFormatError(
-            f"A text STL file must end with a whole facet; its last line is {quote_line(rows[-1][0])}."
-        )
-    return coordinates(
-        [(line[0], line[1][len(word) :]) for line, word in rows if word == b"vertex"]
-    )
 
 
 def format_text(mesh: TriangleMesh) -> bytes:

@@ -8,8 +8,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.samples.cloud_measure import shape_quadrature
-from eigenshape.geometry.samples.quadrature import Quadrature
+from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.clouds.kernel import (

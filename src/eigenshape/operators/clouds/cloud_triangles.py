@@ -9,9 +9,9 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.samples.cloud_measure import require_different_points
+from eigenshape.geometry.samples.quadrature import require_different_points
 from eigenshape.geometry.simplices import size_one
-from eigenshape.operators.clouds import cloud_loops
+from eigenshape.operators.clouds import pair_loops
 from eigenshape.operators.tufted import (
     MOLLIFY,
     Triangulation,
@@ -97,7 +97,7 @@ def local_triangles(
     frames = np.stack([first, np.cross(normals, first)], axis=1)
     coordinates = np.einsum("nkd,nad->nka", offsets, frames)
     rings = np.empty((cloud.n_points, count + 1), dtype=np.int64)
-    cloud_loops.local_rings(np.ascontiguousarray(coordinates), rings)
+    pair_loops.local_rings(np.ascontiguousarray(coordinates), rings)
     # Join each two that follow each other in a ring with the middle, but across its opening.
     n, k = neighbors.shape
     lengths = (rings >= 0).sum(axis=1)

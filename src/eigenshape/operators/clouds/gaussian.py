@@ -12,8 +12,7 @@ from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.samples.cloud_measure import shape_quadrature
-from eigenshape.geometry.samples.quadrature import Quadrature
+from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components

@@ -18,7 +18,7 @@ from eigenshape.features.segmentation import FeaturePoints, Segmentation, segmen
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh
-from eigenshape.geometry.repairs.fragments import fragment_vertices
+from eigenshape.geometry.repairs.repair_steps import fragment_vertices
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import boundary_edges, vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian

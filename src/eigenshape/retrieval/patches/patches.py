@@ -18,7 +18,7 @@ from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.orientation import orient_outward
-from eigenshape.geometry.repairs.fragments import fragment_vertices
+from eigenshape.geometry.repairs.repair_steps import fragment_vertices
 from eigenshape.geometry.requirements import require_describable, require_oriented
 from eigenshape.geometry.resolution.thinning import thin_out
 from eigenshape.geometry.simplices import dual_volumes

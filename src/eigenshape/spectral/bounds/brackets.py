@@ -20,8 +20,12 @@ from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.choices import Condition
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import interpolation_constants, longest_edges
-from eigenshape.spectral.bounds.nonconforming import lower_bounds, partly
-from eigenshape.spectral.bounds.rounding import enclose, relative_rounding
+from eigenshape.spectral.bounds.nonconforming import (
+    enclose,
+    lower_bounds,
+    partly,
+    relative_rounding,
+)
 from eigenshape.spectral.solve import solve_spectrum
 
 # Largest c with B ≥ c diag(B) for the consistent mass of linear elements, in any dimension.

@@ -13,9 +13,8 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian, find_zero_row_sums, require_matrix
 from eigenshape.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
-from eigenshape.spectral.diffusion.decay import decay_factors
 from eigenshape.spectral.solver.pencil import Pencil, normalize
-from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.spectral.spectrum import Spectrum, decay_factors
 
 # Largest error by default, relative to the norm of the values: 25 to 30 solves for each factor.
 DEFAULT_ACCURACY = 1e-10
@@ -126,34 +125,25 @@ def apply_heat(
     if accuracy is not None and not low <= accuracy <= high:
         raise InvalidParameterError(f"accuracy must lie in {low}..{high}; it is {accuracy!r}.")
     if isinstance(operator, Spectrum):
-        warm = _flow_by_modes(operator, columns, times, accuracy)
+        decay = decay_factors(operator, times, "t")
+        k = len(operator.eigenvalues)
+        left = float(decay[-1].max())
+        if accuracy is not None and k < n and left > accuracy:
+            needed = -np.log(accuracy) / times.min()
+            raise InvalidParameterError(
+                f"A spectrum must reach the accuracy: {k} pairs leave up to {left:.2g} of a function at "
+                f"t = {times.min():.4g}, and accuracy is {accuracy:.2g}. Compute all pairs below "
+                f"{needed:.4g}, or pass the Laplacian itself."
+            )
+        coefficients = operator.eigenvectors.T @ (operator.mass @ columns)
+        damped = coefficients[:, :, None] * decay[:, None, :]
+        warm = np.tensordot(operator.eigenvectors, damped, axes=1)
     else:
         warm = _flow_by_steps(
             operator, columns, times, accuracy or DEFAULT_ACCURACY, progress or silent
         )
     warm = warm.reshape(*np.shape(values), len(times))
     return warm if np.ndim(t) else warm[..., 0]
-
-
-def _flow_by_modes(
-    spectrum: Spectrum,
-    columns: Columns,
-    times: Float[np.ndarray, " q"],
-    accuracy: float | None,
-) -> Float[np.ndarray, "n c q"]:
-    decay = decay_factors(spectrum, times, "t")
-    n, k = spectrum.eigenvectors.shape
-    left = float(decay[-1].max())
-    if accuracy is not None and k < n and left > accuracy:
-        needed = -np.log(accuracy) / times.min()
-        raise InvalidParameterError(
-            f"A spectrum must reach the accuracy: {k} pairs leave up to {left:.2g} of a function at "
-            f"t = {times.min():.4g}, and accuracy is {accuracy:.2g}. Compute all pairs below "
-            f"{needed:.4g}, or pass the Laplacian itself."
-        )
-    coefficients = spectrum.eigenvectors.T @ (spectrum.mass @ columns)
-    damped = coefficients[:, :, None] * decay[:, None, :]
-    return np.tensordot(spectrum.eigenvectors, damped, axes=1)
 
 
 def _flow_by_steps(

@@ -10,8 +10,7 @@ from eigenshape._memory import require_memory
 from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.spectral.diffusion.decay import decay_factors
-from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.spectral.spectrum import Spectrum, decay_factors
 
 
 @one_blas_thread()

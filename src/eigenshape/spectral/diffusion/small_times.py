@@ -11,8 +11,12 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.choices import Condition
-from eigenshape.spectral.diffusion.decay import exponential_decay
-from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
+from eigenshape.spectral.spectrum import (
+    Spectrum,
+    count_zero_modes,
+    exponential_decay,
+    require_lowest,
+)
 
 # Eigenvalues that are needed at least. With fewer, the shortest times are as long as the shape.
 FEWEST_EIGENVALUES = 50

@@ -9,11 +9,10 @@ from eigenshape._arguments import describe_value
 from eigenshape._arrays import point_functions
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
-from eigenshape.spectral.diffusion.decay import decay_factors
 from eigenshape.spectral.maps.functional_map import point_areas, unit_modes, unit_projector
 from eigenshape.spectral.signatures.heat import default_times
 from eigenshape.spectral.signatures.wave import default_energies, wave_bands
-from eigenshape.spectral.spectrum import Spectrum
+from eigenshape.spectral.spectrum import Spectrum, decay_factors
 
 SIGNATURES = ("waves", "heat")
 N_FUNCTIONS = 20  # of each signature

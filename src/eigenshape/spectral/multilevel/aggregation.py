@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape.sparse.largest import largest_ritz_value
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, smooth_columns
+from eigenshape.spectral.solver.chebyshev import largest_ritz_value
 
 LARGEST = 256  # most points in an aggregate, on average
 TOO_LITTLE = 1.5  # ratio of points between levels below which another level is not worth its cost
@@ -84,7 +84,14 @@ def build_levels(
     stiffness, mass = _by_rows(stiffness), _by_rows(mass)
     while stiffness.shape[0] > TOO_LITTLE * n_coarsest:
         n = stiffness.shape[0]
-        columns = _aggregates(stiffness, n_coarsest)
+        # The indicators of aggregates, as columns
+        ratio = n / n_coarsest
+        size = max(round(ratio ** (1 / np.ceil(np.log(ratio) / np.log(LARGEST)))), 2)
+        labels, count = grow_aggregates(stiffness.indptr, stiffness.indices, stiffness.data, size)
+        columns = sp.csr_array(
+            (np.ones(n), labels, np.arange(n + 1, dtype=np.int32)),
+            shape=(n, count),
+        )
         if n < TOO_LITTLE * columns.shape[1]:
             break
         top = scaled_top(stiffness)
@@ -95,7 +102,11 @@ def build_levels(
         up = _by_rows(columns.T)
         energies = up.power(2) @ stiffness.diagonal()
         coarser = _project(up, stiffness, columns), _project(up, mass, columns)
-        _clear_rounding(coarser[0], energies)
+        projected = coarser[0]
+        alone = np.flatnonzero(np.diff(projected.indptr) == 1)
+        places = projected.indptr[alone]
+        rounding = np.abs(projected.data[places]) <= ENERGY_ROUNDING * energies[alone]
+        projected.data[places[rounding]] = 0.0
 
         weights, inverse = mass.diagonal()[:, None], 1 / _positive(stiffness.diagonal())[:, None]
         rough_prolong = _by_rows(columns, np.float32)
@@ -114,15 +125,6 @@ def build_levels(
         levels.append(level)
         stiffness, mass = coarser
     return levels, stiffness, mass
-
-
-def _aggregates(stiffness: sp.csr_array, n_coarsest: int) -> sp.csr_array:
-    """Return the indicators of aggregates, as columns."""
-    n = stiffness.shape[0]
-    ratio = n / n_coarsest
-    size = max(round(ratio ** (1 / np.ceil(np.log(ratio) / np.log(LARGEST)))), 2)
-    labels, count = grow_aggregates(stiffness.indptr, stiffness.indices, stiffness.data, size)
-    return sp.csr_array((np.ones(n), labels, np.arange(n + 1, dtype=np.int32)), shape=(n, count))
 
 
 def _smooth(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.csr_array:
@@ -147,18 +149,6 @@ def _smooth(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.cs
 def _project(up: sp.csr_array, matrix: sp.csr_array, down: sp.csr_array) -> sp.csr_array:
     product = up @ (matrix @ down)
     return _by_rows((product + product.T) * 0.5)
-
-
-def _clear_rounding(stiffness: sp.csr_array, energies: Float[np.ndarray, " m"]) -> None:
-    """Set the energy of components that consist of one point to 0 if it is only rounding error.
-
-    A constant on a component has no energy. The rounding error, 1e-16 of the energies that were
-    summed, would otherwise appear as an eigenvalue.
-    """
-    alone = np.flatnonzero(np.diff(stiffness.indptr) == 1)
-    places = stiffness.indptr[alone]
-    rounding = np.abs(stiffness.data[places]) <= ENERGY_ROUNDING * energies[alone]
-    stiffness.data[places[rounding]] = 0.0
 
 
 def _by_rows(matrix: sp.sparray, dtype: type = np.float64) -> sp.csr_array:

@@ -12,7 +12,6 @@ from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.diffusion.decay import exponential_decay
 from eigenshape.spectral.multilevel.approximate import (
     MOST_ROUNDS,
     SINGLE,
@@ -35,6 +34,7 @@ from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.kernel_values import from_pencil, require_readable
 from eigenshape.spectral.solver.pencil import Pencil, normalize
+from eigenshape.spectral.spectrum import exponential_decay
 
 LARGE = 100_000  # points beyond which the command line computes approximate signatures
 USUAL_ACCURACY = 1e-2  # of eigenvalues; the heat then has a relative error of about 1e-3

@@ -8,8 +8,7 @@ from eigenshape._arrays import positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
-from eigenshape.spectral.diffusion.decay import decay_factors
-from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
+from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, decay_factors
 
 # Relative difference between steps of log t up to which times count as a geometric sequence; the
 # rounding of numpy.geomspace stays far below it.

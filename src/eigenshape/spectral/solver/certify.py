@@ -88,9 +88,21 @@ def certify(
     True
     """
     require_type(laplacian, Laplacian, "laplacian")
-    values, vectors = _as_eigenpairs(
-        laplacian, as_array(eigenvalues, "eigenvalues"), as_array(eigenvectors, "eigenvectors")
-    )
+    values = as_array(eigenvalues, "eigenvalues")
+    vectors = as_array(eigenvectors, "eigenvectors")
+    fits = values.ndim == 1 and values.size and vectors.shape == (laplacian.n_points, len(values))
+    if not fits:
+        raise InvalidParameterError(
+            f"eigenvalues and eigenvectors must have shapes (k,) and ({laplacian.n_points}, k); "
+            f"the shapes are {values.shape} and {vectors.shape}."
+        )
+    if not (np.isfinite(values).all() and np.isfinite(vectors).all()):
+        raise InvalidParameterError("eigenvalues and eigenvectors must be finite; some are not.")
+    drops = np.flatnonzero(np.diff(values) < 0)
+    if drops.size:
+        raise InvalidParameterError(
+            f"eigenvalues must ascend; {drops[0] + 1} is {values[drops[0] + 1]} after {values[drops[0]]}."
+        )
     values = to_pencil(laplacian.kernel, values)
     with one_blas_thread():
         pencil = normalize(laplacian)
@@ -255,22 +267,3 @@ def require_orthonormal(pencil: Pencil, pairs: Pairs) -> float:
                 f"{worst:.2e}."
             )
     return max((worst for worst, _, _ in found), default=0.0)
-
-
-def _as_eigenpairs(
-    laplacian: Laplacian, values: Float[np.ndarray, " k"], vectors: Float[np.ndarray, "n k"]
-) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "n k"]]:
-    fits = values.ndim == 1 and values.size and vectors.shape == (laplacian.n_points, len(values))
-    if not fits:
-        raise InvalidParameterError(
-            f"eigenvalues and eigenvectors must have shapes (k,) and ({laplacian.n_points}, k); "
-            f"the shapes are {values.shape} and {vectors.shape}."
-        )
-    if not (np.isfinite(values).all() and np.isfinite(vectors).all()):
-        raise InvalidParameterError("eigenvalues and eigenvectors must be finite; some are not.")
-    drops = np.flatnonzero(np.diff(values) < 0)
-    if drops.size:
-        raise InvalidParameterError(
-            f"eigenvalues must ascend; {drops[0] + 1} is {values[drops[0] + 1]} after {values[drops[0]]}."
-        )
-    return values, vectors

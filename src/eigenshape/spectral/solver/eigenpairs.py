@@ -78,23 +78,8 @@ def lowest_pairs(
 
     The vectors are used up. What they nearly are may be given where B is diagonal.
     """
-    vectors = _orthonormalize(pencil, vectors)
-    values, residuals = rayleigh_residuals(pencil, vectors, near)
-    order = np.argsort(values, kind="stable")[:k]
-    if not np.array_equal(order, np.arange(vectors.shape[1])):
-        vectors = vectors[:, order]
-    return Pairs(values[order], vectors, residuals[order])
-
-
-def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[np.ndarray, "n j"]:
-    """Make columns B-orthonormal, in place, that are so up to the tolerance of the iteration.
-
-    By Newton steps towards the nearest such columns, of which one is enough as a rule. Columns
-    ascend nearly, and lean on those whose eigenvalues are near; what is further apart is orthogonal
-    by its residuals.
-    """
-    k = vectors.shape[1]
-    chunks = column_chunks(k)
+    width = vectors.shape[1]
+    chunks = column_chunks(width)
     starts = [max(columns.start - LEANING_COLUMNS, 0) for columns in chunks]
     for _ in range(NEWTON_STEPS):
         offs = map_in_threads(
@@ -107,14 +92,18 @@ def _orthonormalize(pencil: Pencil, vectors: Float[np.ndarray, "n j"]) -> Float[
             raise ConvergenceError(
                 f"Vectors of different runs must be B-orthogonal; two are off by {off:.1e}."
             )
-        gram = np.zeros((k, k), np.float32)  # a correction needs few digits
+        gram = np.zeros((width, width), np.float32)  # a correction needs few digits
         for columns, start, each in zip(chunks, starts, offs, strict=True):
             gram[start : columns.stop, columns] = each
             gram[columns, start : columns.start] = each[: columns.start - start].T
         _subtract_half(vectors, gram, chunks)
         if off <= ONE_STEP:
             break
-    return vectors
+    values, residuals = rayleigh_residuals(pencil, vectors, near)
+    order = np.argsort(values, kind="stable")[:k]
+    if not np.array_equal(order, np.arange(vectors.shape[1])):
+        vectors = vectors[:, order]
+    return Pairs(values[order], vectors, residuals[order])
 
 
 def _subtract_half(

@@ -33,10 +33,15 @@ from eigenshape.geometry.conversion import ShapeLike, as_mesh, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.catalog import build_laplacian
-from eigenshape.sparse.frozen import freeze_sparse
+from eigenshape.operators.laplacian import freeze_sparse
+from eigenshape.spectral.archive import (
+    open_archive,
+    require_finite_floats,
+    take_arrays,
+    write_arrays,
+)
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver.cache import require_writable
-from eigenshape.spectral.tools.bundle_archive import FORMAT, read_bundle, write_bundle
 from eigenshape.spectral.tools.vertex_gradient import (
     Shape3,
     fit_gradient,
@@ -47,6 +52,11 @@ from eigenshape.spectral.tools.vertex_gradient import (
 Form = Literal["scipy", "numpy", "torch"]
 Precision = Literal["single", "double"]
 Read = Callable[[Path], ShapeLike]
+# Version of the file format; a file of another version is refused.
+FORMAT = 1
+# What a file holds as arrays, and what as sparse matrices.
+DENSE = ("frames", "mass", "eigenvalues", "eigenvectors")
+SPARSE = ("stiffness", "gradient_x", "gradient_y")
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +184,7 @@ def operator_bundle(
         path = as_path(cache, "cache") / f"{_content_key(surface, count, name)}.npz"
         if path.exists():
             try:
-                return OperatorBundle(**read_bundle(path))
+                return OperatorBundle(**_read_bundle(path))
             except FileFormatError as error:
                 warnings.warn(
                     f"A bundle in the cache cannot be used and is computed again: {error}",
@@ -205,7 +215,8 @@ def operator_bundle(
     )
     if cache is not None:
         try:
-            write_bundle(path, vars(bundle))
+            fields = {name: getattr(bundle, name) for name in (*DENSE, *SPARSE)}
+            write_arrays(path, {"eigenshape_bundle": FORMAT}, fields)
         except OSError as error:
             warnings.warn(
                 f"A bundle was computed and could not be kept in the cache: {error}", stacklevel=2
@@ -386,3 +397,23 @@ def _convert(part: Any, form: Form) -> Any:
         torch.from_numpy(indices), torch.from_numpy(values), part.shape, check_invariants=True
     )
     return tensor.coalesce()
+
+
+def _read_bundle(path: Path) -> dict[str, Any]:
+    """Read the arrays of a bundle.
+
+    Raise FileFormatError if the file is not a bundle, is damaged or of another version, or its
+    arrays do not fit together or are not finite.
+    """
+    with open_archive(path, "bundle", FORMAT) as (_, archive):
+        n, k = len(archive["mass"]), archive["eigenvalues"].size
+        fields = take_arrays(archive, DENSE, SPARSE, n)
+    shapes = {"frames": (n, 3, 3), "mass": (n,), "eigenvalues": (k,), "eigenvectors": (n, k)}
+    for name, shape in shapes.items():
+        if fields[name].shape != shape:
+            raise FileFormatError(
+                f"{path} must hold arrays that fit together; {name} has shape {fields[name].shape} for "
+                f"{n} points and {k} eigenvalues."
+            )
+    require_finite_floats(path, fields)
+    return fields

@@ -108,7 +108,12 @@ def spectral_clusters(
     # Start from rows that are long and nearly orthogonal to each other.
     weighted = modes * np.sqrt(spectrum.mass.diagonal())[:, None]
     _, pivots = sl.qr(weighted.T, mode="r", pivoting=True)
-    return _in_order_of_appearance(_move_centers(rows, rows[pivots[:n_clusters]], method))
+    # Label 0 is that of point 0, 1 that of the next point with another one, and so on.
+    found = _move_centers(rows, rows[pivots[:n_clusters]], method)
+    names, first, inverse = np.unique(found, return_index=True, return_inverse=True)
+    numbers = np.empty(len(names), dtype=np.int64)
+    numbers[np.argsort(first)] = np.arange(len(names))
+    return numbers[inverse]
 
 
 def _move_centers(
@@ -134,14 +139,6 @@ def _move_centers(
             left, _, right = sl.svd(sums)
             centers = left @ right
     return labels.astype(np.int64)
-
-
-def _in_order_of_appearance(labels: Int[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
-    """Return labels with new numbers: 0 for the cluster of point 0, 1 for the next one, ..."""
-    names, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-    numbers = np.empty(len(names), dtype=np.int64)
-    numbers[np.argsort(first)] = np.arange(len(names))
-    return numbers[inverse]
 
 
 def count_clusters(spectrum: Spectrum, most: int | None = None) -> int:

@@ -18,8 +18,12 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.spectral.diffusion.decay import exponential_decay
-from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
+from eigenshape.spectral.spectrum import (
+    Spectrum,
+    count_zero_modes,
+    exponential_decay,
+    require_lowest,
+)
 
 DistanceMethod = Literal["biharmonic", "commute-time", "diffusion"]
 # Cosine of the angle between rows of the constant modes above which two points are of one

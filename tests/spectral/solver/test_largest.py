@@ -3,7 +3,7 @@ import pytest
 
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import torus
-from eigenshape.sparse.largest import largest_ritz_value
+from eigenshape.spectral.solver.chebyshev import largest_ritz_value
 
 
 def test_the_bounds_enclose_the_largest_eigenvalue_closely():
