@@ -12,14 +12,12 @@ from jaxtyping import Float, Int
 from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor
 from eigenshape.retrieval.heat.features import N_VIEWS, describe_views, find_heat_features
 from eigenshape.retrieval.heat.recipe import HeatRecipe
-from eigenshape.retrieval.heat.score import match_features, matching_scores
+from eigenshape.retrieval.heat.score import HeatDescriptor, match_features, matching_scores
 from eigenshape.retrieval.patches.codebook import read_codebook, write_codebook
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe, patch_descriptor
-from eigenshape.retrieval.patches.distance import packed_distances
-from eigenshape.retrieval.patches.isolation import scale_distances
+from eigenshape.retrieval.patches.distance import packed_distances, scale_distances
 from eigenshape.retrieval.patches.matching import match_patches
 from eigenshape.retrieval.patches.packing import (
     pack_codes,
