@@ -38,8 +38,7 @@ from report import Report, Row, in_process, options_of
 
 import eigenshape as es
 from eigenshape.retrieval.patches.codebook import encode_patches
-from eigenshape.retrieval.patches.distance import packed_distances
-from eigenshape.retrieval.patches.isolation import scale_distances
+from eigenshape.retrieval.patches.distance import packed_distances, scale_distances
 from eigenshape.retrieval.patches.matching import PatchPoints
 from eigenshape.retrieval.search.candidates import choose_candidates, n_compared
 from eigenshape.retrieval.search.coarse import CoarseRows

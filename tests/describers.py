@@ -10,8 +10,8 @@ from filelock import FileLock
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor
 from eigenshape.retrieval.heat.recipe import HeatRecipe
+from eigenshape.retrieval.heat.score import HeatDescriptor
 from eigenshape.retrieval.store.writing import DescribedShape
 from eigenshape.shapes.surfaces import icosphere
 

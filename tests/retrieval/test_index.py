@@ -20,9 +20,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError, StoreError
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor
 from eigenshape.retrieval.heat.recipe import HeatRecipe
-from eigenshape.retrieval.heat.score import matching_score
+from eigenshape.retrieval.heat.score import HeatDescriptor, matching_score
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.store import database as store
 from eigenshape.retrieval.store.damage import StoreWarning

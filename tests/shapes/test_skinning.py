@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from eigenshape.shapes.creatures import Joints, bend_at_joints, diffuse
 from eigenshape.shapes.isosurface import isosurface
-from eigenshape.shapes.skinning import Joints, bend_at_joints, diffuse
 
 
 def rod(points):

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, euler_characteristic, is_closed, is_manifold
+from eigenshape.shapes.creatures import FEWEST_NEIGHBORS, MOST_NEIGHBORS, collapse_shortest_edges
 from eigenshape.shapes.isosurface import isosurface
-from eigenshape.shapes.thinning import FEWEST_NEIGHBORS, MOST_NEIGHBORS, collapse_shortest_edges
 
 
 def ring(points):

@@ -1,4 +1,4 @@
-"""The command line, one file a verb."""
+"""The command line."""
 
 from typing import Annotated
 

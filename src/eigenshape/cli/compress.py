@@ -1,9 +1,9 @@
-"""eigenshape compress: a mesh as a small file."""
+"""eigenshape compress and decompress: a mesh as a small file, and back."""
 
 from pathlib import Path
 
 import eigenshape as es
-from eigenshape._files import replace_file
+from eigenshape._files import read_regular, replace_file
 from eigenshape.cli import steps
 from eigenshape.cli.console import out, print_json, print_written, progress_bar
 
@@ -52,3 +52,26 @@ def compress(
         f"{8 * packed.n_geometry_bytes / n:.1f}); vertices move by {packed.rms_error:.3g} (root mean "
         f"square), at most {packed.max_error:.3g}"
     )
+
+
+def decompress(
+    packed: Path,
+    *,
+    output: Path,
+) -> None:
+    """Write the mesh of a file that `eigenshape compress` wrote.
+
+    For instance: eigenshape decompress scan.esz -o scan.ply
+
+    Parameters
+    ----------
+    packed
+        File that `eigenshape compress` wrote (.esz).
+    """
+    steps.require_mesh_path(output)
+    with progress_bar("decompress") as progress:
+        mesh = es.spectral.decompress_mesh(
+            read_regular(packed, "a compressed mesh"), progress=progress
+        )
+    es.write_mesh(mesh, output)
+    print_written(output)

@@ -10,7 +10,7 @@ import typer
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli.console import escape_text, out, progress_bar
-from eigenshape.cli.index.add import Workers, add
+from eigenshape.cli.index import Workers, add
 from eigenshape.cli.query import query
 from eigenshape.shapes.creature_plans import CREATURES
 

@@ -1,14 +1,26 @@
-"""eigenshape match: where each point of a part lies on a whole shape."""
+"""eigenshape match, pose and fuse: points of two shapes that correspond, and what follows from them."""
 
 from __future__ import annotations
 
+from math import sqrt
 from pathlib import Path
 from typing import Any
+
+import typer
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
-from eigenshape.cli.console import out, print_json, progress_bar, result_facts
+from eigenshape.cli.console import (
+    SOME_FAILED,
+    err,
+    escape_text,
+    out,
+    print_json,
+    print_written,
+    progress_bar,
+    result_facts,
+)
 
 MAP_FILES = (".csv", ".npz", ".txt")
 
@@ -58,9 +70,9 @@ def match(
         found = es.match_shapes(ours, theirs, scale=size, progress=progress)
     if as_json:
         each = {"vertices": found.vertices, "vertex_confidence": found.confidence}
-        print_json({"path": mesh, "whole": whole, **match_facts(found), **each})
+        print_json({"path": mesh, "whole": whole, **_match_facts(found), **each})
     else:
-        print_match(found)
+        _print_match(found)
     if output:
         steps.save_match(found, output)
     if picture:
@@ -79,14 +91,14 @@ def _parse_scale(text: str) -> Any:
         ) from error
 
 
-def match_facts(found: es.matching.ShapeMatch) -> dict[str, Any]:
+def _match_facts(found: es.matching.ShapeMatch) -> dict[str, Any]:
     """Return what a map says of the whole shape, without what it says of each vertex."""
     arrays = ("vertices", "faces", "corners", "weights", "confidence", "evidence")
     means = {"mean_confidence": found.confidence.mean(), "share_sure": found.sure().mean()}
     return result_facts(found, *arrays) | means
 
 
-def print_match(found: es.matching.ShapeMatch) -> None:
+def _print_match(found: es.matching.ShapeMatch) -> None:
     """Print in words how good a map is."""
     text = (
         f"{found.n_vertices} vertices; {found.sure().mean():.0%} have a confidence of at least "
@@ -100,3 +112,99 @@ def print_match(found: es.matching.ShapeMatch) -> None:
             "can be turned into itself; this is one of them."
         )
     out.print("\n".join([text, *(f"{sentence}." for sentence in found.report)]))
+
+
+def pose(
+    mesh: Path,
+    *,
+    like: Path,
+    rest: Path | None = None,
+    repair: str = "auto",
+    output: Path | None = None,
+    picture: Path | None = None,
+    view: str = "auto",
+    up: str = "auto",
+    as_json: bool = False,
+) -> None:
+    """Bend a mesh into the pose of another one; what corresponds is found by itself.
+
+    All meshes are repaired; what is done to --rest is done to the same faces of --like.
+
+    For instance: eigenshape pose cat.ply --like lion.ply -o bent.ply --picture bent.png
+
+    Parameters
+    ----------
+    like
+        Mesh in the wanted pose.
+    rest
+        The shape of --like, with the same faces, in the pose that the mesh has now. The mesh is
+        then bent as that shape was bent from --rest to --like.
+    picture
+        Draw the mesh before and after (PNG, SVG or PDF).
+    """
+    side = steps.picture_side(view, up, picture)
+    steps.require_mesh_path(output)
+    target = steps.load_mesh(mesh, repair)
+    source, posed = steps.load_poses(rest or like, like, repair)
+    factor = sqrt(es.geometry.surface_area(source) / es.geometry.surface_area(target))
+    with progress_bar("match") as progress:
+        found = es.match_shapes(target, source, scale=factor, progress=progress)
+        if rest:
+            bent = es.deformation.transfer_deformation(source, posed, target, found)
+        else:
+            bent = es.matching.take_pose(target, posed, match=found)
+    if as_json:
+        print_json({"path": mesh, "like": like, **_match_facts(found)})
+    else:
+        _print_match(found)
+    if output:
+        steps.save_like(mesh, target, output, bent.vertices)
+    if picture:
+        figure = es.plot.figure_poses({"before": target, "after": bent}, **side)
+        steps.save_picture(figure, picture)
+
+
+def fuse(
+    scans: list[Path],
+    *,
+    output: Path,
+    repair: str = "auto",
+    as_json: bool = False,
+) -> None:
+    """Join scans of one shape from several sides, in any places, to one surface.
+
+    Neighbors should share a third of what they show. A scan that fits no other is named and left
+    out; the exit code is then 3.
+
+    For instance: eigenshape fuse frame1.pcd frame2.pcd frame3.pcd -o whole.ply
+
+    Parameters
+    ----------
+    scans
+        Scans of one rigid shape in one length unit: meshes, or frames of a depth camera (.pcd).
+    """
+    steps.require_mesh_path(output)
+    meshes = [steps.load_surface(path, repair) for path in scans]
+    with progress_bar("fuse") as progress:
+        fused = es.matching.fuse_scans(meshes, progress=progress)
+    es.write_mesh(fused.mesh, output)
+    print_written(output)
+    vertices, faces = fused.mesh.n_vertices, fused.mesh.n_faces
+    if as_json:
+        motions = []
+        for path, motion in zip(scans, fused.motions, strict=True):
+            facts = {"scan": path, "joined": motion is not None}
+            if motion is not None:
+                facts |= {"rotation": motion.rotation, "translation": motion.translation}
+            motions.append(facts)
+        print_json({"output": output, "vertices": vertices, "faces": faces, "scans": motions})
+    else:
+        out.print(
+            f"joined {int(fused.joined.sum())} of {len(scans)} scans: {vertices:,} vertices, "
+            f"{faces:,} faces"
+        )
+    left = [path for path, joined in zip(scans, fused.joined, strict=True) if not joined]
+    for path in left:
+        err.print(f"[yellow]left out:[/] {escape_text(path)} fits no other scan well enough")
+    if left:
+        raise typer.Exit(SOME_FAILED)

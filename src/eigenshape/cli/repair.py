@@ -1,12 +1,54 @@
-"""eigenshape repair: a mesh repaired, or converted, and written."""
+"""eigenshape info, repair and decimate: what a mesh is, what it needs, and the same surface by fewer faces."""
 
 from pathlib import Path
+from typing import Any
 
 import eigenshape as es
+from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
-from eigenshape.cli.console import print_json, print_repairs, print_table, print_written
-from eigenshape.cli.info import format_fact
+from eigenshape.cli.console import (
+    escape_text,
+    out,
+    print_json,
+    print_repairs,
+    print_table,
+    print_written,
+)
 from eigenshape.io.formats.registry import CellKind
+
+
+def info(
+    shape: Path,
+    *,
+    repair: str = "none",
+    dim: int = 2,
+    cells: CellKind | None = None,
+    as_json: bool = False,
+) -> None:
+    """Show the size, topology and faults of a shape, and which repairs would help."""
+    found = steps.load_shape(shape, repair, dim, cells)
+    facts = steps.shape_facts(found)
+    if as_json:
+        print_json({"path": shape, **facts})
+        return
+    out.print(f"[bold]{escape_text(shape)}[/]")
+    for name, value in facts.items():
+        inward = name == "enclosed_volume" and value is not None and value < 0
+        remark = " (faces point inward)" if inward else ""
+        out.print(f"  {name.replace('_', ' '):<24}{_format_fact(value)}{remark}")
+
+
+def _format_fact(value: Any) -> str:
+    """Return a fact of a shape as people read it."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(_format_fact(item) for item in value) or "none"
+    if isinstance(value, int):
+        return f"{value:,}"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def repair(
@@ -48,6 +90,49 @@ def repair(
     rows = []
     for name, value in facts["before"].items():
         if isinstance(value, int):  # counts, and yes or no
-            texts = [format_fact(fact[name]) for fact in facts.values()]
+            texts = [_format_fact(fact[name]) for fact in facts.values()]
             rows.append([name.replace("_", " "), *texts])
     print_table("Repaired", ["", *facts], rows)
+
+
+def decimate(
+    mesh: Path,
+    *,
+    output: Path,
+    n_faces: int | None = None,
+    ratio: float | None = None,
+    repair: str = "none",
+    as_json: bool = False,
+) -> None:
+    """Write a mesh with fewer faces and the same topology, by collapsing edges.
+
+    All else that the file holds stays, or is named: textures, materials, colors, groups, fields.
+    Vertices that are double along seams are joined first.
+
+    For instance: eigenshape decimate scan.ply --ratio 0.1 -o small.ply
+
+    Parameters
+    ----------
+    n_faces
+        Number of faces to keep.
+    ratio
+        Instead of -n: the share of faces to keep, between 0 and 1.
+    """
+    steps.require_mesh_path(output)
+    if (n_faces is None) == (ratio is None):
+        raise InvalidParameterError(
+            "The number of faces must be given by one of --n-faces and --ratio."
+        )
+    surface = steps.load_surface(mesh, repair)
+    # Vertices are double along seams of textures, where the surface would come apart.
+    joined = es.repair(surface, ["weld_seams"])
+    if joined.mesh.n_vertices < surface.n_vertices:
+        print_repairs(joined.report)
+    done = es.geometry.decimate(joined.mesh, n_faces, ratio=ratio)
+    steps.save_like(mesh, done.mesh, output)
+    if as_json:
+        facts = {"n_vertices": done.mesh.n_vertices, "n_faces": done.mesh.n_faces}
+        print_json({"path": mesh, "output": output, "report": done.report, **facts})
+    else:
+        for sentence in done.report:
+            out.print(escape_text(sentence))

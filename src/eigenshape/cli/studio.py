@@ -1,4 +1,4 @@
-"""eigenshape studio: a window in the browser."""
+"""eigenshape studio, serve and report: what the package eigenshape-studio shows in a browser."""
 
 from functools import partial
 from pathlib import Path
@@ -6,9 +6,11 @@ from typing import Annotated
 
 import typer
 
+import eigenshape as es
 from eigenshape._studio import studio_module
 from eigenshape.cli import steps
-from eigenshape.cli.console import print_address
+from eigenshape.cli.console import print_address, print_written, progress_bar
+from eigenshape.cli.inputs import memory_bytes
 
 
 def studio(
@@ -55,3 +57,103 @@ def studio(
         announce=partial(print_address, "studio"),
         browse=browser,
     )
+
+
+def serve(
+    index: Path,
+    *,
+    host: str = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535)] = 8000,
+    allow_remote: bool = False,
+    allow_host: list[str] | None = None,
+    token: Annotated[str | None, typer.Option(envvar="EIGENSHAPE_TOKEN")] = None,
+    write_token: Annotated[str | None, typer.Option(envvar="EIGENSHAPE_WRITE_TOKEN")] = None,
+    workers: Annotated[int, typer.Option(min=1)] = 2,
+    timeout: Annotated[float, typer.Option(min=1)] = 60.0,
+    memory: Annotated[float | None, typer.Option(min=0.5)] = None,
+    show_sources: bool = False,
+    browser: bool = False,
+) -> None:
+    """Serve an index: upload a scan, by a page or a program, and get the most similar shapes.
+
+    Needs the package eigenshape-studio. Programs send the header `Authorization: Bearer TOKEN`; the
+    address /docs lists the calls. Ctrl-C or SIGTERM ends the service when the queries that run have
+    ended.
+
+    For instance: eigenshape serve my-index
+
+    Parameters
+    ----------
+    port
+        Port to listen on; 0 takes any that is free.
+    allow_remote
+        Let other machines in, if they have the token. Nothing is encrypted.
+    allow_host : NAME[:PORT]
+        Answer to this name, too, as clients send it; may be given several times. Names of this
+        machine are known.
+    token
+        Secret that requests must bring, at least 16 letters; other users of the machine can read
+        options, but not the environment variable. By default a random one is printed.
+    write_token
+        Another secret, with which programs may also add and remove shapes. Without it the service
+        only reads.
+    workers
+        Number of processes that describe uploaded meshes.
+    timeout
+        Seconds after which an uploaded mesh is given up.
+    memory
+        Gigabytes that a process may use; a mesh that needs more is refused. By default each
+        process has an equal share of the machine's memory.
+    show_sources
+        Name the files of shapes in answers.
+    browser
+        Open the address in a browser.
+    """
+    server = studio_module("service.server")
+
+    server.serve(
+        index,
+        host=host,
+        port=port,
+        allow_remote=allow_remote,
+        allow_hosts=allow_host or (),
+        token=token,
+        write_token=write_token,
+        workers=es.retrieval.Workers(workers, timeout, memory_bytes(memory)),
+        show_sources=show_sources,
+        announce=partial(print_address, "service"),
+        browse=browser,
+    )
+
+
+def report(
+    mesh: Path,
+    *,
+    output: Path,
+    n_modes: Annotated[int, typer.Option(min=1, max=200)] = 20,
+    view: str = "auto",
+    up: str = "auto",
+    repair: str = "none",
+) -> None:
+    """Write a shape with its spectrum, heat and parts to one HTML file that any browser opens.
+
+    Needs the package eigenshape-studio.
+
+    For instance: eigenshape report scan.ply -o scan.html
+
+    Parameters
+    ----------
+    output
+        Write the page (HTML), which any browser opens without a server.
+    n_modes
+        Number of eigenfunctions to write.
+    """
+    steps.require_output(output, (".html",), "A report")
+    side = steps.picture_side(view, up)
+    writer = studio_module("report")
+    surface = steps.load_mesh(mesh, repair)
+    with progress_bar("report") as progress:
+        writer.write_report(
+            surface, output, name=mesh.name, n_modes=n_modes, **side, progress=progress
+        )
+    print_written(output)

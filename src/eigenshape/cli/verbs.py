@@ -35,6 +35,14 @@ VERBS = (
 INDEX_VERBS = (
     "add", "ls", "rm", "stats", "verify", "compact", "export", "merge", "convert", "duplicates", "learn",
 )  # fmt: skip
+# Verbs that stand in the module of another one; each of the others has a module of its name.
+TOGETHER = {
+    "info": "repair", "decimate": "repair",
+    "operators": "spectrum",
+    "pose": "match", "fuse": "match",
+    "decompress": "compress",
+    "serve": "studio", "report": "studio",
+}  # fmt: skip
 MARKUP: Any = "markdown"  # leaves plain brackets alone, which rich markup would take for its own
 
 # typer brings its own copy of click since version 0.20 and used the package before; this is the
@@ -71,13 +79,17 @@ class Verbs(TyperGroup):
     """The list of verbs. It holds the name and first line of each, and imports a verb when it is called."""
 
     names: tuple[str, ...] = VERBS
-    package = "eigenshape.cli"
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.commands = {
-            name: TyperCommand(name, help=first_line(self.package, name)) for name in self.names
+            name: TyperCommand(name, help=first_line(self.module(name), name))
+            for name in self.names
         }
+
+    def module(self, name: str) -> str:
+        """Return the module of a verb."""
+        return f"eigenshape.cli.{TOGETHER.get(name, name).replace('-', '_')}"
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the options before the verb, as help lists them."""
@@ -102,12 +114,11 @@ class Verbs(TyperGroup):
     def load(self, name: str) -> Any:
         """Import a verb's module and return its command."""
         if name == "index":
-            help_text = first_line(self.package, name)
+            help_text = first_line(self.module(name), name)
             return IndexVerbs(
                 name=name, help=help_text, rich_markup_mode=MARKUP, no_args_is_help=True
             )
-        function = name.replace("-", "_")
-        verb = command_of(getattr(import_module(f"{self.package}.{function}"), function))
+        verb = command_of(getattr(import_module(self.module(name)), name.replace("-", "_")))
         parameters = inspect.signature(verb).parameters.values()
         takes_something = any(parameter.default is parameter.empty for parameter in parameters)
         alone = typer.Typer(
@@ -121,7 +132,10 @@ class IndexVerbs(Verbs):
     """The verbs of `eigenshape index`."""
 
     names = INDEX_VERBS
-    package = "eigenshape.cli.index"
+
+    def module(self, name: str) -> str:
+        """Return the module of a verb: the same for all."""
+        return "eigenshape.cli.index"
 
 
 def load_verb(name: str) -> Any:
@@ -131,12 +145,12 @@ def load_verb(name: str) -> Any:
     return verbs.load(verb)
 
 
-def first_line(package: str, verb: str) -> str:
+def first_line(module: str, verb: str) -> str:
     """Return what a verb does, without importing its module, which takes up to a second."""
-    function = verb.replace("-", "_")
-    place = find_spec(f"{package}.{function}").origin  # type: ignore[union-attr]  # it is there
+    place = find_spec(module).origin  # type: ignore[union-attr]  # it is there
     text = Path(str(place)).read_text(encoding="utf-8")
-    text = text.partition(f"\ndef {function}(")[2] or text  # `index` has a docstring of its own
+    # `index` is no function, and has the docstring of its module.
+    text = text.partition(f"\ndef {verb.replace('-', '_')}(")[2] or text
     return " ".join(text.split('"""')[1].split("\n\n")[0].split())
 
 

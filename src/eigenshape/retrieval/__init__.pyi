@@ -5,13 +5,13 @@ from .building.batch import build_index as build_index
 from .building.batch import train_codebook_from_files as train_codebook_from_files
 from .description import describe as describe
 from .duplicates import find_duplicates as find_duplicates
-from .heat.descriptor import HeatDescriptor as HeatDescriptor
 from .heat.features import HeatFeatures as HeatFeatures
 from .heat.features import find_heat_features as find_heat_features
 from .heat.features import heat_descriptor as heat_descriptor
 from .heat.recipe import SCALE_FREE as SCALE_FREE
 from .heat.recipe import THESIS as THESIS
 from .heat.recipe import HeatRecipe as HeatRecipe
+from .heat.score import HeatDescriptor as HeatDescriptor
 from .heat.score import match_features as match_features
 from .heat.score import matching_score as matching_score
 from .index import ShapeIndex as ShapeIndex
@@ -42,7 +42,7 @@ from .search.reader import IndexReader as IndexReader
 from .search.several import query_indexes as query_indexes
 from .store.damage import Damage as Damage
 from .store.damage import StoreWarning as StoreWarning
-from .store.records import Record as Record
 from .store.upkeep import IndexReport as IndexReport
 from .store.writing import DescribedShape as DescribedShape
+from .store.writing import Record as Record
 from .thumbnails import draw_thumbnail as draw_thumbnail

@@ -21,7 +21,6 @@ from eigenshape.retrieval.search.reader import EngineMaker, IndexReader, choose_
 from eigenshape.retrieval.store.damage import warn_of_damage
 from eigenshape.retrieval.store.database import create, writing
 from eigenshape.retrieval.store.filters import choose_shapes
-from eigenshape.retrieval.store.records import Record
 from eigenshape.retrieval.store.state import IndexState, read_state, tags_and_attributes
 from eigenshape.retrieval.store.upkeep import (
     IndexReport,
@@ -32,6 +31,7 @@ from eigenshape.retrieval.store.upkeep import (
 )
 from eigenshape.retrieval.store.writing import (
     DescribedShape,
+    Record,
     Writer,
     described,
     facts_text,

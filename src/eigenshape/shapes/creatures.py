@@ -1,18 +1,23 @@
 """Synthetic creatures in any number of poses: closed manifold meshes for demos and tests."""
 
+import heapq
+import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float
+from scipy.sparse.linalg import splu
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import adjacency_matrix, edge_table
 from eigenshape.shapes.creature_plans import CREATURES, PLANS
 from eigenshape.shapes.isosurface import find_spacing, isosurface, relax
 from eigenshape.shapes.limbs import Body, distance_to_body, nearest_limbs, place_limbs
-from eigenshape.shapes.skinning import Joints, bend_at_joints, diffuse
-from eigenshape.shapes.thinning import collapse_shortest_edges
 
 # The first mesh has this multiple of the requested number of vertices. The surplus lets `collapse_shortest_edges`
 # remove the shortest edges; a larger surplus takes longer.
@@ -23,6 +28,32 @@ SOFTNESS = 2.2
 # Order of the axes that turns plans, which face +x and stand along +z, to face +z and stand along
 # +y.
 TO_Y_UP = [1, 2, 0]
+# Implicit diffusion steps of the narrowest bend; wider bends take more steps of the same length.
+# Three steps are close to a Gaussian profile.
+STEPS = 3
+# Numbers of neighbors that a collapse may leave a vertex with. Outside this range triangles become
+# slivers; in a regular mesh every vertex has 6.
+FEWEST_NEIGHBORS, MOST_NEIGHBORS = 4, 8
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """The joints of a creature, the outermost first.
+
+    Attributes
+    ----------
+    pivots, axes : (j, 3) float
+        A point and the unit direction of the axis of each joint.
+    limits : (j, 2) float
+        Smallest and largest angle of each joint, in radians.
+    follows : (n, j) float
+        Share of the angle by which each vertex turns: 1 beyond the joint, 0 before it.
+    """
+
+    pivots: Float[np.ndarray, "j 3"]
+    axes: Float[np.ndarray, "j 3"]
+    limits: Float[np.ndarray, "j 2"]
+    follows: Float[np.ndarray, "n j"]
 
 
 def make_creature(
@@ -115,3 +146,99 @@ def _joints(mesh: TriangleMesh, body: Body) -> Joints:
     table = np.array(rows)
     follows = diffuse(mesh, np.column_stack(beyond).astype(np.float64), np.array(widths))
     return Joints(table[:, :3], table[:, 3:6], np.radians(table[:, 6:]), follows)
+
+
+def diffuse(
+    mesh: TriangleMesh, values: Float[np.ndarray, "n j"], widths: Float[np.ndarray, " j"]
+) -> Float[np.ndarray, "n j"]:
+    """Diffuse functions on a mesh of even triangles, each by a given standard deviation in length.
+
+    Diffusion stays on the skin, so nothing leaks to another limb that is only near in space.
+    """
+    edges = edge_table(mesh).edges
+    ends = mesh.vertices[edges]
+    length2 = np.square(ends[:, 0] - ends[:, 1]).sum(axis=1).mean()
+    links = adjacency_matrix(edges, np.ones(len(edges)), mesh.n_vertices)
+    step = widths.min() ** 2 / STEPS
+    # With six neighbors at equal distance the sum of differences is 3/2 length² times the
+    # Laplacian, and the variance of diffused heat is twice the time.
+    pencil = sp.eye_array(mesh.n_vertices) + step / (3 * length2) * (
+        sp.diags_array(links.sum(axis=1)) - links
+    )
+    spread, n_steps = values.copy(), np.rint(widths**2 / step)
+    with one_blas_thread():
+        factor = splu(pencil.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        for step_number in range(int(n_steps.max())):
+            unfinished = n_steps > step_number
+            spread[:, unfinished] = factor.solve(spread[:, unfinished])
+    return spread
+
+
+def bend_at_joints(
+    points: Float[np.ndarray, "n 3"], joints: Joints, angles: Float[np.ndarray, " j"]
+) -> Float[np.ndarray, "n 3"]:
+    """Rotate each point about each joint by its share of the angle (Rodrigues' formula)."""
+    for pivot, axis, angle, share in zip(
+        joints.pivots, joints.axes, angles, joints.follows.T, strict=True
+    ):
+        arm = points - pivot
+        cosine, sine = np.cos(angle * share)[:, None], np.sin(angle * share)[:, None]
+        points = (
+            pivot
+            + cosine * arm
+            + sine * np.cross(axis, arm)
+            + (1 - cosine) * np.einsum("ni,i->n", arm, axis)[:, None] * axis
+        )
+    return points
+
+
+def collapse_shortest_edges(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
+    """Collapse the shortest edges of a closed manifold until it has at most `n_vertices` vertices.
+
+    An edge collapses to its midpoint if its ends have exactly two neighbors in common, so that the
+    surface stays a manifold of the same genus (the link condition: Dey, Edelsbrunner, Guha and
+    Nekhayev 1999), and if no vertex gets too few or too many neighbors. If no edge may collapse,
+    more vertices remain.
+    """
+    points, edges = mesh.vertices.tolist(), edge_table(mesh).edges.tolist()
+    around: list[set[int]] = [set() for _ in points]
+    for one, two in edges:
+        around[one].add(two)
+        around[two].add(one)
+    shortest = [(math.dist(points[one], points[two]), one, two) for one, two in edges]
+    heapq.heapify(shortest)
+    target = list(range(mesh.n_vertices))
+    surplus = mesh.n_vertices - n_vertices
+    while surplus > 0 and shortest:
+        length, kept, gone = heapq.heappop(shortest)
+        # The heap still holds edges that have collapsed or changed their length since.
+        out_of_date = gone not in around[kept] or length != math.dist(points[kept], points[gone])
+        if out_of_date:
+            continue
+        common = around[kept] & around[gone]
+        n_left = len(around[kept]) + len(around[gone]) - 4
+        if (
+            len(common) != 2
+            or not FEWEST_NEIGHBORS <= n_left <= MOST_NEIGHBORS
+            or any(len(around[other]) <= FEWEST_NEIGHBORS for other in common)
+        ):
+            continue
+        points[kept] = [(x + y) / 2 for x, y in zip(points[kept], points[gone], strict=True)]
+        target[gone] = kept
+        for other in around[gone]:
+            around[other].remove(gone)
+            if other != kept:
+                around[other].add(kept)
+                around[kept].add(other)
+        around[gone] = set()
+        for other in sorted(around[kept]):
+            heapq.heappush(shortest, (math.dist(points[kept], points[other]), kept, other))
+        surplus -= 1
+    # Replace the corners of faces by what they have collapsed to, and leave out collapsed faces.
+    into = np.array(target)
+    while (into[into] != into).any():
+        into = into[into]
+    stays, number = np.unique(into, return_inverse=True)
+    corners = number[mesh.faces]
+    alive = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return TriangleMesh(np.array(points)[stays], corners[alive])

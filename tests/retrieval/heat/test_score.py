@@ -8,9 +8,13 @@ from hypothesis import strategies as st
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.heat import score
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor
 from eigenshape.retrieval.heat.recipe import PRESETS, SCALE_FREE, THESIS, HeatRecipe
-from eigenshape.retrieval.heat.score import match_features, matching_score, matching_scores
+from eigenshape.retrieval.heat.score import (
+    HeatDescriptor,
+    match_features,
+    matching_score,
+    matching_scores,
+)
 
 
 def of(vectors, recipe=RECIPE):

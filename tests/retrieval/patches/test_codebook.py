@@ -17,8 +17,6 @@ from eigenshape.retrieval.patches.packing import pack_codes, unpack_codes
 from eigenshape.retrieval.patches.patches import Patches, extract_patches, surface_patches
 from eigenshape.scans.partial import viewpoint
 
-pytestmark = pytest.mark.long
-
 KINDS = ("quadruped", "hand", "octopus", "biped")
 
 
@@ -49,6 +47,7 @@ def test_another_pose_is_the_nearest(creatures, book):
         assert patch_distances(vectors[kind, 1], known)[place] == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.long
 def test_vectors_are_gradients_of_the_likelihood(creatures, book):
     shape = creatures["hand", 2]
     place, radius, step = 1, codes.BASES[1], 1e-5
@@ -150,6 +149,7 @@ def test_distances_are_those_of_cosines():
     assert patch_distances(query, 0 * other[None]) == pytest.approx(1)
 
 
+@pytest.mark.long
 def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
     mesh = es.make_creature("hand", 1, n_vertices=1200)
     _, *views = extract_patches(mesh, n_views=3, clean=False)
@@ -164,6 +164,7 @@ def test_a_scan_is_nearest_to_the_view_from_its_side(creatures, book):
     assert len(extract_patches(scan, n_views=3)) == 1
 
 
+@pytest.mark.long
 def test_the_same_again(creatures):
     one, two = (training.train_codebook(list(creatures.values()), seed=3) for _ in range(2))
     for name in ("means", "spreads", "axes", "shares", "centers", "variances"):

@@ -7,14 +7,14 @@ from search_cases import RECIPE, mixtures
 
 import eigenshape as es
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
-from eigenshape.retrieval.patches.distance import patch_distances
-from eigenshape.retrieval.patches.isolation import (
+from eigenshape.retrieval.patches.distance import (
     N_NEAREST,
     USUAL_ISOLATION,
     measure_isolations,
+    patch_distances,
     scale_distances,
 )
-from eigenshape.retrieval.search import isolations as kept_isolations
+from eigenshape.retrieval.search import coarse
 
 N_SHAPES = 8
 
@@ -64,7 +64,7 @@ def test_an_index_scores_as_descriptors_do_in_any_order(codes, points):
 
 def test_what_is_added_removed_or_merged_is_scored_as_in_a_new_index(points, tmp_path, monkeypatch):
     """Isolations are kept in a file, which must follow the index."""
-    monkeypatch.setattr(kept_isolations, "FEWEST_TO_KEEP", 1)
+    monkeypatch.setattr(coarse, "FEWEST_TO_KEEP", 1)
     count = 14
     shapes = [
         es.retrieval.DescribedShape(str(number), [PatchDescriptor(each, points, RECIPE)])

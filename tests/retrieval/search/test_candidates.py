@@ -7,8 +7,7 @@ import pytest
 from search_cases import RECIPE, as_query, make_source, mixtures
 
 import eigenshape as es
-from eigenshape.retrieval.patches.distance import packed_distances
-from eigenshape.retrieval.patches.isolation import USUAL_ISOLATION
+from eigenshape.retrieval.patches.distance import USUAL_ISOLATION, packed_distances
 from eigenshape.retrieval.search import candidates, engines
 from eigenshape.retrieval.search.candidates import choose_candidates, n_compared
 from eigenshape.retrieval.search.coarse import coarse_rows

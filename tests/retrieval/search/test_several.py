@@ -10,7 +10,7 @@ from search_cases import RECIPE, mixtures
 
 import eigenshape as es
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
-from eigenshape.retrieval.patches.isolation import USUAL_ISOLATION
+from eigenshape.retrieval.patches.distance import USUAL_ISOLATION
 from eigenshape.retrieval.search import reader
 
 pytestmark = pytest.mark.long

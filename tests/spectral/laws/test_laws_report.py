@@ -536,6 +536,12 @@ def oriented_volumes(mesh):
     return np.linalg.det(corners[:, 1:] - corners[:, :1])
 
 
+def test_a_jiggle_is_no_larger_than_rounding():
+    ball = icosphere(2)
+    moved = np.abs(changes.jiggle(ball, np.random.default_rng(0)).vertices - ball.vertices)
+    assert 0 < moved.max() < 1e-14
+
+
 @pytest.mark.parametrize("dim", [1, 2, 3, 5])
 def test_changes_keep_or_turn_the_orientation_as_they_say(dim):
     rng = np.random.default_rng(dim)

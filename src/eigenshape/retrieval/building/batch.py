@@ -34,9 +34,8 @@ from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descripto
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
 from eigenshape.retrieval.patches.patches import Patches, extract_patches
 from eigenshape.retrieval.patches.training import train_codebook
-from eigenshape.retrieval.store.records import Record
 from eigenshape.retrieval.store.upkeep import find_damaged
-from eigenshape.retrieval.store.writing import DescribedShape
+from eigenshape.retrieval.store.writing import DescribedShape, Record
 from eigenshape.retrieval.thumbnails import draw_thumbnail
 from eigenshape.scans.partial import view_number
 

@@ -23,8 +23,8 @@ from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import boundary_edges, vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
-from eigenshape.retrieval.heat.descriptor import HeatDescriptor
 from eigenshape.retrieval.heat.recipe import SCALE_FREE, HeatRecipe
+from eigenshape.retrieval.heat.score import HeatDescriptor
 from eigenshape.scans.partial import MeshPart, view_of, views_of
 from eigenshape.spectral.signatures.approximate_heat import approximate_heat_signature
 from eigenshape.spectral.signatures.heat import heat_kernel_signature, reflection_free_signature

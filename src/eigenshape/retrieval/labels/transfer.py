@@ -25,8 +25,7 @@ from eigenshape.geometry.orientation import orient_closed_outward
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import edge_table, face_pairs
 from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
-from eigenshape.retrieval.labels.label_points import LabelPoints, label_points
-from eigenshape.retrieval.labels.labeled_shape import LabeledShape
+from eigenshape.retrieval.labels.labeled_shape import LabeledShape, LabelPoints, label_points
 from eigenshape.retrieval.labels.transport import transport_points
 
 # Heat time in which votes spread, as a share of the area. It bridges the gaps between points and

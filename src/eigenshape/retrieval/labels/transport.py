@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._threads import one_blas_thread
-from eigenshape.retrieval.labels.label_points import LabelPoints
+from eigenshape.retrieval.labels.labeled_shape import LabelPoints
 from eigenshape.retrieval.patches.matching import anchor_strain
 
 # Weights of the costs beside that of patches, without unit; all were chosen on the tuning half of

@@ -1,8 +1,4 @@
-"""Compiled loops of `distance`: codes of four bits, and the distance of two descriptions.
-
-All sums are of whole numbers, so that every CPU returns the same distances. Codes are multiplied
-as 16-bit numbers, for which processors have one instruction for products and their sum.
-"""
+"""Compiled loops of `distance` and `coarse`: codes of four bits, and distances of two descriptions or of short rows."""
 
 from typing import no_type_check
 
@@ -102,3 +98,22 @@ def packed_view_distance(query, query_lengths, packed, codes, code_lengths, m, n
             view = distance(query[rows], query_lengths[rows], other, other_lengths, n_sizes, price)
             nearest = min(nearest, view)
     return (own + nearest) / 2
+
+
+@njit
+@no_type_check
+def scan(query, rows, unit, price, found):
+    """Write 1 - the best mean cosine over relative sizes, of one query with each shape.
+
+    `query` is (s, d) int16 and `rows` (n, s, d) int8; `unit` is the mean cosine of a product of 1.
+    """
+    n_sizes = len(query)
+    for place in range(len(rows)):
+        best = -np.inf
+        for step in range(1 - n_sizes, n_sizes):
+            ours, theirs = query[max(-step, 0)], rows[place, max(step, 0)]
+            total = np.int32(0)
+            for number in range(len(ours)):
+                total += np.int32(ours[number]) * np.int32(np.int16(theirs[number]))
+            best = max(best, unit * np.float64(np.int32(total)) - price * abs(step))
+        found[place] = 1.0 - best

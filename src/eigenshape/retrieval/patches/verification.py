@@ -9,8 +9,12 @@ from jaxtyping import Float
 from eigenshape._arguments import require_each, require_type
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
-from eigenshape.retrieval.patches.distance import packed_distances, patch_distances
-from eigenshape.retrieval.patches.isolation import measure_isolations, scale_distances
+from eigenshape.retrieval.patches.distance import (
+    measure_isolations,
+    packed_distances,
+    patch_distances,
+    scale_distances,
+)
 from eigenshape.retrieval.patches.matching import patch_agreement
 from eigenshape.retrieval.patches.packing import pack_codes
 

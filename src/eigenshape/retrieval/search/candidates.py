@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Int8
 
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
-from eigenshape.retrieval.patches.isolation import scale_distances
+from eigenshape.retrieval.patches.distance import scale_distances
 from eigenshape.retrieval.search.coarse import CoarseRows
 
 # Below this number of shapes all are compared: it takes 30 ms, and a file of coarse rows would

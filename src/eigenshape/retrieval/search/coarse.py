@@ -1,4 +1,4 @@
-"""Short rows of all shapes of an index, kept in a file that can be made again at any time."""
+"""What search keeps in files beside an index: short rows of all shapes, and how isolated each is."""
 
 import os
 from collections.abc import Iterator
@@ -6,21 +6,22 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol, runtime_checkable
+from zipfile import BadZipFile
 from zlib import crc32
 
 import numpy as np
-from jaxtyping import Float32, Int, Int8, Int64
+from jaxtyping import Float, Float32, Int, Int8, Int64
 from numpy.lib.format import read_array, read_array_header_1_0, read_magic
 
 from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import FileFormatError
 from eigenshape._files import replacing
 from eigenshape._text import short_repr
+from eigenshape.retrieval.patches.code_loops import scan
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.patches.distance import SIZE_PRICE
+from eigenshape.retrieval.patches.distance import N_REFERENCES, SIZE_PRICE, measure_isolations
 from eigenshape.retrieval.patches.packing import unpack_codes
 from eigenshape.retrieval.search.axes import PatchAxes, fit_axes
-from eigenshape.retrieval.search.scan_loops import scan
 
 # Shapes to which axes are fitted: three sizes of each give 6,000 vectors of 1,280 numbers, and the
 # fit takes 2 s. Twice as many changed no list of candidates.
@@ -32,6 +33,7 @@ GROWTH = 4
 # at each opening, 0.2 ms a shape; writing the file anew takes as long as making a tenth of it.
 MOST_CHANGED = 0.05
 FORMAT = "eigenshape coarse rows 1"
+FEWEST_TO_KEEP = 100  # shapes of an index that has such a file; fewer are measured in 10 ms
 
 
 @runtime_checkable
@@ -257,3 +259,42 @@ def _mapped(file: BinaryIO) -> np.ndarray | None:
         return np.empty(shape, dtype=np.int8)
     mapped: np.ndarray[Any, Any] = np.memmap(file, dtype, "r", file.tell(), shape)
     return np.asarray(mapped)
+
+
+def stored_isolations(
+    source: Rows, recipe: PatchRecipe, checksums: Int[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Return the isolation of each shape of an index, of which those that are new are measured.
+
+    The shapes with the 500 smallest checksums are the references, so the answer depends on what the
+    index holds, and not on the order in which it was added. If one of them is added or removed, all
+    shapes are measured again.
+
+    Parameters
+    ----------
+    source : Rows
+    recipe : PatchRecipe
+    checksums : (n,) int
+        Of the packed codes; equal checksums mean equal codes.
+    """
+    path = source.beside(f"isolation-{recipe.codebook.digest[:16]}-{recipe.clip!r}.npz")
+    distinct, firsts, inverse = np.unique(checksums, return_index=True, return_inverse=True)
+    found = np.full(len(distinct), np.nan)
+    problems = (OSError, ValueError, KeyError, EOFError, BadZipFile)
+    with suppress(*problems), path.open("rb") as file, np.load(file) as kept:
+        if np.array_equal(kept["checksums"][:N_REFERENCES], distinct[:N_REFERENCES]):
+            both = np.intersect1d(distinct, kept["checksums"], return_indices=True)
+            found[both[1]] = kept["isolations"][both[2]]
+    missing = np.flatnonzero(np.isnan(found))
+    shape: Any = recipe.codebook.code_shape
+
+    def whole(number: int) -> np.ndarray:
+        (rows,) = source.rows_of(firsts[[number]], checked=True)
+        return unpack_codes(rows[: shape[0] * shape[1]]).reshape(shape)
+
+    found[missing] = measure_isolations(whole, len(distinct), missing)
+    if len(missing) and len(distinct) >= FEWEST_TO_KEEP:
+        # A folder that cannot be written to, as on a read-only disk, is searched all the same.
+        with suppress(OSError, FileFormatError), replacing(path) as fresh:
+            np.savez(fresh, checksums=distinct, isolations=found)
+    return found[inverse]

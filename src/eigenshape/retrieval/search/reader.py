@@ -18,16 +18,15 @@ from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe
-from eigenshape.retrieval.patches.isolation import USUAL_ISOLATION
+from eigenshape.retrieval.patches.distance import USUAL_ISOLATION
 from eigenshape.retrieval.search.candidates import (
     FEWEST_TO_SCAN,
     Candidates,
     Supplier,
     choose_candidates,
 )
-from eigenshape.retrieval.search.coarse import CoarseRows, coarse_rows
+from eigenshape.retrieval.search.coarse import CoarseRows, coarse_rows, stored_isolations
 from eigenshape.retrieval.search.engines import Engine, supply_from
-from eigenshape.retrieval.search.isolations import stored_isolations
 from eigenshape.retrieval.search.matches import Matches
 from eigenshape.retrieval.search.scoring import search_candidates
 from eigenshape.retrieval.store.damage import warn_of_damage

@@ -14,9 +14,8 @@ from eigenshape._errors import StoreError
 from eigenshape._text import html_repr, short_repr
 from eigenshape.retrieval.store.damage import Damage, warn_of_damage
 from eigenshape.retrieval.store.database import DAMAGE, DATABASE, TABLES, writing
-from eigenshape.retrieval.store.records import Record
 from eigenshape.retrieval.store.state import DamagedEntryError, IndexState, read_state
-from eigenshape.retrieval.store.writing import Writer
+from eigenshape.retrieval.store.writing import Record, Writer
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,0 @@
-"""Keep an index of shapes: add meshes, list and remove shapes, check, compact, export and merge.
-
-Each verb of `eigenshape index` is a module here.
-"""
