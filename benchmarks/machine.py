@@ -4,6 +4,7 @@ import os
 import platform
 import re
 import resource
+import shlex
 import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError, version
@@ -39,7 +40,7 @@ def command(output: str) -> str:
     if output in words:
         place = words.index(output)
         del words[place : place + 2]
-    return " ".join(["python", Path(program).resolve().relative_to(ROOT).as_posix(), *words])
+    return shlex.join(["python", Path(program).resolve().relative_to(ROOT).as_posix(), *words])
 
 
 def commit() -> str:

@@ -76,18 +76,19 @@ class FitPlan:
 class Fit:
     """A part bent onto a whole.
 
-    `places` are the vertices of the whole that are nearest to the compared vertices of the part,
-    `gaps` how far these stay from there, in units, with their normals. `misfit` is the mean gap
-    times the root of the strain.
+    `points` are where the compared vertices of the part come to lie, `places` the vertices of the
+    whole that are nearest to them, `gaps` how far they stay from there, in units, with their
+    normals. `misfit` is the mean gap times the root of the strain.
     """
 
+    points: Float[np.ndarray, "v 3"]
     places: Int[np.ndarray, " v"]
     gaps: Float[np.ndarray, " v"]
     misfit: float
 
     def select(self, chosen: Int[np.ndarray, " k"]) -> "Fit":
         """Return the same fit at some of its vertices."""
-        return Fit(self.places[chosen], self.gaps[chosen], self.misfit)
+        return Fit(self.points[chosen], self.places[chosen], self.gaps[chosen], self.misfit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +207,7 @@ def _fit(
     moved = pose.places[plan.two] - pose.places[plan.one]
     wrong = np.einsum("eij,ej->ei", pose.turns[plan.one], plan.links) - moved
     strain = float((wrong**2).sum() / max(float((plan.links**2).sum()), TINY))
-    return Fit(found, gaps, float(plan.shares @ gaps * np.sqrt(strain)))
+    return Fit(points, found, gaps, float(plan.shares @ gaps * np.sqrt(strain)))
 
 
 def _bend(

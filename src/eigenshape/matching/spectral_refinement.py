@@ -61,6 +61,16 @@ def refine_places(
     return places_in_faces(mesh, theirs, smooth, places)
 
 
+def corners_of_faces(
+    mesh: TriangleMesh, vertices: Int[np.ndarray, " p"]
+) -> tuple[Int[np.ndarray, " p"], Float[np.ndarray, "p 3"]]:
+    """Return the first face at each given vertex, and weights, all on that vertex."""
+    first = np.zeros(mesh.n_vertices, dtype=np.int64)
+    first[mesh.faces[::-1].ravel()] = np.repeat(np.arange(mesh.n_faces)[::-1], 3)
+    faces = first[vertices]
+    return faces, (mesh.faces[faces] == vertices[:, None]).astype(np.float64)
+
+
 def places_in_faces(
     mesh: TriangleMesh,
     corners: Float[np.ndarray, "n k"],

@@ -96,7 +96,7 @@ def prepare_target(whole: MeshLike) -> MatchTarget:
 
     It is turned outward and cleaned of noise, 500 points are described by patches, on the whole and
     on what eight viewpoints see of it, and distances from these to all vertices and 150
-    eigenfunctions are computed: 3 s for 5,000 vertices. A piece of more than 16,000 vertices, or with
+    eigenfunctions are computed: about 1 s for 5,000 vertices. A piece of more than 16,000 vertices, or with
     needles, is represented by a copy with fewer vertices and without needles.
 
     Parameters
