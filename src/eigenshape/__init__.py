@@ -14,6 +14,7 @@ deformation  regions, motions, editing sessions, transfer of poses
 stability    how far two shapes and their spectra differ
 retrieval    descriptors, an index of shapes, search
 matching     dense correspondences of parts and wholes
+morphometrics  landmarks and their files, statistics of shapes
 io           files, trimesh and PyVista
 plot         pictures
 types        annotations for your own signatures

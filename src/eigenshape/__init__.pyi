@@ -4,6 +4,7 @@ from . import features as features
 from . import geometry as geometry
 from . import io as io
 from . import matching as matching
+from . import morphometrics as morphometrics
 from . import operators as operators
 from . import plot as plot
 from . import retrieval as retrieval

@@ -28,6 +28,7 @@ MAKERS = {
     "Item": "es.retrieval.Item(name, path)",
     "LabelTransfer": "es.transfer_labels(labeled, target)",
     "LabeledShape": "es.retrieval.LabeledShape(mesh, labels)",
+    "Landmarks": "es.morphometrics.Landmarks(names, points)",
     "Laplacian": "es.cotangent_laplacian(mesh)",
     "LinearSolver": "es.calculus.factor_equations(matrix)",
     "Mapping": "{title: value}",
@@ -62,6 +63,7 @@ MAKERS = {
 }
 # The call that reads a value of each type from a file.
 READERS = {
+    "Landmarks": "es.morphometrics.read_landmarks({path})",
     "PatchCodebook": "es.retrieval.read_codebook(Path({path}).read_bytes())",
     "PointCloud": "es.io.read_points({path}, dim=2)",
     "ShapeIndex": "es.ShapeIndex.open({path})",

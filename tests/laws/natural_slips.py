@@ -184,6 +184,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.deformation.BoxRegion: lambda: HEAD,
     es.deformation.SkeletonResponse: lambda: es.deformation.skeleton_response(binding()),
     es.deformation.DetailedSkeleton: lambda: es.deformation.detailed_skeleton(binding()),
+    es.morphometrics.Landmarks: lambda: es.morphometrics.Landmarks(["nose"], [[0.0, 1.0, 2.0]]),
     es.spectral.FunctionalMap: mapping,
     es.matching.MatchTarget: target,
     es.matching.ShapeMatch: matched,
@@ -327,6 +328,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "view": lambda: [0.0, 0.0, 1.0],
     "winding_numbers.points": lambda: bent().vertices,
     "write_edits.path": lambda: FOLDER / "edits.json",
+    "write_landmarks.path": lambda: FOLDER / "written.csv",
     "write_points.path": lambda: FOLDER / "written.xyz",
 }
 # What a mesh is in all but type: an answer must be that of the mesh.

@@ -176,6 +176,8 @@ class Shared:
         es.write_mesh(self.animal, self.labeled_folder / "animal.off")
         (self.labeled_folder / "animal.seg").write_text("\n".join(map(str, self.labels)))
         (self.labeled_folder / "names.txt").write_text("torso\nleg\n")
+        self.skull = es.morphometrics.Landmarks(["nose", "left", "right"], np.eye(3))
+        es.morphometrics.write_landmarks(self.skull, self.folder / "skull.mrk.json")
         self.bytes = es.retrieval.write_codebook(self.codebook)
         es.io.write_fields(self.animal, self.folder / "fields.vtu", {"heat": self.heat})
         self.attributes = es.read_mesh(self.folder / "ball.ply", attributes=True)[1]
@@ -624,6 +626,11 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_edits": lambda v: es.io.read_edits(v.folder / "edits.json", v.animal),
     "read_mesh": lambda v: es.read_mesh(v.folder / "ball.ply"),
     "read_surface": lambda v: es.io.read_surface(v.folder / "ball.ply"),
+    "read_landmarks": lambda v: es.morphometrics.read_landmarks(v.folder / "skull.mrk.json"),
+    "read_specimens": lambda v: es.morphometrics.read_specimens(v.folder / "skull.mrk.json"),
+    "write_landmarks": lambda v: written(
+        v.folder, ".csv", lambda path: es.morphometrics.write_landmarks(v.skull, path)
+    ),
     "read_points": lambda v: es.io.read_points(v.folder / "cloud.ply"),
     "read_shape": lambda v: es.read_shape(v.folder / "square.mesh"),
     "reconstruct": lambda v: es.spectral.reconstruct(v.many_coefficients, v.many_spectrum),

@@ -1,0 +1,163 @@
+"""Named points of specimens."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from typing_extensions import TypeAliasType
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_numbers
+from eigenshape._errors import InvalidParameterError
+from eigenshape._text import short_repr
+from eigenshape._typing import ArrayLike
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Landmarks(ReadOnly):
+    """Named points of one specimen.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Each name once.
+    points : (k, 3) float
+        In the unit and the frame of the specimen's mesh. A row of NaN is a missing landmark.
+    spread : (k,) float, optional
+        How far each point may be from its true place, in the unit of the points. NaN if unknown.
+    curves : sequence of sequences of int
+        For each curve the rows of its points, in order. Its inner points are semilandmarks, which
+        `fit_procrustes` may slide; its ends are landmarks. A closed curve ends with its first row.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the numbers of names, points and spreads differ, a name is empty or occurs twice, a point
+        is infinite or partly NaN, a spread is negative or infinite, or a curve refers to a row that
+        does not exist.
+
+    See Also
+    --------
+    read_landmarks, write_landmarks
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.morphometrics.Landmarks(["nasion"], [[0.0, 1.5, 2.0]]).points.tolist()
+    [[0.0, 1.5, 2.0]]
+    """
+
+    names: tuple[str, ...]
+    points: Float[np.ndarray, "k 3"]
+    spread: Float[np.ndarray, " k"] | None
+    curves: tuple[tuple[int, ...], ...]
+
+    def __init__(
+        self,
+        names: Iterable[str],
+        points: ArrayLike,
+        spread: ArrayLike | None = None,
+        curves: Sequence[Sequence[int]] = (),
+    ) -> None:
+        names, places = tuple(names), real_numbers(points, "points").astype(np.float64)
+        if places.shape != (len(names), 3):
+            raise InvalidParameterError(
+                f"points must have shape (k, 3), one row for each name; there are {len(names)} "
+                f"names, and the shape is {places.shape}."
+            )
+        first: dict[str, int] = {}
+        for row, name in enumerate(names):
+            require_name(name, f"names[{row}]")
+            if name in first:
+                raise InvalidParameterError(
+                    f"Names of landmarks must differ; {name!r} is that of rows {first[name]} and "
+                    f"{row}."
+                )
+            first[name] = row
+        missing = np.isnan(places)
+        bad = np.isinf(places).any(axis=1) | (missing.any(axis=1) & ~missing.all(axis=1))
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise InvalidParameterError(
+                "Points must be finite, and all three numbers of a missing one must be NaN; "
+                f"{names[row]!r}, row {row}, is {places[row].tolist()}."
+            )
+        widths = None
+        if spread is not None:
+            widths = freeze(real_numbers(spread, "spread").astype(np.float64))
+            if widths.shape != (len(names),) or np.isinf(widths).any() or (widths < 0).any():
+                raise InvalidParameterError(
+                    f"spread must be {len(names)} numbers, one for each point, each at least 0 or "
+                    f"NaN; it is {widths.tolist()}."
+                )
+        object.__setattr__(self, "names", names)
+        object.__setattr__(self, "points", freeze(places))
+        object.__setattr__(self, "spread", widths)
+        object.__setattr__(self, "curves", as_curves(curves, len(names)))
+
+    __repr__ = short_repr
+
+
+Specimens = TypeAliasType("Specimens", Mapping[str, Landmarks] | Sequence[Landmarks] | ArrayLike)
+
+
+def require_name(name: object, where: str) -> None:
+    """Raise an error if a name could not stand in a line of a file, or would be changed there."""
+    if not isinstance(name, str) or not name or name != name.strip() or not name.isprintable():
+        raise InvalidParameterError(
+            f"{where} must be a text without line breaks that neither begins nor ends with a space; "
+            f"it is {name!r}."
+        )
+
+
+def as_curves(curves: Sequence[Sequence[int]], n_points: int) -> tuple[tuple[int, ...], ...]:
+    """Return curves as tuples of rows; raise an error if a row does not exist."""
+    return tuple(
+        tuple(whole_numbers(list(curve), f"curves[{number}]", 0, n_points - 1).tolist())
+        for number, curve in enumerate(curves)
+    )
+
+
+def as_configurations(specimens: Specimens) -> Float[np.ndarray, "n k 3"]:
+    """Return points of several specimens as one array, with NaN for missing ones.
+
+    Raise InvalidParameterError if they are no such points, or names of landmarks differ.
+    """
+    if isinstance(specimens, Mapping):
+        return _stack(dict(specimens))
+    if isinstance(specimens, list | tuple) and any(
+        isinstance(each, Landmarks) for each in specimens
+    ):
+        return _stack({str(number): each for number, each in enumerate(specimens)})
+    points = real_numbers(specimens, "specimens").astype(np.float64)  # type: ignore[arg-type]
+    if points.ndim != 3 or points.shape[2] != 3 or not points.size:
+        raise InvalidParameterError(
+            f"specimens must have shape (n, k, 3), k points of n specimens; the shape is "
+            f"{points.shape}."
+        )
+    return points
+
+
+def _stack(specimens: dict[str, Landmarks]) -> Float[np.ndarray, "n k 3"]:
+    require_same_names(specimens)
+    return np.stack([landmarks.points for landmarks in specimens.values()])
+
+
+def require_same_names(specimens: Mapping[str, Landmarks]) -> None:
+    """Raise an error if there is no specimen, or two differ in the names or the order of landmarks."""
+    names: tuple[str, ...] | None = None
+    for specimen, landmarks in specimens.items():
+        require_type(landmarks, Landmarks, f"specimens[{specimen!r}]")
+        names = landmarks.names if names is None else names
+        if landmarks.names != names:
+            other = next(
+                (one for one, two in zip(landmarks.names, names, strict=False) if one != two),
+                f"{len(landmarks.names)} landmarks",
+            )
+            raise InvalidParameterError(
+                f"All specimens must have the same landmarks in the same order, {len(names)} from "
+                f"{names[0]!r} on; {specimen!r} has {other!r}. Give missing ones as NaN."
+            )
+    if not names:
+        raise InvalidParameterError("There must be at least one specimen with a landmark.")
