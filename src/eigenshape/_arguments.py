@@ -29,6 +29,7 @@ MAKERS = {
     "LabelTransfer": "es.transfer_labels(labeled, target)",
     "LabeledShape": "es.retrieval.LabeledShape(mesh, labels)",
     "Laplacian": "es.cotangent_laplacian(mesh)",
+    "LatentBasis": "es.spectral.latent_basis(maps)",
     "LinearSolver": "es.calculus.factor_equations(matrix)",
     "Mapping": "{title: value}",
     "MergeTree": "es.merge_tree(mesh, values)",
