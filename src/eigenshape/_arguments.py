@@ -30,6 +30,7 @@ MAKERS = {
     "LabeledShape": "es.retrieval.LabeledShape(mesh, labels)",
     "Landmarks": "es.morphometrics.Landmarks(names, points)",
     "Laplacian": "es.cotangent_laplacian(mesh)",
+    "LatentBasis": "es.spectral.latent_basis(maps)",
     "LinearSolver": "es.calculus.factor_equations(matrix)",
     "Mapping": "{title: value}",
     "MergeTree": "es.merge_tree(mesh, values)",

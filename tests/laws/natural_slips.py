@@ -114,6 +114,11 @@ def mapping() -> es.spectral.FunctionalMap:
     )
 
 
+@cache
+def latent() -> es.spectral.LatentBasis:
+    return es.spectral.latent_basis({(0, 1): mapping()})
+
+
 def plan() -> es.stability.StabilityPlan:
     return es.stability.StabilityPlan(k=5, n_samples=100, times=(0.1,))
 
@@ -186,6 +191,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.deformation.DetailedSkeleton: lambda: es.deformation.detailed_skeleton(binding()),
     es.morphometrics.Landmarks: lambda: es.morphometrics.Landmarks(["nose"], [[0.0, 1.0, 2.0]]),
     es.spectral.FunctionalMap: mapping,
+    es.spectral.LatentBasis: latent,
     es.matching.MatchTarget: target,
     es.matching.ShapeMatch: matched,
     es.matching.Registration: lambda: es.matching.register_scans(body(), body()),
@@ -250,6 +256,8 @@ NAMED: dict[str, Callable[[], Any]] = {
     "delta": lambda: 0.3,
     "eigenspace_errors.eigenvalues": lambda: spectrum().eigenvalues[:8],
     "eigenspace_errors.functions": lambda: spectrum().eigenvectors[:, :6],
+    "difference_regions.difference": lambda: np.eye(5),
+    "difference_regions.shape": lambda: 0,
     "end": lambda: 5,
     "export_bundle.form": lambda: "numpy",
     "extend_scalar.values": lambda: [1.0, 2.0],
@@ -269,6 +277,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "labels": labels,
     "labels_from_votes.labels": lambda: [4, 2, 7],
     "labels_from_votes.votes": lambda: np.eye(body().n_vertices)[:, :3],
+    "latent_basis.maps": lambda: {(0, 1): mapping()},
     "level": lambda: 0.1,
     "logarithmic_map.source": lambda: 0,
     "make_creature.kind": lambda: "fish",

@@ -94,6 +94,7 @@ class Shared:
     def _make_maps(self) -> None:
         pairs = np.repeat(np.arange(0, 700, 70), 2).reshape(-1, 2)
         self.map = es.functional_map(self.spectrum, self.spectrum2, pairs, n_modes=8)
+        self.latent = es.spectral.latent_basis({(0, 1): self.map})
 
     def _make_descriptors(self) -> None:
         self.codebook = es.retrieval.default_codebook()
@@ -415,6 +416,11 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "detect_watermark": lambda v: es.spectral.detect_watermark(
         v.animal, v.marked, ["a key", "another"], k=30
     ),
+    "difference_regions": lambda v: [
+        es.spectral.difference_regions(v.latent, 1, difference, kind)
+        for kind in ("area", "conformal")
+        for difference in v.latent.differences(kind)
+    ],
     "dirichlet_laplacian": lambda v: es.operators.dirichlet_laplacian(
         v.laplacian, np.array([0, 5])
     ),
@@ -547,6 +553,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "irregular_grid": lambda v: es.shapes.irregular_grid(4, 5, rng=rng()),
     "is_closed": lambda v: es.geometry.is_closed(v.animal),
     "is_manifold": lambda v: es.geometry.is_manifold(v.animal),
+    "latent_basis": lambda v: es.spectral.latent_basis({(0, 1): v.map, (0, 2): v.map}),
     "level_set": lambda v: es.calculus.level_set(v.solid, v.solid.points[:, 0], 0.4),
     "local_triangles": lambda v: es.operators.local_triangles(v.cloud),
     "logarithmic_map": lambda v: [
@@ -665,6 +672,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "segment": lambda v: es.segment(v.tree, n_regions=4),
     "self_intersections": lambda v: es.geometry.self_intersections(v.animal),
     "separated_groups": lambda v: es.spectral.separated_groups(v.spectrum.eigenvalues),
+    "shape_difference": lambda v: es.spectral.shape_difference(v.map, "conformal"),
     "shape_dna": lambda v: es.spectral.shape_dna(v.animal),
     "signed_distance": lambda v: es.geometry.signed_distance(v.ball, v.animal.vertices),
     "signed_heat_distance": lambda v: es.calculus.signed_heat_distance(

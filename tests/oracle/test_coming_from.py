@@ -171,6 +171,7 @@ def names_of_pyfm(shared: dict[str, Any]) -> dict[str, Any]:
     mesh.process(40)
     return {
         "TriMesh": meshes.TriMesh,
+        "FMN": import_module("pyFM.FMN").FMN,
         "FunctionalMapping": functional.FunctionalMapping,
         "signatures": import_module("pyFM.signatures"),
         "spectral": import_module("pyFM.spectral"),

@@ -1,5 +1,8 @@
 """Maps of functions and points beside pyFM's, from the same eigenpairs."""
 
+from itertools import permutations
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -10,6 +13,8 @@ convert = pytest.importorskip("pyFM.spectral.convert")
 functional = pytest.importorskip("pyFM.functional")
 energies = pytest.importorskip("pyFM.optimize")
 trimesh = pytest.importorskip("pyFM.mesh")
+networks = pytest.importorskip("pyFM.FMN")
+differences = pytest.importorskip("pyFM.spectral.shape_difference")
 
 N_MODES = 50
 
@@ -130,3 +135,56 @@ def test_descriptors_products_and_orientation_give_their_map(meshes, poses, turn
     )
     np.testing.assert_allclose(found, model.FM_12, atol=1e-4)
     assert energy <= energies.energy_func_std(model.FM_12, *weights, *terms) * (1 + 1e-12)
+
+
+@pytest.fixture(scope="module")
+def network():
+    """Return three individuals and the maps of all their pairs."""
+    mesh = es.make_creature("hand", 1, n_vertices=600)
+    shapes = [
+        es.TriangleMesh(mesh.vertices + 0.04 * np.sin(4 * mesh.vertices + phase), mesh.faces)
+        for phase in range(3)
+    ]
+    spectra = [
+        es.solve_spectrum(es.cotangent_laplacian(es.geometry.normalize_mesh(each, "area")), 16)
+        for each in shapes
+    ]
+    return {
+        (i, j): es.spectral.map_from_points(
+            spectra[i], spectra[j], np.arange(mesh.n_vertices), n_modes=16
+        )
+        for i, j in permutations(range(3), 2)
+    }
+
+
+def test_a_limit_shape_and_differences_from_it_are_theirs(network):
+    """With all functions kept; theirs drop the least consistent ones, ours those of the highest frequency."""
+    latent = es.spectral.latent_basis(network, n_functions=16)
+    theirs = networks.FMN(
+        [SimpleNamespace(eigenvalues=each.eigenvalues) for each in latent.spectra]
+    )
+    theirs.set_maps({pair: np.array(mapping.matrix) for pair, mapping in network.items()})
+    theirs.set_weights(weight_type="adjacency")
+    theirs.compute_CCLB(16, verbose=False)
+    np.testing.assert_allclose(latent.eigenvalues, theirs.cclb_eigenvalues, rtol=1e-6, atol=1e-6)
+    roots = np.sqrt(latent.eigenvalues[1:])
+    for i in range(3):
+        areas, angles = theirs.get_CSD(i)
+        signs = np.sign((latent.matrices * theirs.CCLB).sum(axis=(0, 1)))
+        np.testing.assert_allclose(
+            latent.differences("area")[i], signs[:, None] * areas * signs, atol=1e-5
+        )
+        symmetric = roots[:, None] * (signs[:, None] * angles * signs)[1:, 1:] / roots
+        np.testing.assert_allclose(latent.differences("conformal")[i][1:, 1:], symmetric, atol=1e-5)
+
+
+def test_shape_differences_are_theirs(network):
+    mapping = network[0, 1]
+    values = [each.eigenvalues for each in (mapping.source, mapping.target)]
+    area, conformal = (
+        es.spectral.shape_difference(mapping, kind) for kind in ("area", "conformal")
+    )
+    np.testing.assert_allclose(area, differences.area_SD(mapping.matrix), atol=1e-12)
+    roots = np.sqrt(values[0][1:])
+    expected = differences.conformal_SD(mapping.matrix, *values)[1:, 1:]
+    np.testing.assert_allclose(conformal[1:, 1:], roots[:, None] * expected / roots, atol=1e-9)

@@ -23,6 +23,10 @@ from .laws.outcomes import SkippedLaw as SkippedLaw
 from .maps.functional_map import FunctionalMap as FunctionalMap
 from .maps.functional_map import compose_maps as compose_maps
 from .maps.functional_map import transfer_function as transfer_function
+from .maps.latent_basis import LatentBasis as LatentBasis
+from .maps.latent_basis import difference_regions as difference_regions
+from .maps.latent_basis import latent_basis as latent_basis
+from .maps.latent_basis import shape_difference as shape_difference
 from .maps.map_fit import functional_map as functional_map
 from .maps.point_maps import map_from_points as map_from_points
 from .maps.point_maps import point_map as point_map
