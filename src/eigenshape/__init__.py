@@ -16,6 +16,7 @@ retrieval    descriptors, an index of shapes, search
 matching     dense correspondences of parts and wholes
 io           files, trimesh and PyVista
 plot         pictures
+compat       stand-ins for classes of other libraries, such as LaPy's solver
 types        annotations for your own signatures
 
 Examples

@@ -15,7 +15,7 @@ import eigenshape as es
 
 SOURCE = Path(es.__file__).parent
 ROOMS = {
-    "calculus", "deformation", "features", "geometry", "io", "matching", "operators", "plot", "retrieval",
+    "calculus", "compat", "compat.lapy", "deformation", "features", "geometry", "io", "matching", "operators", "plot", "retrieval",
     "scans", "shapes", "spectral", "stability", "types",
 }  # fmt: skip
 PROMISED = {
