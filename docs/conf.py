@@ -56,6 +56,12 @@ def write_api_pages() -> None:
     rooms = [
         (name, getattr(es, name)) for name in es.__all__ if inspect.ismodule(getattr(es, name))
     ]
+    rooms += [
+        (f"{name}.{inner}", getattr(room, inner))
+        for name, room in rooms
+        for inner in room.__all__
+        if inspect.ismodule(getattr(room, inner))
+    ]
     for name, room in [("eigenshape", es), *rooms]:
         title = "The short door" if room is es else f"eigenshape.{name}"
         summary = (inspect.getdoc(room) or "").split("\n\n")

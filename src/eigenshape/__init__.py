@@ -14,9 +14,10 @@ deformation  regions, motions, editing sessions, transfer of poses
 stability    how far two shapes and their spectra differ
 retrieval    descriptors, an index of shapes, search
 matching     dense correspondences of parts and wholes
-morphometrics  landmarks and their files, statistics of shapes
+morphometrics landmarks and their files, statistics of shapes
 io           files, trimesh and PyVista
 plot         pictures
+compat       stand-ins for classes of other libraries, such as LaPy's solver
 types        annotations for your own signatures
 
 Examples

@@ -87,6 +87,7 @@ MADE: dict[str, Callable[[Shared], Any]] = {
 HANDLES = {
     "FaissEngine": "holds memory of FAISS",
     "QdrantEngine": "holds a connection to a database",
+    "Solver": "its matrices may be changed, as those of LaPy's solver",
 }
 
 

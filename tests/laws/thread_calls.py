@@ -4,6 +4,7 @@ import io
 import secrets
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -786,6 +787,17 @@ CALLS: dict[str, Callable[[Shared], object]] = {
 }
 
 
+def solved_like_lapy(mesh: es.TriangleMesh) -> list[np.ndarray]:
+    """Return what all methods of the stand-in for LaPy's solver answer."""
+    geometry = SimpleNamespace(v=mesh.vertices, t=mesh.faces)
+    solver = es.compat.lapy.Solver(geometry, lump=True)
+    mass = es.compat.lapy.Solver.fem_tria_mass(geometry)
+    return [*solver.eigs(5), solver.poisson(mesh.vertices), mass.data]
+
+
+CALLS["Solver"] = lambda v: solved_like_lapy(v.animal)
+
+
 def call_of_operator(entry: es.operators.Operator) -> Callable[[Shared], object]:
     """Return a call that builds a registered operator on each shape that it takes."""
     return lambda v: [
@@ -801,7 +813,9 @@ for _name, _entry in builders().items():
 LEFT_OUT = {
     "cache_operator_bundles": "It starts processes, which take seconds to import.",
     "build_index": "It starts processes, which take seconds to import; it writes to an index, which admits one writer.",
+    "install": "It replaces a class in all modules; so does uninstall.",
     "set_threads": "It sets one number for all threads; test_thread_count.py calls it.",
     "train_codebook_from_files": "It starts processes, which take seconds to import.",
+    "uninstall": "As install.",
     "view": "It shows a widget of the studio, which is a package of its own.",
 }
