@@ -165,6 +165,11 @@ def written_attributes() -> es.io.MeshAttributes:
     return attributes
 
 
+def skulls() -> np.ndarray:
+    """Landmarks of four specimens."""
+    return np.random.default_rng(0).standard_normal((4, 6, 3))
+
+
 VALUES: dict[Any, Callable[[], Any]] = {
     es.TriangleMesh: body,
     es.PointCloud: lambda: es.PointCloud(body().vertices),
@@ -230,6 +235,13 @@ VALUES: dict[Any, Callable[[], Any]] = {
 }
 # A right value of each argument whose type is not ours, by its name; "function.name" where a name has several meanings.
 NAMED: dict[str, Callable[[], Any]] = {
+    "specimens": skulls,
+    "shapes": skulls,
+    "compare_groups.groups": lambda: [0, 0, 1, 1],
+    "fit_allometry.sizes": lambda: [1.0, 2.0, 3.0, 5.0],
+    "symmetric_components.pairs": lambda: [[0, 1]],
+    "warp_mesh.starts": lambda: body().vertices[:9],
+    "warp_mesh.ends": lambda: bent().vertices[:9],
     "alpha": lambda: 1.0,
     "carry_attributes.attributes": written_attributes,
     "decimate.n_faces": lambda: 100,

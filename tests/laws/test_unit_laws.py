@@ -219,6 +219,14 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     ),
     "vertex_normals": (0, lambda s: geometry.vertex_normals(s.mesh)),
     "compare_spectra": (0, lambda s: spectral.compare_spectra(s.spectrum, s.spectrum).relative),
+    "warp_mesh": (
+        1,
+        lambda s: (
+            es.morphometrics.warp_mesh(
+                s.mesh, s.mesh.vertices[::20], s.other.vertices[::20]
+            ).vertices
+        ),
+    ),
     "winding_numbers": (0, lambda s: geometry.winding_numbers(s.mesh, s.other.vertices)),
     "anchor_nodes": (1, lambda s: stability.anchor_nodes(s.mesh, 0.5 * s.u).points),
     "approximate_heat_signature": (

@@ -178,6 +178,10 @@ class Shared:
         es.write_mesh(self.animal, self.labeled_folder / "animal.off")
         (self.labeled_folder / "animal.seg").write_text("\n".join(map(str, self.labels)))
         (self.labeled_folder / "names.txt").write_text("torso\nleg\n")
+        # Configurations of enough points for BLAS to cut its sums
+        self.skulls = rng().standard_normal((5, 1, 3)) + np.repeat(
+            self.animal.vertices[None], 5, axis=0
+        ) * np.exp(0.1 * rng().standard_normal((5, self.animal.n_vertices, 3)))
         self.skull = es.morphometrics.Landmarks(["nose", "left", "right"], np.eye(3))
         es.morphometrics.write_landmarks(self.skull, self.folder / "skull.mrk.json")
         self.bytes = es.retrieval.write_codebook(self.codebook)
@@ -634,6 +638,32 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_edits": lambda v: es.io.read_edits(v.folder / "edits.json", v.animal),
     "read_mesh": lambda v: es.read_mesh(v.folder / "ball.ply"),
     "read_surface": lambda v: es.io.read_surface(v.folder / "ball.ply"),
+    "Allometry.shapes": lambda v: es.morphometrics.fit_allometry(
+        v.skulls, [1.0, 2, 3, 4, 5]
+    ).shapes([2.5]),
+    "PrincipalComponents.shape": lambda v: es.morphometrics.principal_components(v.skulls).shape(
+        [0.1]
+    ),
+    "ProcrustesFit.distances": lambda v: es.morphometrics.fit_procrustes(v.skulls).distances(),
+    "ProcrustesFit.outliers": lambda v: es.morphometrics.fit_procrustes(v.skulls).outliers(),
+    "compare_groups": lambda v: es.morphometrics.compare_groups(v.skulls, [0, 0, 0, 1, 1]),
+    "estimate_missing": lambda v: es.morphometrics.estimate_missing(
+        np.where(
+            np.eye(5)[:, :, None] * (np.arange(5) == 2)[:, None, None], np.nan, v.skulls[:, :5]
+        )
+    ),
+    "figure_ordination": lambda v: drawn(
+        es.plot.figure_ordination(v.skulls[:, 0], [0, 0, 0, 1, 1])
+    ),
+    "fit_allometry": lambda v: es.morphometrics.fit_allometry(v.skulls, [1.0, 2, 3, 4, 5]),
+    "fit_procrustes": lambda v: es.morphometrics.fit_procrustes(
+        v.skulls[:, :60], curves=[range(20)]
+    ),
+    "principal_components": lambda v: es.morphometrics.principal_components(v.skulls),
+    "symmetric_components": lambda v: es.morphometrics.symmetric_components(v.skulls, [[0, 1]]),
+    "warp_mesh": lambda v: es.morphometrics.warp_mesh(
+        v.animal, v.animal.vertices[:20], v.pose.vertices[:20]
+    ),
     "read_landmarks": lambda v: es.morphometrics.read_landmarks(v.folder / "skull.mrk.json"),
     "read_specimens": lambda v: es.morphometrics.read_specimens(v.folder / "skull.mrk.json"),
     "write_landmarks": lambda v: written(

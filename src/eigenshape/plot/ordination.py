@@ -1,0 +1,90 @@
+"""Figures of ordinations: specimens as points, groups as hulls."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.patches import Polygon
+from scipy.spatial import ConvexHull, QhullError
+
+from eigenshape._arrays import as_array, finite_rows, finite_values
+from eigenshape._errors import InvalidParameterError
+from eigenshape._text import literal
+from eigenshape._typing import ArrayLike
+from eigenshape.plot.figure import Figure
+from eigenshape.plot.render import palette
+
+
+def figure_ordination(
+    scores: ArrayLike,
+    groups: ArrayLike | None = None,
+    *,
+    names: Sequence[str] = (),
+    shares: ArrayLike | None = None,
+) -> Figure:
+    """Plot specimens by their first two scores, with the convex hull of each group.
+
+    Parameters
+    ----------
+    scores : (n, m) float
+        `PrincipalComponents.scores`, or coordinates of another ordination.
+    groups : (n,) str or int, optional
+        The group of each specimen.
+    names : (n,) str, optional
+        Names to be written beside the points.
+    shares : (m,) float, optional
+        `PrincipalComponents.shares`, for the labels of the axes.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InvalidShapeError, InvalidParameterError
+        If there are fewer than two columns, or not one group and name for each row.
+
+    See Also
+    --------
+    es.morphometrics.principal_components
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> scores = np.random.default_rng(0).standard_normal((8, 3))
+    >>> figure = es.plot.figure_ordination(scores, list("aaaabbbb"))
+    >>> [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    ['a (4)', 'b (4)']
+    """
+    points = finite_rows(scores, "points")
+    labels = as_array(np.zeros(len(points), int) if groups is None else groups, "groups").astype(
+        str
+    )
+    if points.shape[1] < 2 or labels.shape != (len(points),) or len(names) not in (0, len(points)):
+        raise InvalidParameterError(
+            f"scores must have two columns or more, and groups and names one entry for each row; "
+            f"there are {points.shape} scores, {labels.size} groups and {len(names)} names."
+        )
+    figure = Figure(figsize=(6.6, 6.0), layout="constrained")
+    axes = figure.subplots()
+    kinds = np.unique(labels)
+    for kind, color in zip(kinds, palette(np.arange(len(kinds))), strict=True):
+        members = points[labels == kind, :2]
+        text = literal(f"{kind} ({len(members)})")
+        axes.scatter(*members.T, s=34, color=color, edgecolor="white", linewidth=0.4, label=text)
+        try:
+            corners = members[ConvexHull(members).vertices]
+        except (QhullError, ValueError):  # fewer than three points, or all on a line
+            continue
+        axes.add_patch(Polygon(corners, facecolor=(*color, 0.15), edgecolor=color, zorder=0.5))
+    for name, point in zip(names, points[:, :2], strict=False):
+        axes.annotate(literal(name), point, (3, 3), textcoords="offset points", fontsize=7)
+    percents = ["", ""]
+    if shares is not None:
+        percents = [f" ({100 * share:.0f} %)" for share in finite_values(shares, "shares")[:2]]
+    axes.set(xlabel=f"component 1{percents[0]}", ylabel=f"component 2{percents[-1]}")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.spines[["top", "right"]].set_visible(False)
+    if groups is not None:
+        axes.legend(frameon=False, fontsize=8)
+    return figure
