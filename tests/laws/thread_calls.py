@@ -667,7 +667,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_landmarks": lambda v: es.morphometrics.read_landmarks(v.folder / "skull.mrk.json"),
     "read_specimens": lambda v: es.morphometrics.read_specimens(v.folder / "skull.mrk.json"),
     "write_landmarks": lambda v: written(
-        v.folder, ".csv", lambda path: es.morphometrics.write_landmarks(v.skull, path)
+        v.folder, ".csv", lambda path: es.morphometrics.write_landmarks({"a": v.skull}, path)
     ),
     "read_points": lambda v: es.io.read_points(v.folder / "cloud.ply"),
     "read_shape": lambda v: es.read_shape(v.folder / "square.mesh"),
