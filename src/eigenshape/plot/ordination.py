@@ -71,7 +71,8 @@ def figure_ordination(
     for kind, color in zip(kinds, palette(np.arange(len(kinds))), strict=True):
         members = points[labels == kind, :2]
         text = literal(f"{kind} ({len(members)})")
-        axes.scatter(*members.T, s=34, color=color, edgecolor="white", linewidth=0.4, label=text)
+        dots = axes.scatter(members[:, 0], members[:, 1], s=34, color=color, label=text)
+        dots.set(edgecolor="white", linewidth=0.4)
         try:
             corners = members[ConvexHull(members).vertices]
         except (QhullError, ValueError):  # fewer than three points, or all on a line
