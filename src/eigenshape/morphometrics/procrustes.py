@@ -61,10 +61,11 @@ class ProcrustesFit(ReadOnly):
 
     __repr__ = short_repr
 
+    @one_blas_thread()
     def distances(self) -> Float[np.ndarray, "n n"]:
         """Return the Procrustes distances of all pairs, each pair turned on one another anew."""
         # With the best turn, |x - R y|² = 2 - 2 (sum of singular values of xᵀy, the last signed).
-        products = np.einsum("nki,mkj->nmij", self.shapes, self.shapes)
+        products = np.tensordot(self.shapes, self.shapes, axes=(1, 1)).swapaxes(1, 2)
         values = np.linalg.svd(products, compute_uv=False)
         values[..., 2] *= np.sign(np.linalg.det(products))
         squares = 2 - 2 * values.sum(axis=-1)
@@ -163,7 +164,8 @@ def fit_procrustes(
             is_sliding = energy < highest
     raise ConvergenceError(
         f"The mean shape must rest; after {MOST_ROUNDS} rounds it moves by "
-        f"{np.linalg.norm(mean - last):.1g} of its size. The specimens are no shapes of one kind."
+        f"{np.linalg.norm(mean - last):.1g} of its size. The specimens are not alike: "
+        "landmarks may be exchanged."
     )
 
 
