@@ -652,6 +652,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
             np.eye(5)[:, :, None] * (np.arange(5) == 2)[:, None, None], np.nan, v.skulls[:, :5]
         )
     ),
+    "figure_landmarks": lambda v: drawn(es.plot.figure_landmarks(v.skulls[:, :9])),
     "figure_ordination": lambda v: drawn(
         es.plot.figure_ordination(v.skulls[:, 0], [0, 0, 0, 1, 1])
     ),

@@ -36,3 +36,26 @@ def test_wrong_numbers_of_groups_and_names_are_refused():
     ):
         with pytest.raises(es.InvalidParameterError, match="scores must have two columns or more"):
             es.plot.figure_ordination(scores, groups, names=names)
+
+
+def test_landmarks_of_all_specimens_lie_around_those_of_the_mean():
+    shapes = np.random.default_rng(0).standard_normal((6, 4, 3)) + np.diag([9, 4, 2, 0])[:, :3]
+    figure = es.plot.figure_landmarks(shapes, names=["a", "b", "$c", "d"])
+    for axes, height in zip(figure.axes, (1, 2), strict=True):
+        cloud, mean = (np.asarray(each.get_offsets()) for each in axes.collections)
+        np.testing.assert_allclose(cloud.reshape(6, 4, 2).mean(axis=0), mean)
+        assert [text.get_text() for text in axes.texts] == ["a", "b", r"\$c", "d"]
+        assert axes.get_ylabel() == f"axis {height + 1}"
+    # Both panels have the longest axis across, and the second has the shortest up.
+    wide, flat = (np.asarray(axes.collections[1].get_offsets()) for axes in figure.axes)
+    np.testing.assert_array_equal(wide[:, 0], flat[:, 0])
+    assert np.linalg.norm(wide[:, 0]) > np.linalg.norm(wide[:, 1]) > np.linalg.norm(flat[:, 1])
+
+
+def test_wrong_landmarks_are_refused():
+    with pytest.raises(es.InvalidParameterError, match="shapes must be finite, in shape"):
+        es.plot.figure_landmarks(np.eye(3))
+    with pytest.raises(
+        es.InvalidParameterError, match="one entry for each of 3 landmarks; there are 1"
+    ):
+        es.plot.figure_landmarks(np.ones((2, 3, 3)), names=["a"])

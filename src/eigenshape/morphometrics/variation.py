@@ -357,7 +357,8 @@ def symmetric_components(specimens: Specimens, pairs: ArrayLike) -> SymmetricCom
     ----------
     specimens : (n, k, 3) float, or Landmarks of n specimens
     pairs : (p, 2) int
-        Rows of left and right landmarks. All others lie in the middle.
+        Rows of all left and right landmarks. All others are taken to lie in the middle: if a pair
+        is forgotten, nearly all variance becomes directional asymmetry.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Figures of ordinations: specimens as points, groups as hulls."""
+"""Figures of specimens: as points of an ordination with hulls of groups, and by their landmarks."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull, QhullError
 
-from eigenshape._arrays import as_array, finite_rows, finite_values
+from eigenshape._arrays import as_array, finite_rows, finite_values, real_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import literal
 from eigenshape._typing import ArrayLike
@@ -88,4 +88,65 @@ def figure_ordination(
     axes.spines[["top", "right"]].set_visible(False)
     if groups is not None:
         axes.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def figure_landmarks(shapes: ArrayLike, *, names: Sequence[str] = ()) -> Figure:
+    """Plot the landmarks of all specimens around those of the mean, seen along two of its axes.
+
+    Parameters
+    ----------
+    shapes : (n, k, 3) float
+        `ProcrustesFit.shapes`.
+    names : (k,) str, optional
+        Names of the landmarks. By default their rows.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InvalidParameterError
+        If shapes are not finite, or there is not one name for each landmark.
+
+    See Also
+    --------
+    es.morphometrics.fit_procrustes
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> shapes = np.random.default_rng(0).standard_normal((5, 7, 3))
+    >>> figure = es.plot.figure_landmarks(shapes)
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['axis 2', 'axis 3']
+    """
+    points = real_numbers(shapes, "shapes").astype(np.float64)
+    if points.ndim != 3 or points.shape[2] != 3 or not np.isfinite(points).all():
+        raise InvalidParameterError(
+            f"shapes must be finite, in shape (n, k, 3); the shape is {points.shape}, and "
+            f"{np.sum(~np.isfinite(points))} numbers are not finite."
+        )
+    n_points = points.shape[1]
+    texts = list(names) or [str(row) for row in range(n_points)]
+    if len(texts) != n_points:
+        raise InvalidParameterError(
+            f"names must have one entry for each of {n_points} landmarks; there are {len(texts)}."
+        )
+    mean = points.mean(axis=0)
+    middle = mean.mean(axis=0)
+    # The longest axis of the mean lies across, in both panels.
+    turn = np.linalg.svd(mean - middle)[2].T
+    points, mean = (points - middle) @ turn, (mean - middle) @ turn
+    figure = Figure(figsize=(11.0, 5.6), layout="constrained")
+    for axes, height in zip(figure.subplots(1, 2), (1, 2), strict=True):
+        axes.scatter(points[..., 0], points[..., height], s=4, color="0.65")
+        axes.scatter(mean[:, 0], mean[:, height], s=22, color="#d62728")
+        for text, place in zip(texts, mean[:, [0, height]], strict=True):
+            axes.annotate(literal(text), place, (3, 3), textcoords="offset points", fontsize=7)
+        axes.set(xlabel="axis 1", ylabel=f"axis {height + 1}")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.spines[["top", "right"]].set_visible(False)
     return figure
