@@ -34,7 +34,7 @@ CLASSES = {
 # Calls whose answers hold the values that `Shared` has none of.
 CALLED = [
     "align_modes",
-    "compare_groups",
+    "compare_modes",
     "nodal_parcels",
     "DepthCamera",
     "ShapeIndex",

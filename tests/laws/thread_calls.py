@@ -799,7 +799,7 @@ CALLS |= {
     "accuracy_curve": lambda v: es.modes.accuracy_curve(v.animal.vertices, v.spectrum),
     "align_modes": lambda v: es.modes.align_modes(v.spectrum, v.spectrum2),
     "blood_response": lambda v: es.modes.blood_response(v.animal.vertices[:4], 0.1),
-    "compare_groups": lambda v: es.modes.compare_groups(
+    "compare_modes": lambda v: es.modes.compare_modes(
         v.animal.vertices.T, v.pose.vertices.T, v.spectrum, n_permutations=5, rng=rng()
     ),
     "fit_modes": lambda v: es.modes.fit_modes(

@@ -14,7 +14,7 @@ def subjects(n, seed, bump=0.0):
 
 
 def compare(one, two, n_permutations=200):
-    return es.modes.compare_groups(
+    return es.modes.compare_modes(
         one, two, SPECTRUM, n_permutations=n_permutations, rng=np.random.default_rng(0)
     )
 

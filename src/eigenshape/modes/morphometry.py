@@ -12,7 +12,7 @@ from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.spectrum import Spectrum
-from eigenshape.spectral.tools.projection import project
+from eigenshape.spectral.tools.filters import project
 
 # Statistics that differ by less than this share are equal: permutations that leave the groups as
 # they are sum in another order.
@@ -40,14 +40,14 @@ class ModeComparison(ReadOnly):
 
     See Also
     --------
-    compare_groups
+    compare_modes
 
     Examples
     --------
     >>> import numpy as np, eigenshape as es
     >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(2)), 9)
     >>> maps = np.random.default_rng(0).normal(size=(8, 162))
-    >>> found = es.modes.compare_groups(
+    >>> found = es.modes.compare_modes(
     ...     maps[:4], maps[4:], spectrum, rng=np.random.default_rng(1)
     ... )
     >>> bool((found.family_p_values >= found.p_values).all())
@@ -63,7 +63,7 @@ class ModeComparison(ReadOnly):
 
 
 @one_blas_thread()
-def compare_groups(
+def compare_modes(
     one: ArrayLike,
     two: ArrayLike,
     spectrum: Spectrum,
@@ -106,7 +106,7 @@ def compare_groups(
     >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(mesh), 16)
     >>> maps = np.random.default_rng(0).normal(size=(20, mesh.n_vertices))
     >>> maps[10:] += 0.5 * mesh.vertices[:, 2]
-    >>> found = es.modes.compare_groups(
+    >>> found = es.modes.compare_modes(
     ...     maps[:10], maps[10:], spectrum, rng=np.random.default_rng(1)
     ... )
     >>> bool(found.family_p_values[1:4].min() < 0.01)

@@ -12,7 +12,7 @@ from eigenshape._memory import require_memory
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
-from eigenshape.spectral.tools.projection import project
+from eigenshape.spectral.tools.filters import project
 
 Residual = Literal["none", "add", "permute"]
 Resample = Literal["none", "exact", "affine"]
@@ -51,7 +51,7 @@ def rotation_nulls(
         What the modes leave of the map is left out, added, or added in random order.
     resample : {"none", "exact", "affine"}
         Whether a null is given the values of the map in its own order of ranks, or the mean and
-        standard deviation of the map by area.
+        standard deviation of the map in the mass.
 
     Returns
     -------
@@ -131,13 +131,11 @@ def rotation_nulls(
     if resample == "exact":
         _take_values(nulls, np.sort(columns, axis=0))
     elif resample == "affine":
-        weights = spectrum.mass.sum(axis=1)
-        weights = weights / weights.sum()
+        mean, square = _moments(columns, spectrum)
         for index in range(count):
             null = nulls[:, index]
-            null -= weights @ null
-            null *= np.sqrt(weights @ (columns - weights @ columns) ** 2 / (weights @ null**2))
-            null += weights @ columns
+            own_mean, own_square = _moments(null, spectrum)
+            null[:] = mean + (null - own_mean) * np.sqrt(square / own_square)
     return nulls if maps.ndim == 2 else nulls[:, :, 0]
 
 
@@ -159,6 +157,16 @@ def _rotate(
         # Q = drawn · frameᵀ is a rotation, not a reflection, for frames of one orientation.
         drawn[:, :, -1] *= (np.linalg.det(drawn) * np.linalg.det(frame))[:, None]
     return np.asarray((drawn @ triangle).transpose(1, 0, 2))
+
+
+def _moments(
+    maps: Float[np.ndarray, "n q"], spectrum: Spectrum
+) -> tuple[Float[np.ndarray, " q"], Float[np.ndarray, " q"]]:
+    """Return the means of maps and the integrals of their squared deviations."""
+    areas = spectrum.mass.sum(axis=1)
+    mean = areas @ maps / areas.sum()
+    deviations = maps - mean
+    return mean, np.sum(deviations * (spectrum.mass @ deviations), axis=0)
 
 
 def _take_values(
