@@ -9,6 +9,7 @@ scans        partial scans and a depth camera
 operators    discrete Laplace operators
 spectral     certified spectra, signatures, functional maps, filters, compression
 calculus     gradients, equations, flows, heat distances, conformal maps
+modes        maps by eigenmodes: fits, nulls, waves, morphometry, parcels
 features     merge trees, feature points, parts
 deformation  regions, motions, editing sessions, transfer of poses
 stability    how far two shapes and their spectra differ

@@ -5,6 +5,7 @@ from . import features as features
 from . import geometry as geometry
 from . import io as io
 from . import matching as matching
+from . import modes as modes
 from . import morphometrics as morphometrics
 from . import operators as operators
 from . import plot as plot

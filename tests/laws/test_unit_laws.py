@@ -324,6 +324,7 @@ WITHOUT = {
     "local_triangles",
     "measure_perturbation",
     "nodal_domains",
+    "nodal_parcels",
     "normalized_cut",
     "one_form_edges",
     "part_colors",

@@ -33,6 +33,9 @@ CLASSES = {
 }
 # Calls whose answers hold the values that `Shared` has none of.
 CALLED = [
+    "align_modes",
+    "compare_modes",
+    "nodal_parcels",
     "DepthCamera",
     "ShapeIndex",
     "approximate_heat_signature",

@@ -826,6 +826,24 @@ def solved_like_lapy(mesh: es.TriangleMesh) -> list[np.ndarray]:
     return [*solver.eigs(5), solver.poisson(mesh.vertices), mass.data]
 
 
+CALLS |= {
+    "accuracy_curve": lambda v: es.modes.accuracy_curve(v.animal.vertices, v.spectrum),
+    "align_modes": lambda v: es.modes.align_modes(v.spectrum, v.spectrum2),
+    "blood_response": lambda v: es.modes.blood_response(v.animal.vertices[:4], 0.1),
+    "compare_modes": lambda v: es.modes.compare_modes(
+        v.animal.vertices.T, v.pose.vertices.T, v.spectrum, n_permutations=5, rng=rng()
+    ),
+    "fit_modes": lambda v: es.modes.fit_modes(
+        v.animal.vertices, v.spectrum, v.animal.vertices[:, 1] ** 2
+    ),
+    "geometric_connectome": lambda v: es.modes.geometric_connectome(v.spectrum, n_modes=30),
+    "nodal_parcels": lambda v: es.modes.nodal_parcels(v.laplacian, 5),
+    "ParcelTree.cut": lambda v: es.modes.nodal_parcels(v.laplacian, 5).cut(3),
+    "rotation_nulls": lambda v: es.modes.rotation_nulls(
+        v.animal.vertices, v.spectrum, 5, rng=rng(), residual="permute", resample="exact"
+    ),
+    "wave_response": lambda v: es.modes.wave_response(v.animal.vertices[:9], v.spectrum, 0.1),
+}
 CALLS["Solver"] = lambda v: solved_like_lapy(v.animal)
 
 

@@ -100,6 +100,11 @@ def shared_names(folder: Path) -> dict[str, Any]:
         "times": [0.1, 0.5],
         "i": 3,
         "j": 90,
+        "data": np.sin(3 * mesh.vertices[:, 0]) + mesh.vertices[:, 1],
+        "holes": np.where(mesh.vertices[:, 2] > 0.7, np.nan, mesh.vertices[:, 1]),
+        "hetero": 1 + 0.3 * mesh.vertices[:, 1],
+        "ext_input": np.outer(mesh.vertices[:, 1], np.linspace(0, 1, 30) ** 2),
+        "pair": np.array(mesh.vertices[:, :2]),
         "k": 12,
         "n": 20,
         "m": 1.0,
@@ -182,8 +187,25 @@ def names_of_pyfm(shared: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def names_of_neuromodes(shared: dict[str, Any]) -> dict[str, Any]:
+    neuromodes, lapy = import_module("neuromodes"), import_module("lapy")
+    tria = lapy.TriaMesh(shared["V"].copy(), shared["F"].copy())
+    solver = neuromodes.EigenSolver(tria).solve(36)
+    names: dict[str, Any] = {}
+    for module in ("basis", "eigen", "network", "nulls", "stats", "waves"):
+        names |= vars(import_module(f"neuromodes.{module}"))
+    return names | {
+        "EigenSolver": Instance(neuromodes.EigenSolver, lambda: solver),
+        "tria": tria,
+        "emodes": solver.emodes,
+        "evals": solver.evals,
+        "mass": solver.mass,
+    }
+
+
 PEERS = {
     "lapy": names_of_lapy,
+    "neuromodes": names_of_neuromodes,
     "libigl": names_of_libigl,
     "potpourri3d": names_of_potpourri3d,
     "pyfm": names_of_pyfm,
