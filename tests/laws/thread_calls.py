@@ -558,6 +558,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "irregular_grid": lambda v: es.shapes.irregular_grid(4, 5, rng=rng()),
     "is_closed": lambda v: es.geometry.is_closed(v.animal),
     "is_manifold": lambda v: es.geometry.is_manifold(v.animal),
+    "LatentBasis.differences": lambda v: v.latent.differences("conformal"),
+    "LatentBasis.map_between": lambda v: v.latent.map_between(1, 0),
     "latent_basis": lambda v: es.spectral.latent_basis({(0, 1): v.map, (0, 2): v.map}),
     "level_set": lambda v: es.calculus.level_set(v.solid, v.solid.points[:, 0], 0.4),
     "local_triangles": lambda v: es.operators.local_triangles(v.cloud),

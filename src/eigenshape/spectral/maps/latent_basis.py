@@ -54,6 +54,7 @@ class LatentBasis(ReadOnly):
 
     __repr__ = short_repr
 
+    @one_blas_thread()
     def map_between(self, source: Integer, target: Integer) -> FunctionalMap:
         """Return the consistent map Y_j Y_i⁺ from one shape to another, by way of the limit shape.
 
