@@ -121,7 +121,7 @@ def write_parcellation(mesh: MeshLike, path: str | Path, parcellation: Parcellat
     >>> cap = es.features.Parcellation((ball.vertices[:, 2] > 0.5).astype(int) - 1, ("cap",))
     >>> es.io.write_parcellation(ball, path, cap)
     >>> int((es.io.read_parcellation(path, ball).labels == 0).sum())
-    10
+    9
     """
     mesh, path = as_mesh(mesh), as_path(path)
     require_parcels(parcellation, mesh.n_vertices)

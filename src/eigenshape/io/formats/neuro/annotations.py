@@ -11,7 +11,7 @@ from eigenshape.io.formats.text import coordinates, lines_of, whole, wholes
 
 WHAT = "An annotation file"
 PACKING = np.array([1, 2**8, 2**16])  # of red, green and blue into the number of a parcel
-OPAQUE = 255.0
+OPAQUE = 255.0  # full opacity of a color in bytes
 
 
 def parse_parcels(data: bytes, n_points: int) -> Parcellation:

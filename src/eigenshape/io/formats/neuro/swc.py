@@ -7,7 +7,7 @@ from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.neuro.shared import find_keys
 from eigenshape.io.formats.text import lines_of, number_table, wholes
 
-N_COLUMNS = 7
+N_COLUMNS = 7  # number, kind, x, y, z, radius, parent
 
 
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "s 2"]]:
