@@ -235,6 +235,15 @@ def test_an_opened_file_becomes_the_shape(page):
     np.testing.assert_array_equal(page.array("vertices"), ball.vertices.astype("<f4"))
 
 
+def test_a_surface_of_freesurfer_is_opened_by_its_name(page, tmp_path):
+    es.write_mesh(es.icosphere(2), tmp_path / "lh.pial")
+    data = np.frombuffer((tmp_path / "lh.pial").read_bytes(), np.uint8)
+    facts, _ = page.call("finish", {"kind": "open", "name": "lh.pial"}, {"file": data})
+    assert facts["state"]["n_faces"] == 320
+    data = np.frombuffer(b"\xff\xff\xff", np.uint8)
+    assert "ff ff fe" in page.error("finish", {"kind": "open", "name": "lh.sulc"}, {"file": data})
+
+
 def test_opened_points_become_a_surface_and_the_page_is_told(page):
     text = "\n".join(f"{x} {y} {z}" for x, y, z in es.icosphere(3).vertices)
     data = np.frombuffer(text.encode(), np.uint8)

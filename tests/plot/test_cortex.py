@@ -39,7 +39,7 @@ def test_four_views_with_one_scale():
         assert middle(axes, front)[3] == 1
     # z is the height of the box, and half of the drawing is cut off.
     bottom, top = views[0].get_ylim()
-    assert 0.6 < (bottom - top) / 700 < 0.8
+    assert 0.6 < (bottom - top) / 600 < 0.8
 
 
 def test_one_hemisphere_and_what_has_no_value():

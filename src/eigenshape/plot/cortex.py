@@ -29,7 +29,7 @@ from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw
 
 OUTWARD = {"left": -1.0, "right": 1.0}  # x points to the right
-PIXELS = 700  # of a side of a drawing
+PIXELS = 600  # of a side of a drawing; figures of one shape have as many
 
 
 def figure_cortex(
