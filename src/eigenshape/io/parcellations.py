@@ -8,8 +8,8 @@ from eigenshape._files import as_path, replace_file
 from eigenshape.features.parcellation import Parcellation, require_parcels
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.repairs.masks import hemisphere_of
-from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, suffix_of
 from eigenshape.io.attributes import naming, open_file
+from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, suffix_of
 
 # Names of files that name a hemisphere: lh.aparc.annot, sub-01_hemi-L.label.gii, S1.L.aparc.label.gii
 LEFT, RIGHT = (
