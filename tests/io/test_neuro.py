@@ -109,6 +109,10 @@ def test_the_command_line_takes_them(tmp_path):
         done = CliRunner().invoke(app, ["spectrum", str(tmp_path / name), "-k", "4"])
         assert done.exit_code == 0, done.output
     write_fields(BALL, tmp_path / "ball.func.gii", {"height": HEIGHT})
+    arguments = [str(tmp_path / name) for name in ("ball.surf.gii", "lh.white")]
+    done = CliRunner().invoke(app, ["repair", arguments[0], "-o", arguments[1]])
+    assert done.exit_code == 0, done.output
+    assert es.read_mesh(arguments[1]).n_faces == 320
     assert [item.name for item in es.io.find_items(tmp_path)] == ["ball.surf"]
     done = CliRunner().invoke(app, ["info", str(tmp_path / "ball.func.gii")])
     assert done.exit_code == 1
@@ -461,7 +465,8 @@ def words(start, *values):
             b"#!ascii\n1\n4 0 0 0 0\n",
             "vertices are 0..3; it lists 4",
         ),
-        (cifti.parse_fields, CIFTI[:-9], "must hold what it declares, uncompressed"),
+        (cifti.parse_fields, CIFTI[:-9], f"uncompressed; {len(CIFTI)} bytes do not fit into its"),
+        (cifti.parse_fields, CIFTI.replace(b"n+2", b"n+3"), "-1: the header is damaged"),
         (
             cifti.parse_fields,
             CIFTI.replace(b"BrainModel", b"BrainNodel"),

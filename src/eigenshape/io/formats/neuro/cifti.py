@@ -9,6 +9,7 @@ from eigenshape.io.formats.neuro.shared import Arrays, narrow, require_nibabel
 
 PREFIX = "CIFTI_STRUCTURE_"
 NIFTI_HEADER = 540  # bytes
+MAGIC = b"n+2\0\r\n\x1a\n"
 SURFACES = ("cortex_left", "cortex_right")  # structures that files are written for
 
 
@@ -26,6 +27,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
         image = nibabel.Cifti2Image.from_bytes(data)
         maps, models = image.header.get_axis(0), image.header.get_axis(1)
         values = np.asarray(image.dataobj)
+        values = values if values.dtype.kind == "f" else values.astype(np.float64)
         structures = [
             (name.removeprefix(PREFIX).lower(), place, part)
             for name, place, part in models.iter_structures()
@@ -38,7 +40,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
                 if is_surface:
                     n_vertices = next(iter(part.nvertices.values()))
                     require_reasonable(8 * n_vertices, len(data))
-                    held = np.full(n_vertices, np.nan, np.float32)
+                    held = np.full(n_vertices, np.nan, values.dtype)
                     held[part.vertex] = row[place]
                 found[f"{structure}:{map_name}"] = held
     except FileFormatError:
@@ -51,18 +53,19 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
 
 
 def _require_size(data: bytes) -> None:
-    """Raise an error for numbers that the file cannot hold, before memory is allocated for them."""
+    """Raise an error for a damaged header, which nibabel would mend, and for numbers that the file cannot hold."""
     order = "<" if data[:4] == b"\x1c\x02\0\0" else ">"
     size = -1.0
-    if len(data) >= NIFTI_HEADER:
+    if len(data) >= NIFTI_HEADER and data[4:12] == MAGIC:
         bits = int(np.frombuffer(data, f"{order}i2", 1, 14)[0])
         shape = np.frombuffer(data, f"{order}i8", 8, 16)
         offset = np.frombuffer(data, f"{order}i8", 1, 168)[0]
-        size = float(offset) + bits / 8 * float(np.prod(shape[1:].astype(float)))
+        if offset >= NIFTI_HEADER:
+            size = float(offset) + bits / 8 * float(np.prod(shape[1:].astype(float)))
     if not 0 < size <= len(data):
         raise FileFormatError(
-            f"A CIFTI file must hold what it declares, uncompressed; {size:.0f} bytes do not fit into "
-            f"its {len(data)}."
+            "A CIFTI file must hold a header of NIfTI-2 and what that declares, uncompressed; "
+            f"{size:.0f} bytes do not fit into its {len(data)} (-1: the header is damaged)."
         )
 
 

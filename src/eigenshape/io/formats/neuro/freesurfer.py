@@ -70,7 +70,7 @@ def _unpack(data: bytes) -> bytes:
         size = MGH_HEADER + 4 * int(np.prod(np.frombuffer(head, ">i4", 5)[1:].astype(float)))
         require_reasonable(size, len(data))
         # Behind the numbers, a little text tells about the scanner.
-        return head + unpacker.decompress(unpacker.unconsumed_tail, size)
+        return head + unpacker.decompress(unpacker.unconsumed_tail, max(size, 1))
     except (zlib.error, ValueError, OverflowError) as err:
         raise FileFormatError(f"A packed MGH file must be whole; {err}.") from err
 
