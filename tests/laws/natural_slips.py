@@ -108,6 +108,11 @@ def labels() -> np.ndarray:
 
 
 @cache
+def parcels() -> es.features.Parcellation:
+    return es.features.Parcellation((height() > 0).astype(int), ("low", "high"))
+
+
+@cache
 def mapping() -> es.spectral.FunctionalMap:
     return es.spectral.map_from_points(
         spectrum(), spectrum(), np.arange(body().n_vertices), n_modes=10
@@ -170,7 +175,13 @@ def skulls() -> np.ndarray:
     return np.random.default_rng(0).standard_normal((4, 6, 3))
 
 
+def written_parcels() -> Path:
+    es.io.write_parcellation(body(), FOLDER / "parcels.annot", parcels())
+    return FOLDER / "parcels.annot"
+
+
 VALUES: dict[Any, Callable[[], Any]] = {
+    es.features.Parcellation: parcels,
     es.TriangleMesh: body,
     es.PointCloud: lambda: es.PointCloud(body().vertices),
     es.Laplacian: lambda: es.cotangent_laplacian(body()),
@@ -254,6 +265,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "boundary_load.mesh": with_boundary,
     "boundary_surface.mesh": lambda: es.shapes.box(2, 2, 2),
     "build": lambda: es.cotangent_laplacian,
+    "conductivity": lambda: np.ones(body().n_vertices),
     "cache": lambda: FOLDER / "cache",
     "caption": lambda: "",
     "certify.eigenvalues": lambda: spectrum().eigenvalues,
@@ -324,7 +336,9 @@ NAMED: dict[str, Callable[[], Any]] = {
     "radius": lambda: 0.4,
     "read": lambda: es.read_mesh,
     "query_indexes.folders": lambda: [shelf().folder],
+    "mask_surface.mask": lambda: height() > 0,
     "read_edits.path": written_edits,
+    "read_parcellation.path": written_parcels,
     "recover_geometry.eigenvalues": lambda: es.shapes.sphere_eigenvalues(60),
     "region": lambda: HEAD,
     "response": lambda: np.ones_like,
@@ -356,6 +370,14 @@ NAMED: dict[str, Callable[[], Any]] = {
     "vertices": lambda: np.arange(3),
     "view": lambda: [0.0, 0.0, 1.0],
     "winding_numbers.points": lambda: bent().vertices,
+    "figure_cortex.surfaces": lambda: {"left": body()},
+    "figure_cortex.values": lambda: {"left": height()},
+    "n_vertices": lambda: 9,
+    "Parcellation.labels": lambda: [0, 1, -1],
+    "Parcellation.names": lambda: ["low", "high"],
+    "unmask.values": lambda: [1.0, 2.0, 3.0],
+    "unparcellate.values": lambda: [1.0, 2.0],
+    "write_parcellation.path": lambda: FOLDER / "written.annot",
     "write_edits.path": lambda: FOLDER / "edits.json",
     "write_landmarks.path": lambda: FOLDER / "written.csv",
     "write_points.path": lambda: FOLDER / "written.xyz",

@@ -246,6 +246,13 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "find_heat_features": (0, lambda s: es.retrieval.find_heat_features(s.mesh).parts.labels),
     "geodesic_balls": (1, lambda s: geometry.geodesic_balls(s.mesh, 0.4 * s.u)),
     "geodesic_waves": (1, lambda s: geometry.geodesic_waves(s.mesh)(0, s.u)[1]),
+    "mask_surface": (1, lambda s: geometry.mask_surface(s.mesh, s.f > s.f.mean()).mesh),
+    "parcellate": (
+        0,
+        lambda s: es.features.parcellate(
+            s.mesh, s.f, es.features.Parcellation((s.f > s.f.mean()).astype(int))
+        ),
+    ),
     "orient_outward": (1, lambda s: geometry.orient_outward(s.mesh)),
     "part_spectrum": (-2, lambda s: es.features.part_spectrum(s.mesh).eigenvalues[1:]),
     "random_planes": (
@@ -310,6 +317,7 @@ WITHOUT = {
     "euler_characteristic",
     "facet_table",
     "fem_boundary_nodes",
+    "figure_cortex",
     "figure_eigenfunctions",
     "figure_field",
     "figure_label_transfer",
@@ -330,6 +338,7 @@ WITHOUT = {
     "part_colors",
     "query_indexes",
     "read_edits",
+    "read_parcellation",
     "region_boundary",
     "region_mask",
     "self_intersections",
@@ -344,6 +353,7 @@ WITHOUT = {
     "view",
     "write_edits",
     "write_mesh",
+    "write_parcellation",
     "write_points",
 }
 # Others that are the same code as a row above, or have laws of the unit of their own.

@@ -86,6 +86,7 @@ MADE: dict[str, Callable[[Shared], Any]] = {
     "IndexReport": lambda v: v.index.verify(),
     "Operator": lambda v: es.operators.OPERATORS["cotangent"],
     "Panel": lambda v: es.plot.Panel(v.ball, "a", np.zeros(v.ball.n_faces, int), np.arange(3)),
+    "Parcellation": lambda v: v.halves,
     "PartDecomposition": lambda v: es.find_parts(v.animal),
     "SpectralClusterer": lambda v: es.spectral.SpectralClusterer(3),
     "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3),

@@ -186,6 +186,8 @@ class Shared:
         es.morphometrics.write_landmarks(self.skull, self.folder / "skull.mrk.json")
         self.bytes = es.retrieval.write_codebook(self.codebook)
         es.io.write_fields(self.animal, self.folder / "fields.vtu", {"heat": self.heat})
+        self.halves = es.features.Parcellation((self.animal.vertices[:, 1] > 0).astype(int))
+        es.io.write_parcellation(self.animal, self.folder / "halves.annot", self.halves)
         self.attributes = es.read_mesh(self.folder / "ball.ply", attributes=True)[1]
 
 
@@ -320,6 +322,14 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "decimate": decimated,
     "find_duplicates": lambda v: es.retrieval.find_duplicates(es.ShapeIndex.open(v.index.folder)),
     "read_fields": lambda v: es.io.read_fields(v.folder / "fields.vtu"),
+    "mask_surface": lambda v: es.geometry.mask_surface(v.animal, v.animal.vertices[:, 1] > 0),
+    "parcellate": lambda v: es.features.parcellate(v.animal, v.heat, v.halves),
+    "read_parcellation": lambda v: es.io.read_parcellation(v.folder / "halves.annot", v.animal),
+    "unmask": lambda v: es.geometry.unmask(v.heat, np.arange(v.animal.n_vertices), 900),
+    "unparcellate": lambda v: es.features.unparcellate([1.0, 2.0], v.halves),
+    "write_parcellation": lambda v: written(
+        v.folder, ".annot", lambda path: es.io.write_parcellation(v.animal, path, v.halves)
+    ),
     "split_solids": lambda v: es.geometry.split_solids(
         v.solid.points, [[0, 1, 5, 4, 16, 17, 21, 20]]
     ),
@@ -474,6 +484,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.plot.figure_contact_sheet(
             es.plot.Panel(v.ball, "ball", np.zeros(v.ball.n_faces, int), np.array([0])), []
         )
+    ),
+    "figure_cortex": lambda v: drawn(
+        es.plot.figure_cortex({"left": v.ball}, {"left": v.ball.vertices[:, 0]})
     ),
     "figure_diagram": lambda v: drawn(es.plot.figure_diagram(v.diagram)),
     "figure_eigenfunctions": lambda v: drawn(

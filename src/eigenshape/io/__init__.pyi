@@ -17,6 +17,8 @@ from .labeled_shapes import read_labeled_shape as read_labeled_shape
 from .labeled_shapes import read_labeled_shapes as read_labeled_shapes
 from .mesh_files import read_mesh as read_mesh
 from .mesh_files import write_mesh as write_mesh
+from .parcellations import read_parcellation as read_parcellation
+from .parcellations import write_parcellation as write_parcellation
 from .shape_files import read_points as read_points
 from .shape_files import read_shape as read_shape
 from .shape_files import write_points as write_points

@@ -47,7 +47,7 @@ class Operator:
     >>> es.operators.OPERATORS["cotangent"].description
     'linear finite elements'
     >>> es.operators.OPERATORS["cotangent"].options
-    ('mass',)
+    ('mass', 'conductivity')
     """
 
     build: Callable[..., Laplacian]
