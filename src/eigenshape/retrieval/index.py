@@ -540,10 +540,7 @@ class ShapeIndex:
             If there is no shape of that name, or the picture is damaged.
         """
         state = self._read()
-        facts = state.find(name)
-        if facts is None:
-            raise StoreError(f"A shape must be in the index to have a picture; {name!r} is not.")
-        return state.picture(facts)
+        return state.picture(state.require(name, "have a picture"))
 
     def verify(self) -> IndexReport:
         """Compare everything in the index with its checksums.
@@ -661,13 +658,7 @@ class ShapeIndex:
         state = self._read()
         chosen = None
         if names is not None:
-            found = [state.find(name) for name in names]
-            for name, facts in zip(names, found, strict=True):
-                if facts is None:
-                    raise StoreError(
-                        f"A shape must be in the index to be exported; {name!r} is not."
-                    )
-            chosen = {facts.id for facts in found if facts is not None}
+            chosen = {state.require(name, "be exported").id for name in names}
         export_index(state, _records(state, chosen), Path(folder))
 
 

@@ -161,7 +161,14 @@ def transfer_labels(
         if progress:
             progress((1 + number) / n_steps, f"matching labeled shape {number + 1}")
         transport = transport_points(points, source.points)
-        votes.append(transport.shares @ _label_shares(source, vocabulary))
+        # The share of each label in the area of the faces around each point of the source
+        columns = np.searchsorted(vocabulary, source.labels)
+        around = np.zeros((source.mesh.n_vertices, len(vocabulary)))
+        areas = face_areas(source.mesh)
+        for corner in source.mesh.faces.T:
+            np.add.at(around, (corner, columns), areas / areas.max())
+        chosen = around[source.points.vertices]
+        votes.append(transport.shares @ (chosen / chosen.sum(axis=1, keepdims=True)))
         costs.append(transport.cost)
     weights = np.exp((min(costs) - np.array(costs)) / COST_SCALE)
     weights /= weights.sum()
@@ -173,19 +180,6 @@ def transfer_labels(
     if progress:
         progress((n_steps - 1) / n_steps, "spreading votes")
     return _settle(target, at_vertices, vocabulary, weights)
-
-
-def _label_shares(
-    source: LabeledShape, vocabulary: Int[np.ndarray, " l"]
-) -> Float[np.ndarray, "m l"]:
-    """Return the share of each label in the area of the faces around each point."""
-    columns = np.searchsorted(vocabulary, source.labels)
-    around = np.zeros((source.mesh.n_vertices, len(vocabulary)))
-    areas = face_areas(source.mesh)
-    for corner in source.mesh.faces.T:
-        np.add.at(around, (corner, columns), areas / areas.max())
-    chosen = around[source.points.vertices]
-    return np.asarray(chosen / chosen.sum(axis=1, keepdims=True))
 
 
 @lru_cache(maxsize=1)

@@ -18,7 +18,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import Descriptor, kind_of
 from eigenshape.retrieval.patches.verification import N_VERIFIED
 from eigenshape.retrieval.search.chances import chances
-from eigenshape.retrieval.search.matches import Match, Matches
+from eigenshape.retrieval.search.matches import Matches
 from eigenshape.retrieval.search.reader import IndexReader
 from eigenshape.retrieval.store.database import DATABASE
 from eigenshape.retrieval.store.filters import choose_shapes
@@ -116,8 +116,14 @@ def _merged(answers: list[Matches], n_matches: int) -> Matches:
     among the thirty nearest of all, as they would in one index; the others keep the distance of
     their codes.
     """
-    found = sorted((match for answer in answers for match in answer), key=_distance)
-    found = [*found[:N_VERIFIED], *map(_not_verified, found[N_VERIFIED:])]
+    found = sorted(
+        (match for answer in answers for match in answer),
+        key=lambda match: match.score if match.distance is None else match.distance,
+    )
+    for place, match in enumerate(found[N_VERIFIED:], N_VERIFIED):
+        if match.distance is not None:
+            chance = float(chances(np.array([match.distance]))[0])
+            found[place] = replace(match, score=match.distance, chance=chance)
     found.sort(key=lambda match: (match.score, match.name))
     return Matches(
         tuple(found[:n_matches]),
@@ -153,15 +159,3 @@ def _open_reader(folder: Path) -> IndexReader:
 @lru_cache(maxsize=MOST_OPEN)
 def _reader(folder: Path, inode: int) -> IndexReader:
     return IndexReader(folder)
-
-
-def _distance(match: Match) -> float:
-    return match.score if match.distance is None else match.distance
-
-
-def _not_verified(match: Match) -> Match:
-    """Return a match by the distance of codes alone."""
-    if match.distance is None:
-        return match
-    chance = float(chances(np.array([match.distance]))[0])
-    return replace(match, score=match.distance, chance=chance)

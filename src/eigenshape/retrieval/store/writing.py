@@ -26,7 +26,6 @@ from eigenshape.retrieval.store.database import (
 )
 from eigenshape.retrieval.store.filters import RESERVED
 from eigenshape.retrieval.store.state import (
-    DamagedEntryError,
     IndexState,
     StoredDescriptor,
     StoredShape,
@@ -168,10 +167,9 @@ def facts_text(tags: Sequence[str], attributes: Mapping[str, Any]) -> tuple[str,
         require_text(tag)
     for key, value in attributes.items():
         require_text(key)
-        number = isinstance(value, int | float | np.integer | np.floating)
-        if isinstance(value, bool) or not (
-            isinstance(value, str) or (number and _is_finite(value))
-        ):
+        is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        is_finite = isinstance(value, float | np.floating) and bool(np.isfinite(value))
+        if not (isinstance(value, str) or is_whole or is_finite):
             raise InvalidParameterError(
                 f"An attribute must be a text or a finite number; {key!r} is {value!r}. Use a tag "
                 "for what is true or false."
@@ -185,10 +183,6 @@ def facts_text(tags: Sequence[str], attributes: Mapping[str, Any]) -> tuple[str,
             )
     numbers = json.dumps(dict(attributes), sort_keys=True, default=np.generic.item)
     return json.dumps(sorted(set(tags))), numbers
-
-
-def _is_finite(value: Any) -> bool:
-    return isinstance(value, int | np.integer) or bool(np.isfinite(value))
 
 
 def rows_of_each(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarray]:
@@ -278,19 +272,29 @@ class Writer:
                 f"{old.digest}, not {shape.digest}. Remove it first, or add it with replace=True "
                 "(--replace)."
             )
-        if old is not None and not (same and self._is_whole(old)):
+        if old is not None and not (same and self.state.is_whole(old)):
             self.delete(old)
             old = None
         known = set()
         if old is None:
-            number = self._insert_shape(shape)
+            number = self._next("shape")
+            n_pictures = int(shape.picture is not None)
+            facts = Facts(number, *shape[:6], len(shape.descriptors), n_pictures)
+            self._insert("shape", *facts, checksum(*facts))
+            if shape.picture is not None:
+                self._insert("picture", number, shape.picture, checksum(number, shape.picture))
         else:
             number = old.id
             query = "SELECT DISTINCT recipe FROM descriptor WHERE shape = ?"
             known = {self.state.recipes[row[0]] for row in self.database.execute(query, (number,))}
         new = [each for each in shape.descriptors if each.recipe not in known]
         for each in new:
-            self._insert_descriptor(number, each)
+            recipe = self.keep_recipe(each.recipe, each.n_columns)
+            sizes = (each.view, each.n_rows, each.n_columns)
+            checksums = (crc32(each.rows), crc32(each.details))
+            integers = (self._next("descriptor"), number, recipe, *sizes, *checksums)
+            row = integer_checksums(np.array([integers], dtype=np.int64))
+            self._insert("descriptor", *integers, int(row[0]), each.rows, each.details)
         if old is not None and new:
             self._update(old._replace(n_descriptors=old.n_descriptors + len(new)))
         return not same
@@ -309,15 +313,6 @@ class Writer:
                 "into a new one to keep what is whole."
             )
         return Facts(*row)
-
-    def _is_whole(self, facts: Facts) -> bool:
-        """Return whether a shape, its numbers and its picture agree with their checksums."""
-        try:
-            self.state.facts([facts.id])
-            self.state.shape(facts)
-        except DamagedEntryError:
-            return False
-        return True
 
     def delete(self, facts: Facts) -> None:
         """Delete a shape, its descriptors and its picture."""
@@ -348,23 +343,6 @@ class Writer:
         fields = ", ".join(f"{name} = ?" for name in Facts._fields[1:])
         query = f"UPDATE shape SET {fields}, checksum = ? WHERE id = ?"
         self.database.execute(query, (*facts[1:], checksum(*facts), facts.id))
-
-    def _insert_shape(self, shape: StoredShape) -> int:
-        number = self._next("shape")
-        n_pictures = int(shape.picture is not None)
-        facts = Facts(number, *shape[:6], len(shape.descriptors), n_pictures)
-        self._insert("shape", *facts, checksum(*facts))
-        if shape.picture is not None:
-            self._insert("picture", number, shape.picture, checksum(number, shape.picture))
-        return number
-
-    def _insert_descriptor(self, shape: int, each: StoredDescriptor) -> None:
-        recipe = self.keep_recipe(each.recipe, each.n_columns)
-        number = self._next("descriptor")
-        sizes = (each.view, each.n_rows, each.n_columns)
-        integers = (number, shape, recipe, *sizes, crc32(each.rows), crc32(each.details))
-        row = integer_checksums(np.array([integers], dtype=np.int64))
-        self._insert("descriptor", *integers, int(row[0]), each.rows, each.details)
 
     def _insert(self, table: str, *values: Any) -> None:
         marks = ", ".join("?" * len(values))
