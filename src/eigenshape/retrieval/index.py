@@ -14,8 +14,7 @@ from eigenshape._files import as_path
 from eigenshape._text import html_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.retrieval.description import describe_to_store
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_store
 from eigenshape.retrieval.search.matches import Matches
 from eigenshape.retrieval.search.reader import EngineMaker, IndexReader, choose_recipe
 from eigenshape.retrieval.store.damage import warn_of_damage

@@ -21,10 +21,9 @@ from eigenshape.geometry.simplices import size_one
 from eigenshape.io.surfaces import read_surface
 from eigenshape.plot.camera import Up, View, aim_camera
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
-from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
 from eigenshape.retrieval.heat.recipe import HeatRecipe
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe
 from eigenshape.retrieval.search.matches import Match
 
 CAPTION = "corresponding parts have one color; a lower score is more similar"

@@ -27,9 +27,8 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_names import require_repairs
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
-from eigenshape.retrieval.description import describe_to_store
 from eigenshape.retrieval.index import ShapeIndex
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_store
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descriptor
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS

@@ -12,7 +12,7 @@ from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
 from eigenshape._threads import one_blas_thread
-from eigenshape.retrieval.kinds import Descriptor, kind_of
+from eigenshape.retrieval.kinds import Descriptor, pair_points
 from eigenshape.retrieval.search.candidates import Method
 from eigenshape.retrieval.search.chances import class_chances
 
@@ -86,8 +86,7 @@ class Match(ReadOnly):
         Each row is the number of one of the query, and of one of this shape. They are computed when
         they are first asked for, which takes 2 ms, and kept.
         """
-        kind = kind_of(self.query.recipe)
-        return freeze(kind.correspondences(self.query, self.descriptor))
+        return freeze(pair_points(self.query, self.descriptor))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._text import html_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe
 from eigenshape.retrieval.patches.distance import USUAL_ISOLATION
 from eigenshape.retrieval.search.candidates import (
@@ -190,7 +190,7 @@ class IndexReader:
             descriptor = shape
         else:
             recipe = choose_recipe(list(state.recipes.values()))
-            descriptor = kind_of(recipe).describe_query(as_mesh(shape, "shape"), recipe)
+            descriptor = describe(as_mesh(shape, "shape"), recipe)
         return self._search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
 
     def _search(  # noqa: PLR0913 - the choices of a query, each of which has a default

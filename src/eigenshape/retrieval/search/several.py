@@ -15,7 +15,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.retrieval.kinds import Descriptor, kind_of
+from eigenshape.retrieval.kinds import Descriptor, describe
 from eigenshape.retrieval.patches.verification import N_VERIFIED
 from eigenshape.retrieval.search.chances import chances
 from eigenshape.retrieval.search.matches import Matches
@@ -101,7 +101,7 @@ def query_indexes(
         descriptor = shape
     else:
         recipe = _open_reader(paths[0]).default_recipe()
-        descriptor = kind_of(recipe).describe_query(as_mesh(shape, "shape"), recipe)
+        descriptor = describe(as_mesh(shape, "shape"), recipe)
     ask = partial(
         _ask, descriptor=descriptor, n_matches=wanted + N_VERIFIED, where=where, exact=exact
     )

@@ -12,7 +12,7 @@ from zlib import crc32
 import numpy as np
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.kinds import AnyRecipe, kind_of, recipe_from_text
+from eigenshape.retrieval.kinds import AnyRecipe, recipe_from_text, row_type
 from eigenshape.retrieval.patches.codebook import PatchCodebook, write_codebook
 from eigenshape.retrieval.store.damage import Damage, warn_of_damage
 from eigenshape.retrieval.store.database import (
@@ -111,7 +111,7 @@ def _shapes(
             descriptors = []
             for row in database.execute(DESCRIPTORS, (number,)):
                 recipe, view, n_rows, n_columns, *where = row
-                size = n_rows * n_columns * kind_of(recipes[recipe]).row_type.itemsize
+                size = n_rows * n_columns * row_type(recipes[recipe]).itemsize
                 rows = piece(where[0], where[1], size, where[2])
                 details = piece(*where[3:])
                 found: Any = (recipes[recipe], view, n_rows, n_columns, rows, details)

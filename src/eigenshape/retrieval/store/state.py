@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, restore, row_type
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
     DAMAGE,
@@ -52,10 +52,8 @@ class StoredDescriptor(NamedTuple):
 
     def restored(self) -> Descriptor:
         """Return the descriptor."""
-        kind = kind_of(self.recipe)
-        rows = np.frombuffer(self.rows, kind.row_type).reshape(self.n_rows, self.n_columns)
-        found: Descriptor = kind.restore(rows, self.details, self.recipe)
-        return found
+        numbers = np.frombuffer(self.rows, row_type(self.recipe))
+        return restore(numbers.reshape(self.n_rows, self.n_columns), self.details, self.recipe)
 
 
 class StoredShape(NamedTuple):
@@ -363,7 +361,7 @@ class Snapshot:
 
         Raise DamagedEntryError if some cannot be read, or are damaged, with all of these.
         """
-        kind, columns = kind_of(self.recipe), self.columns[places]
+        kind, columns = row_type(self.recipe), self.columns[places]
         ids = columns["id"].tolist()
         blobs = self.state.read("descriptor", "rows", ids)
         found, lost = [], []
@@ -371,8 +369,8 @@ class Snapshot:
         for number, n_rows, n_columns, expected in columns[list(names)].tolist():
             blob = blobs[number][1] if number in blobs else b""
             is_whole = isinstance(blob, bytes) and (not checked or crc32(blob) == expected)
-            if is_whole and len(blob) == n_rows * n_columns * kind.row_type.itemsize:
-                found.append(np.frombuffer(blob, kind.row_type).reshape(n_rows, n_columns))
+            if is_whole and len(blob) == n_rows * n_columns * kind.itemsize:
+                found.append(np.frombuffer(blob, kind).reshape(n_rows, n_columns))
             else:
                 lost.append(number)
         if lost:

@@ -14,7 +14,7 @@ import numpy as np
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._text import html_repr, short_repr
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of, recipe_to_text
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, details_of, recipe_to_text, rows_of
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
     DATABASE,
@@ -191,7 +191,7 @@ def rows_of_each(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarra
         raise InvalidParameterError(
             f"A shape must have a descriptor to be found; {name!r} has none."
         )
-    return [kind_of(descriptor.recipe).rows(descriptor, name) for descriptor in descriptors]
+    return [rows_of(descriptor, name) for descriptor in descriptors]
 
 
 def require_columns(recipe: AnyRecipe, n_columns: int, known: int) -> None:
@@ -219,7 +219,7 @@ def described(shape: DescribedShape) -> StoredShape:
     pairs = zip(shape.descriptors, rows_of_each(shape.name, shape.descriptors), strict=True)
     for descriptor, rows in pairs:
         recipe = descriptor.recipe
-        details = kind_of(recipe).details(descriptor)
+        details = details_of(descriptor)
         n_rows, n_columns = rows.shape
         view, data = views[recipe], rows.tobytes()
         stored.append(StoredDescriptor(recipe, view, n_rows, n_columns, data, details))
