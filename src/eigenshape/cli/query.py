@@ -276,10 +276,10 @@ def _draw(
             f"{literal(index.name)} ({steps.CAPTION})"
         )
         sheet = steps.contact_sheet(
-            answer.colored, title, answer.matches, repairs=repairs, caption=caption, **side
+            answer.colored, title, answer.matches, repairs=repairs, caption=caption, side=side
         )
         steps.save_picture(sheet, picture)
     if explain:
         best = answer.matches[0]
-        figure = steps.explanation(answer.colored, title, best, repairs=repairs, **side)
+        figure = steps.explanation(answer.colored, title, best, repairs=repairs, side=side)
         steps.save_picture(figure, explain)

@@ -160,7 +160,7 @@ def transfer_labels(
     for number, source in enumerate(sources):
         if progress:
             progress((1 + number) / n_steps, f"matching labeled shape {number + 1}")
-        transport = transport_points(points, source.points)
+        shares, cost = transport_points(points, source.points)
         # The share of each label in the area of the faces around each point of the source
         columns = np.searchsorted(vocabulary, source.labels)
         around = np.zeros((source.mesh.n_vertices, len(vocabulary)))
@@ -168,8 +168,8 @@ def transfer_labels(
         for corner in source.mesh.faces.T:
             np.add.at(around, (corner, columns), areas / areas.max())
         chosen = around[source.points.vertices]
-        votes.append(transport.shares @ (chosen / chosen.sum(axis=1, keepdims=True)))
-        costs.append(transport.cost)
+        votes.append(shares @ (chosen / chosen.sum(axis=1, keepdims=True)))
+        costs.append(cost)
     weights = np.exp((min(costs) - np.array(costs)) / COST_SCALE)
     weights /= weights.sum()
 

@@ -105,17 +105,10 @@ def query_indexes(
     ask = partial(
         _ask, descriptor=descriptor, n_matches=wanted + N_VERIFIED, where=where, exact=exact
     )
-    answers = map(ask, paths) if executor is None else executor.map(ask, paths)
-    return _merged(list(answers), wanted)
-
-
-def _merged(answers: list[Matches], n_matches: int) -> Matches:
-    """Merge what several indexes answered to one query into the answer of one index of them all.
-
-    Each index has matched the points of its own thirty nearest shapes. Here those count that are
-    among the thirty nearest of all, as they would in one index; the others keep the distance of
-    their codes.
-    """
+    answers = list(map(ask, paths) if executor is None else executor.map(ask, paths))
+    # Each index has matched the points of its own thirty nearest shapes. Here those count that are
+    # among the thirty nearest of all, as they would in one index; the others keep the distance of
+    # their codes.
     found = sorted(
         (match for answer in answers for match in answer),
         key=lambda match: match.score if match.distance is None else match.distance,
@@ -126,7 +119,7 @@ def _merged(answers: list[Matches], n_matches: int) -> Matches:
             found[place] = replace(match, score=match.distance, chance=chance)
     found.sort(key=lambda match: (match.score, match.name))
     return Matches(
-        tuple(found[:n_matches]),
+        tuple(found[:wanted]),
         next((each.method for each in answers if each.method != "exact"), "exact"),
         sum(answer.n_compared for answer in answers),
         sum(answer.n_shapes for answer in answers),
