@@ -8,7 +8,6 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.topology import edge_table, face_pairs
@@ -47,8 +46,6 @@ class FeaturePoints(ReadOnly):
     values: Float[np.ndarray, " m"]
     persistence: Float[np.ndarray, " m"]
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True, eq=False)
 class Segmentation(ReadOnly):
@@ -77,8 +74,6 @@ class Segmentation(ReadOnly):
 
     labels: Int[np.ndarray, " f"]
     features: FeaturePoints
-
-    __repr__ = short_repr
 
 
 def segment(

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, finite_rows
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -80,8 +79,6 @@ class Registration(ReadOnly):
     rotation: Float[np.ndarray, "3 3"]
     translation: Float[np.ndarray, " 3"]
     score: float
-
-    __repr__ = short_repr
 
     def move(self, points: ArrayLike) -> Float[np.ndarray, "n 3"]:
         """Return points of the first scan, placed on the second."""

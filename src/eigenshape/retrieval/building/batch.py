@@ -17,7 +17,7 @@ from typing_extensions import TypeAliasType
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Callback
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 from eigenshape._typing import Integer
 from eigenshape._workers import Item as Item  # noqa: PLC0414 - the room lists it from here
 from eigenshape._workers import Outcome, run_in_workers
@@ -55,7 +55,7 @@ MOST_AT_ONCE, LONGEST_KEPT = 64, 1.0
 
 
 @dataclass(frozen=True)
-class BatchReport:
+class BatchReport(Shown):
     """What `build_index` did.
 
     Attributes
@@ -90,9 +90,6 @@ class BatchReport:
     skipped: tuple[str, ...]
     failed: tuple[tuple[str, str], ...]
     repaired: tuple[tuple[str, tuple[str, ...]], ...] = ()
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, vertex_values
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape._threads import map_in_threads
 from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_tree import merge_tree
@@ -83,8 +82,6 @@ class HeatFeatures(ReadOnly):
     parts: Segmentation
     descriptor: HeatDescriptor
     fragments: Int[np.ndarray, " c"]
-
-    __repr__ = short_repr
 
 
 def heat_descriptor(

@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly, face_labels, freeze
-from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import as_mesh
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -149,8 +148,6 @@ class LabeledShape(ReadOnly):
         labels = face_labels(self.labels, "labels", mesh.n_faces)
         object.__setattr__(self, "mesh", mesh)
         object.__setattr__(self, "labels", freeze(labels.astype(np.int64)))
-
-    __repr__ = short_repr
 
     @cached_property
     def points(self) -> LabelPoints:

@@ -12,7 +12,6 @@ from eigenshape._arguments import require_each
 from eigenshape._arrays import ReadOnly, point_functions
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.linear_solver import factor_definite
@@ -90,8 +89,6 @@ class LabelTransfer(ReadOnly):
     part_confidence: Float[np.ndarray, " m"]
     part_vertices: Int[np.ndarray, " m"]
     weights: Float[np.ndarray, " s"]
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()

@@ -14,7 +14,6 @@ from numpy.lib.format import open_memmap, read_array
 from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import FileFormatError
 from eigenshape._files import replacing
-from eigenshape._text import short_repr
 from eigenshape.retrieval.patches.code_loops import scan
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.distance import N_REFERENCES, SIZE_PRICE, measure_isolations
@@ -78,8 +77,6 @@ class CoarseRows(ReadOnly):
     added: Int8[np.ndarray, "a s q"]
     rows: Int64[np.ndarray, " n"]
     n_fitted: int
-
-    __repr__ = short_repr
 
     def scores(self, codes: Int8[np.ndarray, "b s v"]) -> Float32[np.ndarray, " n"]:
         """Return distances of a query to all whole shapes, as far as the axes show them."""

@@ -10,7 +10,7 @@ from jaxtyping import Int
 
 from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown, html_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.kinds import Descriptor, pair_points
 from eigenshape.retrieval.search.candidates import Method
@@ -70,7 +70,6 @@ class Match(ReadOnly):
     chance: float | None = None
     distance: float | None = None
 
-    __repr__ = short_repr
     _repr_html_ = html_repr
 
     @property
@@ -90,7 +89,7 @@ class Match(ReadOnly):
 
 
 @dataclass(frozen=True, eq=False)
-class Matches(Sequence[Match]):
+class Matches(Shown, Sequence[Match]):
     """What `ShapeIndex.query` found: a sequence of matches, best first, and how they were found.
 
     Attributes
@@ -125,9 +124,6 @@ class Matches(Sequence[Match]):
     n_compared: int
     n_shapes: int
     nothing_alike: bool = False
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def __len__(self) -> int:
         return len(self.found)

@@ -13,7 +13,7 @@ import numpy as np
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError, StoreError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, details_of, recipe_to_text, rows_of
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
@@ -33,7 +33,7 @@ from eigenshape.retrieval.store.state import (
 
 
 @dataclass(frozen=True)
-class Record:
+class Record(Shown):
     """What an index holds of a shape beside its descriptors.
 
     Attributes
@@ -75,15 +75,12 @@ class Record:
     attributes: dict[str, Any]
     recipes: tuple[AnyRecipe, ...]
 
-    __repr__ = short_repr
-    _repr_html_ = html_repr
-
 
 LARGEST_THUMBNAIL = 8192  # bytes, so that a shape takes less than 60 KB
 
 
 @dataclass(frozen=True, eq=False)
-class DescribedShape:
+class DescribedShape(Shown):
     """A shape that is described already, to be added to an index.
 
     Descriptors of one recipe are views of the shape: the whole first, then what is seen of it from
@@ -129,9 +126,6 @@ class DescribedShape:
     tags: Sequence[str] = ()
     attributes: Mapping[str, Any] = field(default_factory=dict)
     thumbnail: bytes | None = None
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def require_name(name: str) -> None:
