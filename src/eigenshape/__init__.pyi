@@ -52,8 +52,8 @@ from .plot.fields import figure_field as figure_field
 from .plot.fields import figure_segments as figure_segments
 from .plot.figure import save_figure as save_figure
 from .plot.view import view as view
-from .retrieval.description import describe as describe
 from .retrieval.index import ShapeIndex as ShapeIndex
+from .retrieval.kinds import describe as describe
 from .retrieval.labels.transfer import transfer_labels as transfer_labels
 from .scans.partial import partial_scan as partial_scan
 from .shapes.creatures import make_creature as make_creature

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from eigenshape._arguments import describe_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._memory import require_memory
-from eigenshape._text import html_repr
+from eigenshape._text import Shown
 from eigenshape._typing import ArrayLike, Integer
 
 # Names of rows in messages, and what rows of indices refer to.
@@ -37,14 +37,12 @@ def freeze(array: ArrayT) -> ArrayT:
     return copy  # type: ignore[return-value]
 
 
-class ReadOnly:
+class ReadOnly(Shown):
     """Base class of values that hold arrays: nobody can change them, nor those of any copy.
 
     An array that its caller can write to is copied. NumPy makes the arrays of a pickle, and of
-    `copy.deepcopy`, writable; here they become read-only again. Notebooks show a value as a table.
+    `copy.deepcopy`, writable; here they become read-only again.
     """
-
-    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         for name, entry in vars(self).items():

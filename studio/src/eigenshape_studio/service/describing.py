@@ -19,7 +19,7 @@ from matplotlib.image import imsave
 
 import eigenshape as es
 from eigenshape._workers import outcome_of, schedule_work, start_pool
-from eigenshape.retrieval.description import describe_to_store
+from eigenshape.retrieval.kinds import describe_to_store
 from eigenshape_studio.parse import Limits, read_upload
 from eigenshape_studio.search import color_places
 
