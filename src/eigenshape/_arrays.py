@@ -3,7 +3,8 @@
 import operator
 from collections.abc import Iterator
 from copy import deepcopy
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from eigenshape._arguments import describe_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._memory import require_memory
-from eigenshape._text import html_repr
+from eigenshape._text import html_repr, short_repr
 from eigenshape._typing import ArrayLike, Integer
 
 # Names of rows in messages, and what rows of indices refer to.
@@ -28,6 +29,7 @@ MOST_STEPS = 1_000_000
 MOST_COORDINATES = 3  # of a row that messages show as a vector: those of a point in space
 
 ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
+T = TypeVar("T")
 
 
 def freeze(array: ArrayT) -> ArrayT:
@@ -41,9 +43,11 @@ class ReadOnly:
     """Base class of values that hold arrays: nobody can change them, nor those of any copy.
 
     An array that its caller can write to is copied. NumPy makes the arrays of a pickle, and of
-    `copy.deepcopy`, writable; here they become read-only again. Notebooks show a value as a table.
+    `copy.deepcopy`, writable; here they become read-only again. Its text gives long arrays by their
+    type and shape, and notebooks show a value as a table.
     """
 
+    __repr__ = short_repr
     _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
@@ -57,6 +61,15 @@ class ReadOnly:
         for entry in state.values():
             for array in _arrays_of(entry):
                 array.flags.writeable = False
+
+
+@dataclass_transform(frozen_default=True, eq_default=False)
+def record(kind: type[T]) -> type[T]:
+    """Make a class a frozen dataclass whose values are equal to themselves alone.
+
+    Whether arrays are equal has no one answer, so values that hold arrays are not compared.
+    """
+    return dataclass(frozen=True, eq=False, repr=not issubclass(kind, ReadOnly))(kind)
 
 
 def _arrays_of(entry: Any) -> Iterator[NDArray[Any]]:

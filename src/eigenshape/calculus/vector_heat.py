@@ -1,7 +1,5 @@
 """Parallel transport and scalar extension by short heat flow."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
@@ -10,6 +8,7 @@ from eigenshape._arrays import (
     finite_values,
     positive_values,
     real_numbers,
+    record,
     require_finite_rows,
 )
 from eigenshape._errors import InvalidParameterError
@@ -32,7 +31,7 @@ from eigenshape.operators.tufted import side_ends
 from eigenshape.sparse.symmetric_factor import SymmetricFactor
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class VectorHeat(ReadOnly):
     """A surface that is ready for transport by heat: three factors, used for all sources.
 

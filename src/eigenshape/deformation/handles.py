@@ -1,14 +1,13 @@
 """Handles: the motions of regions."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, finite_values, freeze
+from eigenshape._arrays import ReadOnly, finite_values, freeze, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 
@@ -17,7 +16,7 @@ from eigenshape._typing import ArrayLike
 PARALLEL = 1e-12
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class Rotation(ReadOnly):
     """A rotation about an axis through a pivot, by any angle.
 
@@ -86,7 +85,7 @@ class Rotation(ReadOnly):
         return np.sin(angle) * across + 2 * np.sin(angle / 2) ** 2 * np.cross(self.axis, across)
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class Translation(ReadOnly):
     """A translation by a vector.
 

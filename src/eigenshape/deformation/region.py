@@ -1,7 +1,6 @@
 """Regions of a shape: vertices given by a mask, indices, a box or a brush."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +15,7 @@ from eigenshape._arrays import (
     freeze,
     positive_values,
     real_numbers,
+    record,
     whole_numbers,
 )
 from eigenshape._errors import InvalidParameterError
@@ -26,7 +26,7 @@ from eigenshape.geometry.distances.geodesic import geodesic_distances
 from eigenshape.geometry.mesh import TriangleMesh
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class BoxRegion(ReadOnly):
     """The vertices inside a box with sides parallel to the axes.
 
@@ -76,7 +76,7 @@ class BoxRegion(ReadOnly):
         object.__setattr__(self, "high", freeze(corners[1]))
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class BrushRegion(ReadOnly):
     """The vertices within a geodesic distance of the vertex nearest to a point.
 

@@ -1,18 +1,16 @@
 """Point clouds: points that sample a manifold of known dimension."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, record, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.simplicial import Mesh
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class PointCloud(ReadOnly):
     """Points in R^d that sample a manifold of dimension m.
 

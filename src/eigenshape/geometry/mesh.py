@@ -1,18 +1,17 @@
 """Triangle meshes: arrays that are checked once and then read-only."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows, record
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_without_facets
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class TriangleMesh(ReadOnly):
     """A triangle mesh in R³.
 

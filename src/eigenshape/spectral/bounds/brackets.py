@@ -1,14 +1,11 @@
 """Lower and upper bounds for the eigenvalues of a mesh itself, rather than of a matrix."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arrays import ReadOnly, freeze, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -33,7 +30,7 @@ LINEAR_FLOOR = 0.5
 NO_POINTS = np.empty(0, dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Brackets(ReadOnly):
     """Guaranteed lower and upper bounds for the k lowest eigenvalues of a mesh.
 
@@ -76,8 +73,6 @@ class Brackets(ReadOnly):
     longest_edge: float
     constant: float
     rounding: float
-
-    __repr__ = short_repr
 
     def explain(self) -> str:
         """Return a text that says what is bounded, and how tightly."""
