@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly, positive_values, record, whole_numbers
+from eigenshape._arrays import ReadOnly, positive_number, record, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike
@@ -133,7 +133,7 @@ def prepare_heat_geodesics(
     (2, 642)
     """
     shape = as_shape(shape)
-    factor = float(positive_values(time_factor, "time_factor")[0])
+    factor = positive_number(time_factor, "time_factor")
     if isinstance(shape, PointCloud) or robust:
         if isinstance(shape, PointCloud):
             cover, scale = cloud_cover(shape)

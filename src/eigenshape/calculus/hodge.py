@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_choice
 from eigenshape._arrays import ReadOnly, real_numbers, record, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
@@ -18,7 +19,6 @@ from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import scaled_corners
-from eigenshape.operators.choices import require_choice
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.operators.directions import require_oriented_manifold

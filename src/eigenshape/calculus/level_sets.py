@@ -3,7 +3,13 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, finite_values, point_functions, record, vertex_values
+from eigenshape._arrays import (
+    ReadOnly,
+    finite_number,
+    point_functions,
+    record,
+    vertex_values,
+)
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -204,7 +210,7 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
             f"Level sets are found on triangles and tetrahedra; the mesh is a {mesh!r}."
         )
     heights = vertex_values(values, "values", mesh.n_points)
-    (wanted,) = finite_values(level, "level")
+    wanted = finite_number(level, "level")
     above = heights >= wanted
     crossed = np.flatnonzero(above[mesh.simplices].any(axis=1) & ~above[mesh.simplices].all(axis=1))
     corners = mesh.simplices[crossed]

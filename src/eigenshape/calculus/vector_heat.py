@@ -6,7 +6,7 @@ from jaxtyping import Complex, Float, Int
 from eigenshape._arrays import (
     ReadOnly,
     finite_values,
-    positive_values,
+    positive_number,
     real_numbers,
     record,
     require_finite_rows,
@@ -124,7 +124,7 @@ def prepare_vector_heat(
     (162, 2)
     """
     mesh = as_mesh(mesh)
-    factor = float(positive_values(time_factor, "time_factor")[0])
+    factor = positive_number(time_factor, "time_factor")
     points, scale = scale_to_unit(mesh)
     unit = TriangleMesh(points, mesh.faces)
     report_progress = progress or silent

@@ -81,7 +81,7 @@ class Move(ReadOnly):
 
     def __post_init__(self) -> None:
         require_handle(self.handle)
-        object.__setattr__(self, "region", copy_region(self.region))
+        vars(self).update(region=copy_region(self.region))
 
 
 @record
@@ -128,7 +128,7 @@ class Edit(ReadOnly):
 
     def __post_init__(self) -> None:
         require_each(self.moves, Move, "moves")
-        object.__setattr__(self, "fixed", None if self.fixed is None else copy_region(self.fixed))
+        vars(self).update(fixed=None if self.fixed is None else copy_region(self.fixed))
 
 
 def apply_edit(rig: EigenRig, edit: Edit) -> EigenRig:

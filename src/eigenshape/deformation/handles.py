@@ -7,7 +7,7 @@ from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, finite_values, freeze, record
+from eigenshape._arrays import ReadOnly, finite_number, finite_values, freeze, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 
@@ -63,9 +63,11 @@ class Rotation(ReadOnly):
         if abs(length - 1) > 4 * np.finfo(float).eps:
             direction = direction / largest
             direction = direction / np.linalg.norm(direction)
-        object.__setattr__(self, "pivot", freeze(as_vector(pivot, "pivot")))
-        object.__setattr__(self, "axis", freeze(direction))
-        object.__setattr__(self, "angle", float(finite_values(angle, "angle")[0]))
+        vars(self).update(
+            pivot=freeze(as_vector(pivot, "pivot")),
+            axis=freeze(direction),
+            angle=finite_number(angle, "angle"),
+        )
 
     @property
     def turn(self) -> Float[np.ndarray, " 3"]:
@@ -114,7 +116,7 @@ class Translation(ReadOnly):
     vector: Float[np.ndarray, " 3"]
 
     def __init__(self, vector: ArrayLike) -> None:
-        object.__setattr__(self, "vector", freeze(as_vector(vector, "vector")))
+        vars(self).update(vector=freeze(as_vector(vector, "vector")))
 
     @property
     def turn(self) -> Float[np.ndarray, " 3"]:

@@ -13,7 +13,7 @@ from eigenshape._arrays import (
     ReadOnly,
     as_array,
     freeze,
-    positive_values,
+    positive_number,
     real_numbers,
     record,
     whole_numbers,
@@ -72,8 +72,7 @@ class BoxRegion(ReadOnly):
             raise InvalidParameterError(
                 f"low must lie below high; along axis {axis[0]} they are {below} and {above}."
             )
-        object.__setattr__(self, "low", freeze(corners[0]))
-        object.__setattr__(self, "high", freeze(corners[1]))
+        vars(self).update(low=freeze(corners[0]), high=freeze(corners[1]))
 
 
 @record
@@ -109,8 +108,9 @@ class BrushRegion(ReadOnly):
     radius: float
 
     def __init__(self, center: ArrayLike, radius: float) -> None:
-        object.__setattr__(self, "center", freeze(as_vector(center, "center")))
-        object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
+        vars(self).update(
+            center=freeze(as_vector(center, "center")), radius=positive_number(radius, "radius")
+        )
 
 
 Region = TypeAliasType("Region", BoxRegion | BrushRegion | np.ndarray | Iterable[int])

@@ -47,8 +47,9 @@ class PointCloud(ReadOnly):
         coordinates = finite_rows(points, "points")
         if not coordinates.size:
             raise InvalidShapeError("A point cloud must have points; it has none.")
-        object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
-        object.__setattr__(self, "points", freeze(coordinates))
+        vars(self).update(
+            dim=whole_number(dim, "dim", 1, coordinates.shape[1]), points=freeze(coordinates)
+        )
 
     @property
     def n_points(self) -> int:

@@ -63,8 +63,7 @@ class TriangleMesh(ReadOnly):
                 f"A mesh must have faces; it has {len(points)} vertices and no face. "
                 "Use PointCloud for points without faces."
             )
-        object.__setattr__(self, "vertices", freeze(points))
-        object.__setattr__(self, "faces", freeze(corners))
+        vars(self).update(vertices=freeze(points), faces=freeze(corners))
 
     @property
     def n_vertices(self) -> int:

@@ -66,8 +66,7 @@ class SimplicialMesh(ReadOnly):
                 f"Simplices in R^{ambient} must have dimension 1..{ambient}; "
                 f"these have {dim + 1} corners, which is dimension {dim}."
             )
-        object.__setattr__(self, "points", freeze(coordinates))
-        object.__setattr__(self, "simplices", freeze(corners))
+        vars(self).update(points=freeze(coordinates), simplices=freeze(corners))
 
     @property
     def n_points(self) -> int:

@@ -65,9 +65,11 @@ class Quadrature(ReadOnly):
                 "weights must hold one number per point; "
                 f"there are {len(measure)} for {len(coordinates)} points."
             )
-        object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
-        object.__setattr__(self, "points", freeze(coordinates))
-        object.__setattr__(self, "weights", freeze(measure))
+        vars(self).update(
+            dim=whole_number(dim, "dim", 1, coordinates.shape[1]),
+            points=freeze(coordinates),
+            weights=freeze(measure),
+        )
 
     @property
     def n_points(self) -> int:

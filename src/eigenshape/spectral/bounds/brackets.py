@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_choice
 from eigenshape._arrays import ReadOnly, freeze, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
@@ -168,10 +169,7 @@ def bracket_eigenvalues(
     True
     """
     mesh = as_simplicial(mesh)
-    if boundary not in ("neumann", "dirichlet"):
-        raise InvalidParameterError(
-            f"boundary must be 'neumann' or 'dirichlet'; it is {boundary!r}."
-        )
+    require_choice(boundary, Condition, "boundary")
     require_sound(mesh)
     points, scale = size_one(mesh.points)
     unit = SimplicialMesh(points, mesh.simplices)

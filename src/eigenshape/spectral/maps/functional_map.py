@@ -73,7 +73,7 @@ class FunctionalMap(ReadOnly):
             raise InvalidParameterError(
                 f"The matrix of a map must be finite; entry {bad[0].tolist()} is not."
             )
-        object.__setattr__(self, "matrix", freeze(self.matrix))
+        vars(self).update(matrix=freeze(self.matrix))
 
 
 def require_one_constant(spectrum: Spectrum, name: str) -> None:

@@ -8,13 +8,13 @@ from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arguments import describe_value, require_each, require_type
+from eigenshape._arguments import describe_value, require_choice, require_each, require_type
 from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import (
     FileFormatError,
@@ -258,10 +258,8 @@ def export_bundle(
     ((42, 42), 'float32', (42, 6))
     """
     require_type(bundle, OperatorBundle, "bundle")
-    if form not in get_args(Form):
-        raise InvalidParameterError(f"form must be 'scipy', 'numpy' or 'torch'; it is {form!r}.")
-    if precision not in get_args(Precision):
-        raise InvalidParameterError(f"precision must be 'single' or 'double'; it is {precision!r}.")
+    require_choice(form, Form, "form")
+    require_choice(precision, Precision, "precision")
     dtype = np.float32 if precision == "single" else np.float64
     # The attributes of a bundle stand in the order of DiffusionNet.
     return tuple(_convert(part.astype(dtype), form) for part in vars(bundle).values())
