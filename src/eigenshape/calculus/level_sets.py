@@ -1,20 +1,23 @@
 """Level sets of piecewise linear functions: polylines on surfaces, triangles in solids."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, finite_values, point_functions, vertex_values
+from eigenshape._arrays import (
+    ReadOnly,
+    finite_number,
+    point_functions,
+    record,
+    vertex_values,
+)
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import cut_tetrahedra, in_length, size_one, volumes
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LevelSet(ReadOnly):
     """The points where a piecewise linear function has a value, as segments or triangles.
 
@@ -57,8 +60,6 @@ class LevelSet(ReadOnly):
     pieces: Int[np.ndarray, "q m"]
     edges: Int[np.ndarray, "p 2"]
     shares: Float[np.ndarray, " p"]
-
-    __repr__ = short_repr
 
     @property
     def size(self) -> float:
@@ -209,7 +210,7 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
             f"Level sets are found on triangles and tetrahedra; the mesh is a {mesh!r}."
         )
     heights = vertex_values(values, "values", mesh.n_points)
-    (wanted,) = finite_values(level, "level")
+    wanted = finite_number(level, "level")
     above = heights >= wanted
     crossed = np.flatnonzero(above[mesh.simplices].any(axis=1) & ~above[mesh.simplices].all(axis=1))
     corners = mesh.simplices[crossed]

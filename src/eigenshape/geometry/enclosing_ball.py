@@ -1,14 +1,12 @@
 """The smallest ball around given points."""
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, finite_rows
+from eigenshape._arrays import ReadOnly, finite_rows, record
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 
@@ -16,7 +14,7 @@ Points = Float[np.ndarray, "n d"]
 Support = list[int]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class EnclosingBall(ReadOnly):
     """A ball in R^d, as found by `enclosing_ball`.
 
@@ -36,8 +34,6 @@ class EnclosingBall(ReadOnly):
 
     center: Float[np.ndarray, " d"]
     radius: float
-
-    __repr__ = short_repr
 
 
 def enclosing_ball(points: ArrayLike) -> EnclosingBall:

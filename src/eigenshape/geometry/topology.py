@@ -1,14 +1,11 @@
 """Connectivity of meshes: edges, boundaries, components, manifoldness, parts and unions."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
-from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.facet_lists import label_components, shared_facets
 from eigenshape.geometry.facets import boundary_facets, corner_fans, facet_table
@@ -19,7 +16,7 @@ from eigenshape.geometry.simplicial import Mesh
 HASH_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class EdgeTable(ReadOnly):
     """The edges of a triangle mesh without duplicates, and the edges of each face.
 
@@ -48,8 +45,6 @@ class EdgeTable(ReadOnly):
     edges: Int[np.ndarray, "e 2"]
     face_edges: Int[np.ndarray, "f 3"]
     n_faces: Int[np.ndarray, " e"]
-
-    __repr__ = short_repr
 
 
 def edge_table(mesh: MeshLike) -> EdgeTable:

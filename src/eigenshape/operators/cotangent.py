@@ -4,6 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from eigenshape._arguments import require_choice
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
@@ -14,7 +15,7 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import dual_volumes, in_length
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
-from eigenshape.operators.choices import Mass, require_choice
+from eigenshape.operators.choices import Mass
 from eigenshape.operators.laplacian import Laplacian
 
 # Dimension in which the default mass is averaged: experiments/ch3_tetrahedra chose it.

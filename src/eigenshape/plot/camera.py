@@ -1,6 +1,5 @@
 """The direction of the view, and where the points of a shape lie in the picture."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -9,7 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, real_numbers, whole_number
+from eigenshape._arrays import ReadOnly, real_numbers, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -68,7 +67,7 @@ LESS = 0.8
 MOST_PIXELS = 10_000  # of a side: some gigabytes while the picture is drawn
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Camera(ReadOnly):
     """A parallel projection onto a square picture.
 

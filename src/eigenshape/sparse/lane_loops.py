@@ -18,7 +18,7 @@ VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 AHEAD = 32
 
 
-def _summation(n_targets: int, change: str, *, kept: bool = True, ahead: int = 0):
+def _summation(n_targets, change, *, kept=True, ahead=0):
     """Return the intrinsic that changes `n_targets` rows at once by sums: "fadd" or "fsub".
 
     Rows that are not kept count as 0. More rows use the multipliers better, as long as all fit into

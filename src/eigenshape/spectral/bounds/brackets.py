@@ -1,14 +1,12 @@
 """Lower and upper bounds for the eigenvalues of a mesh itself, rather than of a matrix."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arguments import require_choice
+from eigenshape._arrays import ReadOnly, freeze, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -33,7 +31,7 @@ LINEAR_FLOOR = 0.5
 NO_POINTS = np.empty(0, dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Brackets(ReadOnly):
     """Guaranteed lower and upper bounds for the k lowest eigenvalues of a mesh.
 
@@ -76,8 +74,6 @@ class Brackets(ReadOnly):
     longest_edge: float
     constant: float
     rounding: float
-
-    __repr__ = short_repr
 
     def explain(self) -> str:
         """Return a text that says what is bounded, and how tightly."""
@@ -173,10 +169,7 @@ def bracket_eigenvalues(
     True
     """
     mesh = as_simplicial(mesh)
-    if boundary not in ("neumann", "dirichlet"):
-        raise InvalidParameterError(
-            f"boundary must be 'neumann' or 'dirichlet'; it is {boundary!r}."
-        )
+    require_choice(boundary, Condition, "boundary")
     require_sound(mesh)
     points, scale = size_one(mesh.points)
     unit = SimplicialMesh(points, mesh.simplices)

@@ -1,11 +1,11 @@
 """What the heat trace of a surface says at short times: area, boundary length, Euler characteristic."""
 
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_choice
 from eigenshape._arrays import finite_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import html_repr, short_repr
@@ -184,10 +184,8 @@ def recover_geometry(
     >>> print(found.explain()[-32:])
     which leaves the whole number 2.
     """
-    if boundary not in (None, *get_args(Condition)):
-        raise InvalidParameterError(
-            f"boundary must be None, 'neumann' or 'dirichlet'; it is {boundary!r}."
-        )
+    if boundary is not None:
+        require_choice(boundary, Condition, "boundary")
     values = _require_eigenvalues(eigenvalues, boundary)
     top = values[-1]
     base = _fit(values / top, boundary)

@@ -1,14 +1,11 @@
 """Heat kernel signatures of large shapes, by approximate eigenvectors, with an estimated error."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, positive_values, whole_number
+from eigenshape._arrays import ReadOnly, positive_values, record, whole_number
 from eigenshape._progress import Progress, silent
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.laplacian import Laplacian
@@ -46,7 +43,7 @@ CORRECTION_STEPS = (
 SINGLE_ROUNDING = 1e-6  # relative error of single precision sums, added to every estimate
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ApproximateSignature(ReadOnly):
     """Heat kernel signatures with an estimate of their error.
 
@@ -84,8 +81,6 @@ class ApproximateSignature(ReadOnly):
     errors: Float[np.ndarray, " q"]
     eigenvalues: Float[np.ndarray, " k"]
     complete: bool
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()
@@ -204,7 +199,7 @@ def approximate_heat_signature(
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Estimate:
     """What is known of the heat of approximate eigenvectors before it is summed up.
 

@@ -1,13 +1,13 @@
 """Disconnected operators: each part is solved separately, small parts of equal size together."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape._progress import Progress, silent
 from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, part_pencil, residual_norms
@@ -26,7 +26,7 @@ EXTRA_PAIRS = 2
 SolvePart = Callable[[Pencil, int, Progress], Pairs]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Parts:
     """The connected parts of a pencil, small ones first; parts of one size in the order of their first points.
 

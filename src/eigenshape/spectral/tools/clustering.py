@@ -7,7 +7,7 @@ import scipy.linalg as sl
 from jaxtyping import Float, Int
 from scipy.cluster.vq import vq
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import require_choice, require_type
 from eigenshape._arrays import as_array, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
@@ -86,10 +86,7 @@ def spectral_clusters(
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
-    if method not in ("k-means", "normalized-cut"):
-        raise InvalidParameterError(
-            f'method must be "k-means" or "normalized-cut"; it is {method!r}.'
-        )
+    require_choice(method, ClusterMethod, "method")
     k = len(spectrum.eigenvalues)
     if n_clusters is None:
         n_clusters = count_clusters(spectrum)

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from scipy.special import betainc, ndtri
 
 from eigenshape._arguments import describe_value
-from eigenshape._arrays import positive_values, whole_number
+from eigenshape._arrays import positive_number, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import Integer
@@ -132,7 +132,7 @@ def embed_watermark(
     """
     mesh = as_mesh(mesh)
     secret = _require_key(key)
-    share = float(positive_values(strength, "strength")[0])
+    share = positive_number(strength, "strength")
     if share > MOST_STRENGTH:
         raise InvalidParameterError(
             f"strength must be at most {MOST_STRENGTH} of the diagonal; it is {share}."
