@@ -33,8 +33,6 @@ def test_a_shape_that_is_moved_and_scaled_is_the_same_shape():
     np.testing.assert_allclose(fit.shapes, np.stack([fit.mean] * 5), atol=1e-12)
     assert fit.distances().max() < 1e-7  # the root of rounding errors
     size = np.linalg.norm(shape - shape.mean(axis=0))
-    scales = np.exp(RNG(0).standard_normal(0))
-    assert scales.size == 0
     np.testing.assert_allclose(np.linalg.norm(fit.mean), 1)
     np.testing.assert_allclose(fit_procrustes([shape, 3 * shape]).sizes, [size, 3 * size])
 
@@ -50,6 +48,15 @@ def test_moving_specimens_changes_neither_shapes_nor_distances():
     np.testing.assert_allclose(one.distances(), two.distances(), atol=1e-9)
     turn = Rotation.align_vectors(one.mean, two.mean)[0].as_matrix()
     np.testing.assert_allclose(two.shapes @ turn.T, one.shapes, atol=1e-7)
+
+
+@pytest.mark.parametrize("unit", [1e-100, 1e100])
+def test_sizes_are_in_the_unit_of_the_points_and_shapes_have_none(unit):
+    shapes = some_shapes()
+    one = fit_procrustes(shapes, curves=[[0, 1, 2, 3]])
+    other = fit_procrustes(unit * shapes, curves=[[0, 1, 2, 3]])
+    np.testing.assert_allclose(other.shapes, one.shapes, atol=1e-9)
+    np.testing.assert_allclose(other.sizes / unit, one.sizes)
 
 
 def test_distances_of_pairs_are_those_of_scipy():
@@ -215,6 +222,9 @@ def test_missing_points_come_from_the_mean_by_a_spline():
         es.InvalidParameterError, match="specimen 0, which has most points, lacks point 1"
     ):
         es.morphometrics.estimate_missing(broken[None])
+    broken[2:] = np.nan
+    with pytest.raises(es.InvalidParameterError, match="Known points of specimen 1 must be 4"):
+        es.morphometrics.estimate_missing([shape, broken])
 
 
 @pytest.mark.data

@@ -25,13 +25,15 @@ def bending_matrix(points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k k"]
     return free @ np.linalg.pinv(kernel, hermitian=True) @ free.T
 
 
-def fit_spline(starts: Float[np.ndarray, "k 3"], ends: Float[np.ndarray, "k 3"]) -> RBFInterpolator:
+def fit_spline(
+    starts: Float[np.ndarray, "k 3"], ends: Float[np.ndarray, "k 3"], name: str
+) -> RBFInterpolator:
     """Return the thin-plate spline between points; raise an error if there is none."""
     try:
         return RBFInterpolator(starts, ends, kernel="linear", degree=1)
     except (ValueError, np.linalg.LinAlgError) as err:
         raise InvalidParameterError(
-            "A spline must start at 4 points or more that differ and lie in no plane; there are "
+            f"{name} must be 4 points or more that differ and lie in no plane; there are "
             f"{len(starts)}, and {err}."
         ) from err
 
@@ -81,4 +83,4 @@ def warp_mesh(mesh: MeshLike, starts: ArrayLike, ends: ArrayLike) -> TriangleMes
         raise InvalidParameterError(
             f"There must be as many ends as starts; there are {len(goals)} and {len(places)}."
         )
-    return TriangleMesh(fit_spline(places, goals)(mesh.vertices), mesh.faces)
+    return TriangleMesh(fit_spline(places, goals, "starts")(mesh.vertices), mesh.faces)

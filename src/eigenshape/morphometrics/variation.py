@@ -17,6 +17,7 @@ from eigenshape.morphometrics.procrustes import complete_points, fit_procrustes
 from eigenshape.morphometrics.splines import fit_spline
 
 NO_VARIANCE = 1e-12  # singular values below this share of the largest are rounding errors
+NEARLY = 1 - 1e-6  # share of the largest movement from which on a point counts among the largest
 BATCH = 64  # permutations at once: as many times the memory of all scores
 
 
@@ -85,7 +86,7 @@ def principal_components(shapes: Specimens) -> PrincipalComponents:
     Returns
     -------
     PrincipalComponents
-        The point of each mode that moves most moves in positive direction.
+        The first of the points that move most in a mode moves in positive direction.
 
     Raises
     ------
@@ -116,7 +117,9 @@ def principal_components(shapes: Specimens) -> PrincipalComponents:
             f"Shapes must differ; there are {len(points)}, and their variance is {values[0] ** 2}."
         )
     n_modes = int(np.sum(values > NO_VARIANCE * values[0]))
-    largest = np.abs(modes).argmax(axis=1)
+    # Where left and right move alike, the first of both decides, and not the last digit.
+    sizes = np.abs(modes)
+    largest = (sizes > NEARLY * sizes.max(axis=1, keepdims=True)).argmax(axis=1)
     signs = np.sign(modes[np.arange(len(modes)), largest])[:n_modes]
     variances = values[:n_modes] ** 2 / (len(points) - 1)
     scores = left[:, :n_modes] * values[:n_modes] * signs
@@ -160,7 +163,7 @@ def compare_groups(shapes: Specimens, groups: ArrayLike) -> GroupComparison:
     shapes : (n, k, 3) float
         `ProcrustesFit.shapes`.
     groups : (n,) str or int
-        The group of each specimen. There must be 2 groups or more.
+        The group of each specimen. There must be 2 groups or more, of 2 specimens or more.
 
     Returns
     -------
@@ -171,8 +174,8 @@ def compare_groups(shapes: Specimens, groups: ArrayLike) -> GroupComparison:
     Raises
     ------
     InvalidParameterError
-        If the numbers of shapes and groups differ, there are fewer than 2 groups, or shapes are
-        wrong as in `principal_components`.
+        If the numbers of shapes and groups differ, there are fewer than 2 groups, one has fewer
+        than 2 specimens, or shapes are wrong as in `principal_components`.
 
     See Also
     --------
@@ -190,11 +193,12 @@ def compare_groups(shapes: Specimens, groups: ArrayLike) -> GroupComparison:
     """
     points = complete_points(shapes)
     labels = as_array(groups, "groups").astype(str)
-    names, members = np.unique(labels, return_inverse=True)
-    if labels.shape != (len(points),) or len(names) < 2:
+    names, members, counts = np.unique(labels, return_inverse=True, return_counts=True)
+    if labels.shape != (len(points),) or len(names) < 2 or counts.min() < 2:
         raise InvalidParameterError(
-            f"groups must give the group of each of {len(points)} specimens, and at least 2 groups; "
-            f"there are {labels.size} entries and {len(names)} groups."
+            f"groups must give the group of each of {len(points)} specimens, 2 groups or more of 2 "
+            f"specimens or more; there are {labels.size} entries, and the groups have "
+            f"{dict(zip(names.tolist(), counts.tolist(), strict=True))} specimens."
         )
     means = np.stack([points[members == group].mean(axis=0) for group in range(len(names))])
     distances = np.linalg.norm(means[:, None] - means, axis=(2, 3))
@@ -307,7 +311,7 @@ def fit_allometry(shapes: Specimens, sizes: ArrayLike) -> Allometry:
         found.mean,
         slope,
         float(logs.mean()),
-        float(explained / np.sum(found.scores**2)),
+        float(min(explained / np.sum(found.scores**2), 1.0)),  # not 1 + rounding errors
         _p_value([steps], effect, "pairings"),
         np.tensordot(points - found.mean, slope, axes=2) / np.linalg.norm(slope),
         points - fitted,
@@ -387,10 +391,10 @@ def symmetric_components(specimens: Specimens, pairs: ArrayLike) -> SymmetricCom
     """
     points = complete_points(specimens)
     rows = whole_numbers(pairs, "pairs", 0, points.shape[1] - 1)
-    if len(rows) % 2 or len(np.unique(rows)) < len(rows):
+    if not len(rows) or len(rows) % 2 or len(np.unique(rows)) < len(rows):
         raise InvalidParameterError(
-            f"pairs must name each landmark once, two in a row; there are {len(rows)} numbers, "
-            f"{len(np.unique(rows))} of them different."
+            f"pairs must have rows of two landmarks, each of them once; there are {len(rows)} "
+            f"numbers, {len(np.unique(rows))} of them different."
         )
     partners = np.arange(points.shape[1])
     partners[rows] = rows.reshape(-1, 2)[:, ::-1].ravel()
@@ -412,7 +416,8 @@ def symmetric_components(specimens: Specimens, pairs: ArrayLike) -> SymmetricCom
     def difference(signs: np.ndarray, axis: int) -> np.ndarray | np.float64:
         return np.linalg.norm(signs @ flat, axis=-1)
 
-    p_value = _p_value([np.ones(len(points))], difference, "samples")
+    # One specimen has the same difference, whichever side is left.
+    p_value = _p_value([np.ones(len(points))], difference, "samples") if len(points) > 1 else 1.0
     individual, side, interaction = shares.tolist()
     return SymmetricComponents(symmetric, asymmetric, individual, side, interaction, p_value)
 
@@ -473,7 +478,8 @@ def estimate_missing(specimens: Specimens) -> Float[np.ndarray, "n k 3"]:
             f"lacks point {int(np.argmin(known[fullest]))}."
         )
     mean = fit_procrustes(points[known.all(axis=1)]).mean
-    for each, there in zip(points, known, strict=True):
-        if not there.all():
-            each[~there] = fit_spline(mean[there], each[there])(mean[~there])
+    for number in np.flatnonzero(~known.all(axis=1)):
+        each, there = points[number], known[number]
+        spline = fit_spline(mean[there], each[there], f"Known points of specimen {number}")
+        each[~there] = spline(mean[~there])
     return points
