@@ -72,6 +72,16 @@ def test_slicer_has_one_file_for_each_specimen(suffix, tmp_path):
         )
 
 
+def test_names_that_would_read_as_something_else_are_refused(tmp_path):
+    with pytest.raises(es.InvalidParameterError, match="The name of a specimen must be a text"):
+        es.morphometrics.write_landmarks({" a": specimen()}, tmp_path / "a.csv")
+    with pytest.raises(
+        es.InvalidParameterError, match=r"must not begin with \[, as sections do; '\[a' does"
+    ):
+        es.morphometrics.write_landmarks({"[a": specimen()}, tmp_path / "a.txt")
+    assert not list(tmp_path.iterdir())
+
+
 def test_points_of_the_system_ras_are_turned_to_lps(tmp_path):
     path = tmp_path / "a.mrk.json"
     point, lost = {"id": "7", "position": [1.0, 2.0, 3.0]}, {"positionStatus": "undefined"}

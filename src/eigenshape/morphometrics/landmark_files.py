@@ -148,7 +148,8 @@ def write_landmarks(landmarks: Landmarks | Mapping[str, Landmarks], path: str | 
         If the name ends otherwise.
     InvalidParameterError
         If the format holds one specimen and there are several, there is none, landmarks of
-        specimens differ, or the name of one is empty or holds a line break.
+        specimens differ, or the name of one is empty, holds a line break, or begins with [ where
+        that begins a section.
     OSError
         If the system cannot write there.
 
@@ -175,6 +176,10 @@ def write_landmarks(landmarks: Landmarks | Mapping[str, Landmarks], path: str | 
     require_same_names(landmarks)
     for specimen in landmarks:
         require_name(specimen, "The name of a specimen")
+        if suffix == ".txt" and specimen.startswith("["):
+            raise InvalidParameterError(
+                f"Names in files of Morphologika must not begin with [, as sections do; {specimen!r} does."
+            )
     if suffix in OF_ONE and len(landmarks) > 1:
         raise InvalidParameterError(
             f"A {suffix} file holds one specimen; there are {len(landmarks)}. Write one file for each."
