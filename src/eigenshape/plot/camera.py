@@ -13,7 +13,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, scale_to_unit
+from eigenshape.geometry.measure import area_vectors, scale_to_unit, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 
@@ -210,7 +210,7 @@ def upward_direction(mesh: TriangleMesh, up: Up) -> Float[np.ndarray, "3"]:
     """
     if isinstance(up, str) and up == "auto":
         points = scale_to_unit(mesh)[0]
-        areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
+        areas = triangle_areas(points[mesh.faces])
         weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
         points = points - weights @ points[mesh.faces].mean(axis=1)
         stands, sizes = [], []
