@@ -21,8 +21,13 @@ from eigenshape.io.formats.cells import (
     Cells,
     cells_of_types,
 )
-from eigenshape.io.formats.cursor import COMPRESSORS, require_reasonable, unpack_block
-from eigenshape.io.formats.text import numbers_of, wholes
+from eigenshape.io.formats.numbers import (
+    COMPRESSORS,
+    numbers_of,
+    require_reasonable,
+    unpack_block,
+    wholes,
+)
 
 HEADER_TYPES = {"UInt32": "u4", "UInt64": "u8"}
 ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
