@@ -5,7 +5,6 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.plot.camera import in_picture, three_quarter_view
-from eigenshape.plot.eigenvalues import figure_spectrum
 from eigenshape.plot.fields import (
     figure_eigenfunctions,
     figure_field,
@@ -16,6 +15,7 @@ from eigenshape.plot.fields import (
 from eigenshape.plot.figure import save_figure
 from eigenshape.plot.render import AMBIENT, INK, draw, palette
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
+from eigenshape.plot.spectra import figure_spectrum
 from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
