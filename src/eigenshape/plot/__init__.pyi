@@ -1,6 +1,5 @@
 from .camera import Camera as Camera
 from .camera import aim_camera as aim_camera
-from .camera import three_quarter_view as three_quarter_view
 from .cortex import figure_cortex as figure_cortex
 from .fields import figure_eigenfunctions as figure_eigenfunctions
 from .fields import figure_field as figure_field
