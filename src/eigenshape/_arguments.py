@@ -12,7 +12,7 @@ from eigenshape._errors import InvalidParameterError
 MAKERS = {
     "Binding": "es.deformation.bind(rig, [region])",
     "Brackets": "es.bracket_eigenvalues(mesh, k)",
-    "Camera": "es.plot.three_quarter_view(mesh)",
+    "Camera": "es.plot.aim_camera(mesh)",
     "DepthCamera": "es.scans.DepthCamera()",
     "DescribedShape": "es.retrieval.DescribedShape(name, [es.describe(mesh)])",
     "DetailedSkeleton": "es.deformation.detailed_skeleton(binding)",

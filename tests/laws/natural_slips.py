@@ -220,7 +220,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.geometry.Quadrature: lambda: es.geometry.shape_quadrature(body()),
     es.spectral.Brackets: lambda: es.bracket_eigenvalues(body(), 10),
     es.stability.Rate: lambda: es.stability.Rate(1.0, -1.0),
-    es.plot.Camera: lambda: es.plot.three_quarter_view(body()),
+    es.plot.Camera: lambda: es.plot.aim_camera(body()),
     es.scans.DepthCamera: es.scans.DepthCamera,
     es.plot.Panel: lambda: es.plot.Panel(body(), "body", labels(), np.arange(3)),
     es.retrieval.LabeledShape: lambda: es.retrieval.LabeledShape(body(), labels()),

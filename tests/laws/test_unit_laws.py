@@ -345,7 +345,6 @@ WITHOUT = {
     "simulate_scan",
     "smooth_boundaries",
     "suggest_repairs",
-    "three_quarter_view",
     "to_pyvista",
     "to_trimesh",
     "transfer_labels",

@@ -768,7 +768,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "tangent_frames": lambda v: es.operators.tangent_frames(v.animal),
     "taubin_smooth": lambda v: es.calculus.taubin_smooth(v.many),
     "theorem_rate": lambda v: es.stability.theorem_rate("lipschitz", 2),
-    "three_quarter_view": lambda v: es.plot.three_quarter_view(v.many),
     "three_sphere": lambda v: es.shapes.three_sphere(60),
     "to_pyvista": lambda v: np.asarray(es.io.to_pyvista(v.ball).points),
     "to_trimesh": lambda v: np.asarray(es.io.to_trimesh(v.ball).vertices),

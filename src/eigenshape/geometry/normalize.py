@@ -9,7 +9,7 @@ from scipy.spatial.distance import cdist
 from eigenshape._arguments import require_choice
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, scale_to_unit
+from eigenshape.geometry.measure import scale_to_unit, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
 
@@ -56,7 +56,7 @@ def normalize_mesh(mesh: MeshLike, measure: Measure) -> TriangleMesh:
         size = float(np.ptp(points, axis=0).max())
     elif measure == "area":
         sound = np.delete(mesh.faces, degenerate_simplices(mesh), axis=0)
-        size = float(np.linalg.norm(area_vectors(points[sound]), axis=1).sum()) ** 0.5
+        size = float(triangle_areas(points[sound]).sum()) ** 0.5
     else:
         # The ends of a diameter are corners of the convex hull: of the space, of a plane, or of a line.
         axes = np.linalg.svd(points, full_matrices=False)[2]

@@ -308,27 +308,21 @@ def boundary_loops(mesh: MeshLike) -> list[Int[np.ndarray, " k"]]:
     loops: list[Int[np.ndarray, " k"]] = []
     for first in sorted(leaving):
         while leaving[first]:
-            loops += [np.array(loop, dtype=np.int64) for loop in _walks(leaving, first)]
+            # Follow unused edges, and cut off a loop whenever the path meets itself. The last walk is
+            # open if the path does not return.
+            path, place = [first], {first: 0}
+            while leaving.get(path[-1]):
+                end = leaving[path[-1]].pop()
+                if end in place:
+                    loops.append(np.array(path[place[end] :], dtype=np.int64))
+                    for vertex in path[place[end] + 1 :]:
+                        del place[vertex]
+                    del path[place[end] + 1 :]
+                else:
+                    place[end] = len(path)
+                    path.append(end)
+            loops += [np.array(path, dtype=np.int64)] if len(path) > 1 else []
     return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
-
-
-def _walks(leaving: dict[int, list[int]], first: int) -> list[list[int]]:
-    """Follow unused edges from a vertex, and cut off a loop whenever the path meets itself.
-
-    The edges are removed from `leaving`. The last walk is open if the path does not return.
-    """
-    loops, path, place = [], [first], {first: 0}
-    while leaving.get(path[-1]):
-        end = leaving[path[-1]].pop()
-        if end in place:
-            loops.append(path[place[end] :])
-            for vertex in path[place[end] + 1 :]:
-                del place[vertex]
-            del path[place[end] + 1 :]
-        else:
-            place[end] = len(path)
-            path.append(end)
-    return [*loops, path] if len(path) > 1 else loops
 
 
 def non_manifold_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:

@@ -23,7 +23,7 @@ from eigenshape.io.attributes import (
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.fields import format_fields, read_field_attributes
+from eigenshape.io.field_files import format_fields, read_field_attributes
 from eigenshape.io.formats.cells import SEGMENTS, require_kind, select_cells, split_sentence
 from eigenshape.io.formats.registry import (
     MESH_FORMATS,

@@ -1,9 +1,6 @@
 from .camera import Camera as Camera
 from .camera import aim_camera as aim_camera
-from .camera import three_quarter_view as three_quarter_view
 from .cortex import figure_cortex as figure_cortex
-from .eigenvalues import figure_spectra as figure_spectra
-from .eigenvalues import figure_spectrum as figure_spectrum
 from .fields import figure_eigenfunctions as figure_eigenfunctions
 from .fields import figure_field as figure_field
 from .fields import figure_segments as figure_segments
@@ -22,4 +19,6 @@ from .sheet import Panel as Panel
 from .sheet import figure_contact_sheet as figure_contact_sheet
 from .sheet import figure_label_transfer as figure_label_transfer
 from .sheet import figure_poses as figure_poses
+from .spectra import figure_spectra as figure_spectra
+from .spectra import figure_spectrum as figure_spectrum
 from .view import view as view

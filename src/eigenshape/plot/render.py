@@ -47,7 +47,7 @@ class Drawing(ReadOnly):
     --------
     >>> import eigenshape as es
     >>> ball = es.icosphere(2)
-    >>> drawing = es.plot.draw(ball, es.plot.three_quarter_view(ball, size=64))
+    >>> drawing = es.plot.draw(ball, es.plot.aim_camera(ball, size=64))
     >>> drawing.places.shape
     (162, 2)
     """
@@ -93,7 +93,7 @@ def draw(
     --------
     >>> import eigenshape as es
     >>> ball = es.icosphere(2)
-    >>> es.plot.draw(ball, es.plot.three_quarter_view(ball, size=64)).image.shape
+    >>> es.plot.draw(ball, es.plot.aim_camera(ball, size=64)).image.shape
     (64, 64, 4)
     """
     mesh = as_mesh(mesh)

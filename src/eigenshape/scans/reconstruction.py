@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import area_vectors, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.simplices import cut_tetrahedra, size_one
@@ -234,7 +234,7 @@ def _large_pieces(mesh: TriangleMesh, chosen: Bool[np.ndarray, " f"]) -> Bool[np
     pieces, _ = submesh(mesh, chosen)
     count, labels = vertex_components(pieces)
     owner = labels[pieces.faces[:, 0]]
-    sizes = np.linalg.norm(area_vectors(pieces.vertices[pieces.faces]), axis=1)
+    sizes = triangle_areas(pieces.vertices[pieces.faces])
     areas = np.bincount(owner, weights=sizes, minlength=count)
     large = np.zeros(mesh.n_faces, dtype=bool)
     large[chosen] = areas[owner] > np.pi * REACH**2

@@ -18,7 +18,7 @@ from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.simplices import size_one
-from eigenshape.io.surfaces import read_surface
+from eigenshape.io.surface_files import read_surface
 from eigenshape.plot.camera import aim_camera
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from eigenshape._arrays import record
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.cells import fans
-from eigenshape.io.formats.text import (
+from eigenshape.io.formats.numbers import (
     Line,
     coordinates,
     lines_of,

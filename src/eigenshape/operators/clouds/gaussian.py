@@ -17,7 +17,7 @@ from eigenshape.geometry.simplices import mean_side_length, require_span, size_o
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.choices import Correction, Distance, Form
-from eigenshape.operators.clouds.cells import cell_grid, gaussian_differences
+from eigenshape.operators.clouds.cell_grid import cell_grid, gaussian_differences
 from eigenshape.operators.clouds.kernel import (
     KernelOptions,
     choose_kernel,

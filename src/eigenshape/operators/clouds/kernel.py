@@ -22,7 +22,7 @@ from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.choices import Correction, Form
-from eigenshape.operators.clouds.cells import cell_grid, count_partners, gaussian_rows
+from eigenshape.operators.clouds.cell_grid import cell_grid, count_partners, gaussian_rows
 from eigenshape.operators.clouds.pair_loops import component_labels
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 

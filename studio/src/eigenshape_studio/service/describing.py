@@ -134,7 +134,7 @@ def draw_file(path: Path) -> Picture:
 
 
 def _draw(mesh: es.TriangleMesh) -> Picture:
-    drawing = es.plot.draw(mesh, es.plot.three_quarter_view(mesh, size=THUMBNAIL))
+    drawing = es.plot.draw(mesh, es.plot.aim_camera(mesh, size=THUMBNAIL))
     file = BytesIO()
     imsave(file, drawing.image, format="png")
     places = (drawing.places / THUMBNAIL).astype(np.float32)

@@ -5,9 +5,8 @@ import numpy as np
 from eigenshape._errors import FileFormatError
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cursor import Cursor
 from eigenshape.io.formats.neuro.shared import find_keys
-from eigenshape.io.formats.text import coordinates, lines_of, whole, wholes
+from eigenshape.io.formats.numbers import Cursor, coordinates, lines_of, whole, wholes
 
 WHAT = "An annotation file"
 PACKING = np.array([1, 2**8, 2**16])  # of red, green and blue into the number of a parcel

@@ -4,8 +4,8 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cursor import require_reasonable
 from eigenshape.io.formats.neuro.shared import Arrays, narrow, require_nibabel
+from eigenshape.io.formats.numbers import require_reasonable
 
 PREFIX = "CIFTI_STRUCTURE_"
 NIFTI_HEADER = 540  # bytes

@@ -8,8 +8,8 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cursor import Cursor, require_reasonable
 from eigenshape.io.formats.neuro.shared import Arrays, narrow, one_table
+from eigenshape.io.formats.numbers import Cursor, require_reasonable
 from eigenshape.io.formats.stl import single_precision
 
 SURFACE, CURVATURE, GZIP = b"\xff\xff\xfe", b"\xff\xff\xff", b"\x1f\x8b"  # first bytes

@@ -10,10 +10,9 @@ from jaxtyping import Float, Int
 from eigenshape._errors import FileFormatError
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cursor import ZLIB, require_reasonable, unpack_block
 from eigenshape.io.formats.neuro.shared import Arrays, find_keys, narrow, require_nibabel
+from eigenshape.io.formats.numbers import ZLIB, numbers_of, require_reasonable, unpack_block
 from eigenshape.io.formats.stl import single_precision
-from eigenshape.io.formats.text import numbers_of
 
 NUMBERS = {
     "NIFTI_TYPE_UINT8": "u1", "NIFTI_TYPE_INT32": "i4", "NIFTI_TYPE_FLOAT32": "f4",

@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.neuro.shared import find_keys
-from eigenshape.io.formats.text import lines_of, number_table, wholes
+from eigenshape.io.formats.numbers import lines_of, number_table, wholes
 
 N_COLUMNS = 7  # number, kind, x, y, z, radius, parent
 
