@@ -11,7 +11,6 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.simplices import dual_volumes
@@ -54,8 +53,6 @@ class Parcellation(ReadOnly):
     labels: Int[np.ndarray, " n"]
     names: tuple[str, ...]
     colors: Float[np.ndarray, "p 4"]
-
-    __repr__ = short_repr
 
     def __init__(
         self,

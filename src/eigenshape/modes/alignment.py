@@ -8,7 +8,6 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, whole_numbers
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.comparison.eigenspaces import (
@@ -57,8 +56,6 @@ class ModeAlignment(ReadOnly):
     starts: Int[np.ndarray, " g"]
     stops: Int[np.ndarray, " g"]
     angles: Float[np.ndarray, " k"]
-
-    __repr__ = short_repr
 
     @property
     def lost(self) -> Int[np.ndarray, " h"]:

@@ -8,7 +8,6 @@ from jaxtyping import Float
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.spectrum import Spectrum
@@ -58,8 +57,6 @@ class ModeComparison(ReadOnly):
     statistics: Float[np.ndarray, " k"]
     p_values: Float[np.ndarray, " k"]
     family_p_values: Float[np.ndarray, " k"]
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()

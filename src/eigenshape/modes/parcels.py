@@ -10,7 +10,6 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, whole_number
-from eigenshape._text import short_repr
 from eigenshape._typing import Integer
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 from eigenshape.spectral.solve import solve_spectrum
@@ -45,8 +44,6 @@ class ParcelTree(ReadOnly):
     labels: Int[np.ndarray, " n"]
     parents: Int[np.ndarray, " p"]
     sizes: Float[np.ndarray, " p"]
-
-    __repr__ = short_repr
 
     def cut(self, n_parcels: Integer) -> Int[np.ndarray, " n"]:
         """Return the labels of fewer parcels: those before the last cuts.

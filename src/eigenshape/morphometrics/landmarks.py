@@ -11,7 +11,6 @@ from typing_extensions import TypeAliasType
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 
 
@@ -96,8 +95,6 @@ class Landmarks(ReadOnly):
         object.__setattr__(self, "points", freeze(places))
         object.__setattr__(self, "spread", widths)
         object.__setattr__(self, "curves", as_curves(curves, len(names)))
-
-    __repr__ = short_repr
 
 
 Specimens = TypeAliasType("Specimens", Mapping[str, Landmarks] | Sequence[Landmarks] | ArrayLike)

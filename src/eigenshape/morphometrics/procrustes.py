@@ -10,7 +10,6 @@ from scipy.stats import iqr
 
 from eigenshape._arrays import ReadOnly, real_numbers
 from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.morphometrics.landmarks import Specimens, as_configurations, as_curves
@@ -58,8 +57,6 @@ class ProcrustesFit(ReadOnly):
     mean: Float[np.ndarray, "k 3"]
     shapes: Float[np.ndarray, "n k 3"]
     sizes: Float[np.ndarray, " n"]
-
-    __repr__ = short_repr
 
     @one_blas_thread()
     def distances(self) -> Float[np.ndarray, "n n"]:

@@ -9,7 +9,6 @@ from scipy.stats import permutation_test
 
 from eigenshape._arrays import ReadOnly, as_array, positive_values, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.morphometrics.landmarks import Specimens, as_configurations
@@ -55,8 +54,6 @@ class PrincipalComponents(ReadOnly):
     modes: Float[np.ndarray, "m k 3"]
     variances: Float[np.ndarray, " m"]
     scores: Float[np.ndarray, "n m"]
-
-    __repr__ = short_repr
 
     @property
     def shares(self) -> Float[np.ndarray, " m"]:
@@ -150,8 +147,6 @@ class GroupComparison(ReadOnly):
     means: Float[np.ndarray, "g k 3"]
     distances: Float[np.ndarray, "g g"]
     p_values: Float[np.ndarray, "g g"]
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()
@@ -250,8 +245,6 @@ class Allometry(ReadOnly):
     scores: Float[np.ndarray, " n"]
     residuals: Float[np.ndarray, "n k 3"]
 
-    __repr__ = short_repr
-
     def shapes(self, sizes: ArrayLike) -> Float[np.ndarray, "m k 3"]:
         """Return the shapes that are expected at centroid sizes (m,)."""
         steps = np.log(positive_values(sizes, "sizes")) - self.mean_log_size
@@ -346,8 +339,6 @@ class SymmetricComponents(ReadOnly):
     share_directional: float
     share_fluctuating: float
     p_value: float
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()

@@ -13,7 +13,6 @@ from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.maps.functional_map import LOST, FunctionalMap, point_areas, unit_modes
@@ -51,8 +50,6 @@ class LatentBasis(ReadOnly):
     eigenvalues: Float[np.ndarray, " m"]
     spectra: tuple[Spectrum, ...]
     misfits: dict[tuple[int, int], float]
-
-    __repr__ = short_repr
 
     @one_blas_thread()
     def map_between(self, source: Integer, target: Integer) -> FunctionalMap:
