@@ -15,6 +15,7 @@ deformation  regions, motions, editing sessions, transfer of poses
 stability    how far two shapes and their spectra differ
 retrieval    descriptors, an index of shapes, search
 matching     dense correspondences of parts and wholes
+collections  specimens of one kind: their maps, mean shape and landmarks
 morphometrics landmarks and their files, statistics of shapes
 io           files, trimesh and PyVista
 plot         pictures

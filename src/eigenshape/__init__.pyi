@@ -1,4 +1,5 @@
 from . import calculus as calculus
+from . import collections as collections
 from . import compat as compat
 from . import deformation as deformation
 from . import features as features

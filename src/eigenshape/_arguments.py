@@ -17,6 +17,7 @@ MAKERS = {
     "DescribedShape": "es.retrieval.DescribedShape(name, [es.describe(mesh)])",
     "DetailedSkeleton": "es.deformation.detailed_skeleton(binding)",
     "Edit": "es.deformation.Edit((es.deformation.Move(region, handle),))",
+    "Collection": "es.collections.open_collection(folder)",
     "EigenRig": "es.rig_shape(mesh)",
     "FeaturePoints": "es.segment(tree).features",
     "Figure": "es.plot.figure_spectrum(spectrum)",

@@ -15,7 +15,7 @@ import eigenshape as es
 
 SOURCE = Path(es.__file__).parent
 ROOMS = {
-    "calculus", "compat", "compat.lapy", "deformation", "features", "geometry", "io", "matching", "modes",
+    "calculus", "collections", "compat", "compat.lapy", "deformation", "features", "geometry", "io", "matching", "modes",
     "morphometrics", "operators", "plot", "retrieval", "scans", "shapes", "spectral", "stability", "types",
 }  # fmt: skip
 PROMISED = {

@@ -66,6 +66,11 @@ def matched() -> es.matching.ShapeMatch:
     return es.match_shapes(body(), target())
 
 
+@cache
+def collection() -> es.collections.Collection:
+    return es.collections.build_collection({"one": body(), "two": body()}, FOLDER / "bones")
+
+
 HEAD = es.deformation.BoxRegion([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
 TURN = es.Rotation([0, 0.5, 0], [1, 0, 0], 0.2)
 
@@ -211,6 +216,11 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.matching.MatchTarget: target,
     es.matching.ShapeMatch: matched,
     es.matching.Registration: lambda: es.matching.register_scans(body(), body()),
+    es.collections.Collection: collection,
+    es.collections.CarriedLandmarks: lambda: es.collections.carry_landmarks(
+        collection(), {"one": es.morphometrics.Landmarks(["tip"], body().vertices[:1])}
+    ),
+    es.collections.Similarity: lambda: es.collections.Similarity(2.0, np.eye(3), np.ones(3)),
     es.matching.FusedScan: lambda: es.matching.fuse_scans([body()]),
     "fuse_scans.scans": lambda: [body()],
     es.stability.Perturbation: lambda: es.stability.measure_perturbation(body(), bent()),
@@ -254,6 +264,11 @@ NAMED: dict[str, Callable[[], Any]] = {
     "warp_mesh.starts": lambda: body().vertices[:9],
     "warp_mesh.ends": lambda: bent().vertices[:9],
     "alpha": lambda: 1.0,
+    "build_collection.specimens": lambda: {"one": body(), "two": body()},
+    "build_collection.folder": lambda: FOLDER / "bones",
+    "carry_landmarks.labelled": lambda: {
+        "one": es.morphometrics.Landmarks(["tip"], body().vertices[:1])
+    },
     "carry_attributes.attributes": written_attributes,
     "decimate.n_faces": lambda: 100,
     "write_fields.fields": lambda: {"height": height()},

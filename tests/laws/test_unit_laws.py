@@ -53,6 +53,7 @@ class Shapes:
 # The power of length that an answer is in, and the call. Parts of an answer in several powers are
 # several rows.
 LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
+    "align_surfaces": (0, lambda s: es.collections.align_surfaces(s.mesh, s.other).rotation),
     "angle_distortion": (0, lambda s: calculus.angle_distortion(s.mesh, s.other.vertices)),
     "anisotropic_laplacian": (
         0,
@@ -108,6 +109,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "farthest_points": (0, lambda s: geometry.farthest_points(s.mesh, 9)[0]),
     "fem_laplacian": (3, lambda s: operators.fem_laplacian(s.solid, 2).mass),
     "fem_nodes": (1, lambda s: operators.fem_nodes(s.solid, 2)),
+    "fit_surface": (1, lambda s: es.collections.fit_surface(s.mesh, s.other).vertices),
     "flatten_conformally": (1, lambda s: calculus.flatten_conformally(s.sheet)),
     "functional_map": (
         0,
@@ -357,6 +359,7 @@ WITHOUT = {
 }
 # Others that are the same code as a row above, or have laws of the unit of their own.
 ELSEWHERE = {
+    "build_collection",
     "compress_mesh",
     "fuse_scans",
     "prepare_target",

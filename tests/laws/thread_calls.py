@@ -45,6 +45,10 @@ class Shared:
         self.fish_scan = es.partial_scan(es.make_creature("fish", n_vertices=1200), [0, 0, 1]).mesh
         self.motion = es.matching.register_scans(self.fish_scan, self.fish_scan)
         self.fish_match = es.match_shapes(self.fish, self.fish_target)
+        self.bones = {"one": self.fish, "two": self.fish}
+        self.collection = es.collections.build_collection(self.bones, self.folder / "bones")
+        self.similarity = es.collections.Similarity(2.0, np.eye(3), np.ones(3))
+        self.tip = es.morphometrics.Landmarks(["tip"], self.fish.vertices[[9]])
         self.camera = es.plot.Camera(np.eye(3), 60)
         self.labels = (self.animal.vertices[self.animal.faces[:, 0], 1] > 0).astype(np.int64)
         self.laplacian, self.other = (
@@ -775,6 +779,20 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
     "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
+    "Similarity.move": lambda v: v.similarity.move(v.fish.vertices),
+    "Similarity.inverse": lambda v: v.similarity.inverse().translation,
+    "align_surfaces": lambda v: es.collections.align_surfaces(v.fish, v.fish),
+    "fit_surface": lambda v: es.collections.fit_surface(v.fish, v.fish),
+    "build_collection": lambda v: (
+        es.collections.build_collection(v.bones, v.folder / secrets.token_hex(8)).points
+    ),
+    "open_collection": lambda v: es.collections.open_collection(v.collection.folder).points,
+    "Collection.number": lambda v: v.collection.number("two"),
+    "Collection.read_specimen": lambda v: v.collection.read_specimen("two"),
+    "carry_landmarks": lambda v: es.collections.carry_landmarks(v.collection, {"one": v.tip}),
+    "CarriedLandmarks.save": lambda v: written(
+        v.folder, ".csv", es.collections.carry_landmarks(v.collection, {"one": v.tip}).save
+    ),
     "Registration.move": lambda v: v.motion.move(v.fish.vertices),
     "Registration.inverse": lambda v: v.motion.inverse().rotation,
     "Registration.after": lambda v: v.motion.after(v.motion).rotation,
