@@ -139,7 +139,7 @@ def align_surfaces(surface: MeshLike, whole: MeshLike) -> Similarity:
     tree, rough_tree = cKDTree(theirs), cKDTree(theirs[:: N_WHOLE[0] // N_WHOLE[1]])
     n = N_POINTS // N_ROUGH
 
-    def search(points: Float[np.ndarray, "k 6"]) -> Similarity:
+    def search(points: Float[np.ndarray, "k 6"]) -> _Places:
         """Return the best place of points with normals."""
         turns = _turns(points[:, :3], theirs[:, :3])
         offsets = np.vstack([np.zeros(3), OFFSET * np.eye(3), -OFFSET * np.eye(3)])
@@ -149,16 +149,22 @@ def align_surfaces(surface: MeshLike, whole: MeshLike) -> Similarity:
         half = len(ROUGH_REACH) // 2
         starts = _refine(points[::n], rough_tree, starts, ROUGH_REACH[:half]).best(N_KEPT)
         starts = _refine(points[::n], rough_tree, starts, ROUGH_REACH[half:]).best(N_REFINED)
-        best = _refine(points, tree, starts, FINE_REACH).best(1)
-        return Similarity(
-            float(best.scales[0]), best.rotations[0], best.translations[0], float(best.gaps[0])
-        )
+        return _refine(points, tree, starts, FINE_REACH).best(1)
 
-    best = search(ours)
-    mirrored = search(ours @ np.kron(np.eye(2), MIRROR))  # places and normals
-    if mirrored.gap < REFLECTED * best.gap:
-        turn = mirrored.rotation @ MIRROR
-        best = Similarity(mirrored.scale, turn, mirrored.translation, mirrored.gap)
+    mirrored = ours @ np.kron(np.eye(2), MIRROR)  # places and normals
+    found, reflected = search(ours), search(mirrored)
+    # A form with two equal sides lies as well on itself in a mirror: each place, mirrored by the
+    # planes of the principal axes of the whole, is a start of the other one.
+    axes = np.linalg.svd(theirs[:, :3], full_matrices=False)[2]
+    planes = np.eye(3) - 2 * axes[:, :, None] * axes[:, None]
+    found, reflected = (
+        own.joined(_refine(points, tree, other.mirrored(planes), FINE_REACH)).best(1)
+        for points, own, other in ((ours, found, reflected), (mirrored, reflected, found))
+    )
+    turned = reflected.gaps[0] < REFLECTED * found.gaps[0]
+    best = (reflected if turned else found).similarity()
+    if turned:
+        best = Similarity(best.scale, best.rotation @ MIRROR, best.translation, best.gap)
     scale = best.scale * size / our_size
     away = middle + size * best.translation - scale * best.rotation @ our_middle
     return Similarity(scale, best.rotation, away, best.gap)
@@ -201,6 +207,23 @@ class _Places:
         """Return those with the smallest gaps."""
         chosen = np.argsort(self.gaps, kind="stable")[:n]
         return _Places(*(entry[chosen] for entry in vars(self).values()))
+
+    def mirrored(self, planes: Float[np.ndarray, "3 3 3"]) -> "_Places":
+        """Return the first place after each reflection, for points that are reflected themselves."""
+        scales, gaps = np.repeat(self.scales[:1], 3), np.zeros(3)
+        turns = planes @ self.rotations[0] @ MIRROR
+        return _Places(scales, turns, planes @ self.translations[0], gaps)
+
+    def joined(self, other: "_Places") -> "_Places":
+        """Return these places and others."""
+        both = zip(vars(self).values(), vars(other).values(), strict=True)
+        return _Places(*(np.concatenate(pair) for pair in both))
+
+    def similarity(self) -> Similarity:
+        """Return the first place."""
+        return Similarity(
+            float(self.scales[0]), self.rotations[0], self.translations[0], float(self.gaps[0])
+        )
 
 
 def _turns(

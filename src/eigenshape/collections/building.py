@@ -39,6 +39,7 @@ from eigenshape.geometry.repairs.repair import repair, suggest_repairs
 from eigenshape.geometry.resolution.decimation import decimate
 from eigenshape.io.folders import find_items
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.morphometrics.procrustes import fit_procrustes
 from eigenshape.retrieval.building.batch import content_digest
 
 T = TypeVar("T")
@@ -55,7 +56,7 @@ NOTABLE = 0.1
 OTHER_UNIT = 3.0  # factor from the median size from which a unit is suspected
 RECIPE = "1"  # changes when fits of an older version must not be used again
 SURE = 0.25  # confidence of a vertex that determines where the second round starts
-ROUNDS = 20  # of superimposing shapes on their mean; each changes it a hundred times less
+ROUNDS = 20  # of finding the place and the shape of a start in turn
 
 
 def build_collection(
@@ -173,10 +174,11 @@ def build_collection(
     reflected = tuple(fits[name].reflected for name in names)
     points = np.stack([fits[name].vertices for name in names])
     complete = _complete([fits[name] for name in names])
-    shapes, sizes = _superimpose(unreflect(points, reflected)[complete])
-    mean = TriangleMesh(shapes.mean(axis=0) * np.median(sizes), surface.faces)
+    together = fit_procrustes(unreflect(points, reflected)[complete])
+    size = float(np.median(together.sizes))
+    mean = TriangleMesh(together.mean * size, surface.faces)
     for name in names:
-        notes[name] += _noticed(fits[name], float(np.median(sizes)))
+        notes[name] += _noticed(fits[name], size)
     collection = Collection(
         folder=folder,
         names=names,
@@ -367,12 +369,11 @@ def _starts_from_modes(
     reflected = tuple(fit.reflected for fit in ordered)
     points = unreflect(np.stack([fit.vertices for fit in ordered]), reflected)
     complete = _complete(ordered)
-    shapes, _ = _superimpose(points[complete])
-    flat = shapes.reshape(len(shapes), -1)
-    mean = flat.mean(axis=0)
-    _, lengths, right = np.linalg.svd(flat - mean, full_matrices=False)
-    modes = np.vstack([mean, right[:N_MODES]]).reshape(-1, *shapes.shape[1:])
-    deviations = lengths[: len(modes) - 1] / np.sqrt(max(len(shapes) - 1, 1))
+    together = fit_procrustes(points[complete])
+    away = (together.shapes - together.mean).reshape(len(together.shapes), -1)
+    _, lengths, right = np.linalg.svd(away, full_matrices=False)
+    modes = np.vstack([together.mean.ravel(), right[:N_MODES]]).reshape(-1, *points.shape[1:])
+    deviations = lengths[:N_MODES] / np.sqrt(len(away) - 1)
     starts = {}
     for name, fit, own in zip(fits, ordered, points, strict=True):
         sure = np.ones(len(own), dtype=bool)
@@ -407,21 +408,6 @@ def _fit_modes(
         away = placing.inverse().move(points)[sure] - modes[0, sure]
         coefficients[1:] = np.linalg.solve(basis @ basis.T + penalty, basis @ away.ravel())
     return coefficients, best_similarity(np.tensordot(coefficients, modes, 1), points, weights)
-
-
-def _superimpose(
-    points: Float[np.ndarray, "s n 3"],
-) -> tuple[Float[np.ndarray, "s n 3"], Float[np.ndarray, " s"]]:
-    """Return shapes of centroid size 1 on their mean, and the sizes (Gower 1975)."""
-    away = points - points.mean(axis=1, keepdims=True)
-    sizes = np.linalg.norm(away, axis=(1, 2))
-    shapes = away / sizes[:, None, None]
-    mean, equal = shapes[0], np.ones(points.shape[1])
-    for _ in range(ROUNDS):
-        turns = [best_similarity(shape, mean, equal).rotation for shape in shapes]
-        shapes = np.stack([shape @ turn.T for shape, turn in zip(shapes, turns, strict=True)])
-        mean = shapes.mean(axis=0)
-    return shapes, sizes
 
 
 def _noticed(fit: SurfaceFit, usual_size: float) -> list[str]:
