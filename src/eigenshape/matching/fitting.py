@@ -6,7 +6,7 @@ of the whole that face the same way (non-rigid registration, compare Li, Sumner 
 A wrong map needs strong bending and stays far from the whole, so that few wrong ones pass.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial import cKDTree
 
+from eigenshape._arrays import record
 from eigenshape.matching.fitting_loops import add_pulls, add_tensions, turn_frames
 from eigenshape.matching.match_loops import nearest_rows
 from eigenshape.matching.surface import Surface
@@ -43,7 +44,7 @@ LARGEST_GAP = 0.2  # units: longer gaps say no more
 TINY = np.finfo(float).tiny
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FitPlan:
     """What fits of one part on one whole share: samples, frames and the whole as a tree.
 
@@ -72,7 +73,7 @@ class FitPlan:
     shares: Float[np.ndarray, " v"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Fit:
     """A part bent onto a whole.
 
@@ -91,7 +92,7 @@ class Fit:
         return Fit(self.points[chosen], self.places[chosen], self.gaps[chosen], self.misfit)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Pose:
     """Where the frames are: a matrix (a rotation times a size) and a place for each."""
 

@@ -2,7 +2,6 @@
 
 import heapq
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +9,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.linalg import splu
 
-from eigenshape._arrays import whole_number
+from eigenshape._arrays import record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
@@ -36,7 +35,7 @@ STEPS = 3
 FEWEST_NEIGHBORS, MOST_NEIGHBORS = 4, 8
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Joints:
     """The joints of a creature, the outermost first.
 
