@@ -16,7 +16,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import adjacency_matrix, edge_table
 from eigenshape.shapes.creature_plans import CREATURES, PLANS
 from eigenshape.shapes.isosurface import find_spacing, isosurface, relax
-from eigenshape.shapes.limbs import Body, distance_to_body, nearest_limbs, place_limbs
+from eigenshape.shapes.limbs import distance_to_body, nearest_limbs, place_limbs
 
 # The first mesh has this multiple of the requested number of vertices. The surplus lets `collapse_shortest_edges`
 # remove the shortest edges; a larger surplus takes longer.
@@ -125,11 +125,7 @@ def _rest_pose(kind: str, n_vertices: int, individual: int) -> tuple[TriangleMes
     spacing = min(wanted, body.thinnest)
     mesh = collapse_shortest_edges(isosurface(field, *body.box, spacing), n_vertices)
     mesh = relax(field, mesh, spacing)
-    return mesh, _joints(mesh, body)
-
-
-def _joints(mesh: TriangleMesh, body: Body) -> Joints:
-    """Return the joints, the outermost first, and how much each vertex turns with each of them."""
+    # The joints, the outermost first, and how much each vertex turns with each of them
     owner, place = nearest_limbs(mesh.vertices, body)
     rows, beyond, widths = [], [], []
     for number in range(len(body.limbs) - 1, -1, -1):
@@ -144,7 +140,8 @@ def _joints(mesh: TriangleMesh, body: Body) -> Joints:
             widths.append(SOFTNESS * limb.nodes[node, 3] * limb.squash.mean())
     table = np.array(rows)
     follows = diffuse(mesh, np.column_stack(beyond).astype(np.float64), np.array(widths))
-    return Joints(table[:, :3], table[:, 3:6], np.radians(table[:, 6:]), follows)
+    joints = Joints(table[:, :3], table[:, 3:6], np.radians(table[:, 6:]), follows)
+    return mesh, joints
 
 
 def diffuse(
