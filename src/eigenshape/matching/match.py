@@ -1,12 +1,12 @@
 """Dense correspondences of a part or a whole with a whole, without training."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
+from eigenshape._arrays import record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
@@ -165,7 +165,7 @@ def match_shapes(
     return found
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Piece:
     """The map of a connected part; see `ShapeMatch`."""
 

@@ -1,10 +1,9 @@
 """A map of points made smooth and precise by the lowest eigenfunctions of both shapes."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.matching.match_loops import nearest_face_points
@@ -20,7 +19,7 @@ EXTRA = 1.25, 15
 ROWS_AT_ONCE = 1000  # vertices whose distances to all others are in memory at a time
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Modes:
     """Eigenvalues, in 1 / unit², and eigenfunctions of a surface, orthonormal by its areas."""
 
