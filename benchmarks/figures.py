@@ -78,6 +78,7 @@ FIGURES = {
         SOLVER,
     ),
     "libraries": Figure("bench_spectrum.py --cases sphere-10k,graph-sphere --repeats 1", SOLVER),
+    "cortex": Figure("bench_cortex.py --repeats 1", ("modes", "compat", *SOLVER)),
     "calls": Figure("bench_calls.py", ("operators", "matching", "spectral")),
     "start": Figure("bench_start.py", ("__init__.py", "cli")),
     "threads": Figure("bench_threads.py", ("_threads.py", "sparse", "spectral/solver")),

@@ -24,7 +24,7 @@ def warm_hand(path: Path, n_vertices: int = 4000) -> np.ndarray:
     heat = es.spectral.apply_heat(laplacian, tip, TIMES * area)
     even = laplacian.mass.diagonal() @ tip / area  # what is left everywhere in the end
 
-    camera = es.plot.three_quarter_view(hand)
+    camera = es.plot.aim_camera(hand)
     across = hand.vertices @ camera.rotation[0]
     step = 1.1 * np.ptp(across) * camera.rotation[0]
     copies = [

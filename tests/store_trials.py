@@ -23,7 +23,7 @@ from describers import descriptor, keep
 
 import eigenshape as es
 from eigenshape.retrieval import DescribedShape
-from eigenshape.retrieval.description import describe_to_store
+from eigenshape.retrieval.kinds import describe_to_store
 
 PATCHES = es.retrieval.PatchRecipe()
 N_LINES = 2500  # of the store that the four kinds of steps run through, about

@@ -194,7 +194,7 @@ def main() -> None:
     if arguments.figures:
         first = next(iter(shapes.values()))
         bunny = shapes.get("bunny", first)
-        camera = es.plot.three_quarter_view(bunny)
+        camera = es.plot.aim_camera(bunny)
         pictures = {"curves": draw_curves(found), "precisions": draw_precisions(bunny, camera)}
     finish(rounded(results), pictures, arguments)
 

@@ -170,7 +170,7 @@ def figure_tracks(found: dict[str, np.ndarray]) -> Figure:
         show_shape(
             axes,
             mesh,
-            es.plot.three_quarter_view(mesh, up="z"),
+            es.plot.aim_camera(mesh, up="z"),
             color="#d9c9a3",
             edges=0.15,
             reach=0.62,

@@ -94,7 +94,7 @@ def errors(found: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[str, list[
 def figure_meshes(meshes: dict[str, es.TriangleMesh]) -> Figure:
     """Draw the meshes with their edges, from one side, in the colors of their curves."""
     figure = Figure(figsize=(11, 3.1), layout="constrained", dpi=75)
-    camera = es.plot.three_quarter_view(meshes[ORIGINAL], up="x")
+    camera = es.plot.aim_camera(meshes[ORIGINAL], up="x")
     for axes, (name, mesh), color in zip(
         figure.subplots(1, len(meshes)), meshes.items(), COLORS, strict=False
     ):

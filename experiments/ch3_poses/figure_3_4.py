@@ -76,7 +76,7 @@ def figure_spectra(
     above, below = figure.subfigures(2, 1, height_ratios=[1, 1.9])
     for axes, name, color in zip(above.subplots(1, len(DRAWN)), DRAWN, COLORS, strict=False):
         mesh = read(name)
-        show_shape(axes, mesh, es.plot.three_quarter_view(mesh, up="z"), color=color)
+        show_shape(axes, mesh, es.plot.aim_camera(mesh, up="z"), color=color)
         axes.set_title(name, fontsize=9)
     for axes, (operator, found) in zip(
         below.subplots(1, 3, sharey=True), rows.items(), strict=True

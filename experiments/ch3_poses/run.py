@@ -107,7 +107,7 @@ def figure_classical(rows: dict[str, np.ndarray]) -> Figure:
     above, below = figure.subfigures(2, 1, height_ratios=[1, 1.9])
     for axes, path, color in zip(above.subplots(1, len(paths)), paths, COLORS, strict=False):
         mesh = es.read_mesh(path)
-        show_shape(axes, mesh, es.plot.three_quarter_view(mesh, up="z"), color=color)
+        show_shape(axes, mesh, es.plot.aim_camera(mesh, up="z"), color=color)
         axes.set_title(path.stem.removeprefix("tosca_"), fontsize=9)
     left, right = below.subplots(1, 2)
     index = np.arange(1, 101)
@@ -177,7 +177,7 @@ def figure_separation(found: dict[tuple[str, str], np.ndarray]) -> Figure:
 def figure_leak(paths: list[Path], shares: dict[str, float]) -> Figure:
     """Draw where the Euclidean kernel of the worst pose leaks."""
     worst = es.read_mesh(max(paths, key=lambda path: shares[path.stem]))
-    camera = es.plot.three_quarter_view(worst, up="z")
+    camera = es.plot.aim_camera(worst, up="z")
     figure = es.figure_field(
         worst, leaks(worst), "share of the kernel out of reach along the surface", camera=camera
     )

@@ -92,7 +92,7 @@ def main() -> None:
     }
     poses = {"M": mesh, **shaken(mesh, noise[-4:-1])}
     pictures = {
-        "variants": es.plot.figure_poses(poses, camera=es.plot.three_quarter_view(mesh, size=300)),
+        "variants": es.plot.figure_poses(poses, camera=es.plot.aim_camera(mesh, size=300)),
         "changes": figure_changes(
             runs,
             noise,

@@ -22,7 +22,7 @@ SIDE = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # from +
 
 def view(scene: Scene) -> es.plot.Camera:
     """Return where a scene is looked at from."""
-    usual = es.plot.three_quarter_view(scene.mesh, up=scene.up)
+    usual = es.plot.aim_camera(scene.mesh, up=scene.up)
     return es.plot.Camera(SIDE, usual.size) if scene.name in FROM_THE_SIDE else usual
 
 

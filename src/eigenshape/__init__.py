@@ -9,11 +9,13 @@ scans        partial scans and a depth camera
 operators    discrete Laplace operators
 spectral     certified spectra, signatures, functional maps, filters, compression
 calculus     gradients, equations, flows, heat distances, conformal maps
+modes        maps by eigenmodes: fits, nulls, waves, morphometry, parcels
 features     merge trees, feature points, parts
 deformation  regions, motions, editing sessions, transfer of poses
 stability    how far two shapes and their spectra differ
 retrieval    descriptors, an index of shapes, search
 matching     dense correspondences of parts and wholes
+collections  specimens of one kind: their maps, mean shape and landmarks
 morphometrics landmarks and their files, statistics of shapes
 io           files, trimesh and PyVista
 plot         pictures

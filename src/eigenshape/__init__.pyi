@@ -1,10 +1,12 @@
 from . import calculus as calculus
+from . import collections as collections
 from . import compat as compat
 from . import deformation as deformation
 from . import features as features
 from . import geometry as geometry
 from . import io as io
 from . import matching as matching
+from . import modes as modes
 from . import morphometrics as morphometrics
 from . import operators as operators
 from . import plot as plot
@@ -51,8 +53,8 @@ from .plot.fields import figure_field as figure_field
 from .plot.fields import figure_segments as figure_segments
 from .plot.figure import save_figure as save_figure
 from .plot.view import view as view
-from .retrieval.description import describe as describe
 from .retrieval.index import ShapeIndex as ShapeIndex
+from .retrieval.kinds import describe as describe
 from .retrieval.labels.transfer import transfer_labels as transfer_labels
 from .scans.partial import partial_scan as partial_scan
 from .shapes.creatures import make_creature as make_creature

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from types import UnionType
-from typing import get_args
+from typing import Any, get_args
 
 from eigenshape._errors import InvalidParameterError
 
@@ -12,11 +12,12 @@ from eigenshape._errors import InvalidParameterError
 MAKERS = {
     "Binding": "es.deformation.bind(rig, [region])",
     "Brackets": "es.bracket_eigenvalues(mesh, k)",
-    "Camera": "es.plot.three_quarter_view(mesh)",
+    "Camera": "es.plot.aim_camera(mesh)",
     "DepthCamera": "es.scans.DepthCamera()",
     "DescribedShape": "es.retrieval.DescribedShape(name, [es.describe(mesh)])",
     "DetailedSkeleton": "es.deformation.detailed_skeleton(binding)",
     "Edit": "es.deformation.Edit((es.deformation.Move(region, handle),))",
+    "Collection": "es.collections.open_collection(folder)",
     "EigenRig": "es.rig_shape(mesh)",
     "FeaturePoints": "es.segment(tree).features",
     "Figure": "es.plot.figure_spectrum(spectrum)",
@@ -91,6 +92,14 @@ def require_type(value: object, kind: type | UnionType, name: str) -> None:
             f"{name} must be {describe_kind(kind)}; the value is {describe_value(value)}. "
             f"{suggest_argument(value, kind)}"
         )
+
+
+def require_choice(value: object, choice: Any, name: str) -> None:
+    """Raise an error if an option is none of the names that a Literal lists."""
+    *names, last = get_args(choice)
+    if value not in (*names, last):
+        listed = "', '".join(names)
+        raise InvalidParameterError(f"{name} must be '{listed}' or '{last}'; it is {value!r}.")
 
 
 def require_each(values: object, kind: type | UnionType, name: str) -> None:

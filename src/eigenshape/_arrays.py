@@ -3,7 +3,8 @@
 import operator
 from collections.abc import Iterator
 from copy import deepcopy
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from eigenshape._arguments import describe_value
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._memory import require_memory
-from eigenshape._text import html_repr
+from eigenshape._text import Shown
 from eigenshape._typing import ArrayLike, Integer
 
 # Names of rows in messages, and what rows of indices refer to.
@@ -28,6 +29,7 @@ MOST_STEPS = 1_000_000
 MOST_COORDINATES = 3  # of a row that messages show as a vector: those of a point in space
 
 ArrayT = TypeVar("ArrayT", bound=NDArray[Any])
+T = TypeVar("T")
 
 
 def freeze(array: ArrayT) -> ArrayT:
@@ -37,14 +39,13 @@ def freeze(array: ArrayT) -> ArrayT:
     return copy  # type: ignore[return-value]
 
 
-class ReadOnly:
+class ReadOnly(Shown):
     """Base class of values that hold arrays: nobody can change them, nor those of any copy.
 
     An array that its caller can write to is copied. NumPy makes the arrays of a pickle, and of
-    `copy.deepcopy`, writable; here they become read-only again. Notebooks show a value as a table.
+    `copy.deepcopy`, writable; here they become read-only again. Its text gives long arrays by their
+    type and shape, and notebooks show a value as a table.
     """
-
-    _repr_html_ = html_repr
 
     def __post_init__(self) -> None:
         for name, entry in vars(self).items():
@@ -57,6 +58,15 @@ class ReadOnly:
         for entry in state.values():
             for array in _arrays_of(entry):
                 array.flags.writeable = False
+
+
+@dataclass_transform(frozen_default=True, eq_default=False)
+def record(kind: type[T]) -> type[T]:
+    """Make a class a frozen dataclass whose values are equal to themselves alone.
+
+    Whether arrays are equal has no one answer, so values that hold arrays are not compared.
+    """
+    return dataclass(frozen=True, eq=False, repr=not issubclass(kind, ReadOnly))(kind)
 
 
 def _arrays_of(entry: Any) -> Iterator[NDArray[Any]]:
@@ -186,11 +196,25 @@ def positive_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
     return values
 
 
+def finite_number(value: ArrayLike, name: str) -> float:
+    """Return `value` as a finite float, given as a number or a list of one."""
+    return _one(finite_values(value, name), name)
+
+
+def positive_number(value: ArrayLike, name: str) -> float:
+    """Return `value` as a positive and finite float, given as a number or a list of one."""
+    return _one(positive_values(value, name), name)
+
+
+def _one(values: NDArray[np.float64], name: str) -> float:
+    if len(values) != 1:
+        raise InvalidParameterError(f"{name} must be one number; there are {len(values)}.")
+    return float(values[0])
+
+
 def finite_values(value: ArrayLike, name: str) -> NDArray[np.float64]:
     """Return `value` as a one-dimensional float64 array of finite numbers."""
-    values = _list_of_numbers(value, name)
-    _require_finite(values, name)
-    return values
+    return _all_finite(_list_of_numbers(value, name), name)
 
 
 def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.float64]:
@@ -201,9 +225,7 @@ def vertex_values(value: ArrayLike, name: str, n_vertices: int) -> NDArray[np.fl
             f"{name} must hold one number per vertex, shape ({n_vertices},); "
             f"the shape is {values.shape}."
         )
-    values = values.astype(np.float64)
-    _require_finite(values, name)
-    return values
+    return _all_finite(values, name)
 
 
 def point_functions(value: ArrayLike, name: str, n_points: int) -> NDArray[np.float64]:
@@ -215,9 +237,7 @@ def point_functions(value: ArrayLike, name: str, n_points: int) -> NDArray[np.fl
             f"{name} must hold one number per point, shape ({n_points},) or ({n_points}, k) for k "
             f"functions; the shape is {values.shape}.{hint}"
         )
-    values = values.astype(np.float64)
-    _require_finite(values, name)
-    return values
+    return _all_finite(values, name)
 
 
 def simplex_vectors(
@@ -230,9 +250,7 @@ def simplex_vectors(
             f"{name} must hold one vector per simplex, shape ({n_simplices}, {ambient}) or "
             f"({n_simplices}, {ambient}, k) for k fields; the shape is {vectors.shape}."
         )
-    vectors = vectors.astype(np.float64)
-    _require_finite(vectors, name)
-    return vectors
+    return _all_finite(vectors, name)
 
 
 def face_labels(value: ArrayLike, name: str, n_faces: int) -> NDArray[Any]:
@@ -246,12 +264,14 @@ def face_labels(value: ArrayLike, name: str, n_faces: int) -> NDArray[Any]:
     return labels
 
 
-def _require_finite(values: NDArray[np.float64], name: str) -> None:
-    bad = np.argwhere(~np.isfinite(values))
+def _all_finite(values: NDArray[Any], name: str) -> NDArray[np.float64]:
+    numbers = values.astype(np.float64)
+    bad = np.argwhere(~np.isfinite(numbers))
     if len(bad):
         place = tuple(bad[0].tolist())
         entry = place[0] if len(place) == 1 else place
-        raise InvalidParameterError(f"{name} must be finite; entry {entry} is {values[place]}.")
+        raise InvalidParameterError(f"{name} must be finite; entry {entry} is {numbers[place]}.")
+    return numbers
 
 
 def require_finite_rows(rows: NDArray[np.float64], name: str, noun: str) -> None:

@@ -35,8 +35,8 @@ def literal(text: str) -> str:
 def short_repr(value: Any) -> str:
     """Return a dataclass in one line, where long arrays are given by their type and shape.
 
-    A spectrum of 50,000 vertices would fill a screen with numbers otherwise. Values with large
-    arrays take it as their `__repr__`.
+    A spectrum of 50,000 vertices would fill a screen with numbers otherwise. Values take it as their
+    `__repr__`, from the base class `Shown`.
 
     Examples
     --------
@@ -116,3 +116,26 @@ def _shorten(entry: Any) -> str:
         return f"<{entry.dtype} {entry.shape}>"
     count = f"{len(entry)} entries" if isinstance(entry, list | tuple | dict) else "..."
     return f"{type(entry).__name__}({count})"
+
+
+class Shown:
+    """Base class of values: they print in one line, and notebooks show a table.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> import numpy as np
+    >>> @dataclass
+    ... class Walk(Shown):
+    ...     steps: np.ndarray
+    >>> Walk(np.zeros((900, 3)))
+    Walk(steps=<float64 (900, 3)>)
+    """
+
+    _repr_html_ = html_repr
+
+    def __init_subclass__(cls, **settings: Any) -> None:
+        super().__init_subclass__(**settings)
+        # `dataclass` would write a text with all numbers of arrays.
+        if "__repr__" not in vars(cls):
+            cls.__repr__ = short_repr  # type: ignore[method-assign]

@@ -9,6 +9,7 @@ import pytest
 from conftest import stretched_ball
 
 import eigenshape as es
+from eigenshape_studio.server import _first_workspace
 from eigenshape_studio.wire import decode, encode
 from eigenshape_studio.workspace import Workspace
 
@@ -233,6 +234,16 @@ def test_an_opened_file_becomes_the_shape(page):
     state = facts["state"]
     assert (state["name"], state["n_vertices"], state["shape"]) == ("ball.ply", 162, 1)
     np.testing.assert_array_equal(page.array("vertices"), ball.vertices.astype("<f4"))
+
+
+def test_a_surface_of_freesurfer_is_opened_by_its_name(page, tmp_path):
+    es.write_mesh(es.icosphere(2), tmp_path / "lh.pial")
+    data = np.frombuffer((tmp_path / "lh.pial").read_bytes(), np.uint8)
+    facts, _ = page.call("finish", {"kind": "open", "name": "lh.pial"}, {"file": data})
+    assert facts["state"]["n_faces"] == 320
+    data = np.frombuffer(b"\xff\xff\xff", np.uint8)
+    error = page.error("finish", {"kind": "open", "name": "lh.sulc"}, {"file": data})
+    assert "ff ff fe" in error["message"]
 
 
 def test_opened_points_become_a_surface_and_the_page_is_told(page):
@@ -491,4 +502,18 @@ def test_a_file_that_is_saved_keeps_what_the_opened_one_held(tmp_path):
         path = tmp_path / f"b.{kind}"
         path.write_bytes(workspace._file(kind).tobytes())
         assert es.read_mesh(path, attributes=True)[1].colors is not None
+    workspace.close()
+
+
+@pytest.mark.parametrize("suffix", [".gii", ".vtu"])
+def test_functions_of_the_file_are_there_to_choose_from(tmp_path, suffix):
+    ball = es.icosphere(2)
+    fields = {
+        "height (mm)": ball.vertices[:, 2],
+        "hole": np.full(162, np.nan),
+        "move": ball.vertices,
+    }
+    es.io.write_fields(ball, tmp_path / f"a{suffix}", fields)
+    workspace = _first_workspace(tmp_path / f"a{suffix}", None)
+    assert [facts["name"] for facts in workspace.state()["values"]] == ["height (mm)"]
     workspace.close()

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from eigenshape._arguments import require_choice
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape.calculus import hodge, one_forms
 from eigenshape.calculus.derivatives import gradient
@@ -12,7 +13,6 @@ from eigenshape.geometry.measure import face_areas, face_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import edge_table, submesh
-from eigenshape.operators.choices import require_choice
 from eigenshape.shapes.domains import box, disc, interval
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from eigenshape._arguments import require_choice
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.calculus.log_map import LogMethod, logarithmic_map
 from eigenshape.calculus.vector_heat import (
@@ -11,7 +12,6 @@ from eigenshape.calculus.vector_heat import (
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union
-from eigenshape.operators.choices import require_choice
 from eigenshape.operators.connection import tangent_frames
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 

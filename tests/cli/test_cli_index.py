@@ -352,8 +352,10 @@ def test_a_match_is_drawn_from_the_side_of_the_query(tmp_path):
     query = sheets.color_query(mesh, index.default_recipe())
     (match,) = index.query(query.descriptor)
     figures = [
-        sheets.contact_sheet(query, "scan", [match], view="left"),
-        sheets.explanation(query, "scan", match),
+        sheets.contact_sheet(
+            query, "scan", [match], repairs=(), caption="", side={"view": "left", "up": "auto"}
+        ),
+        sheets.explanation(query, "scan", match, repairs=(), side={"view": "auto", "up": "auto"}),
     ]
     for figure in figures:
         pictures = [axes.images[0].get_array() for axes in figure.axes if axes.images]

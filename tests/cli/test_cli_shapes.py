@@ -199,7 +199,7 @@ def test_an_operator_is_explained():
         ),
         (
             ("spectrum", "disc.off", "--set", "masses=lumped"),
-            "the cotangent operator has the options mass, and it is 'masses=lumped'",
+            "the cotangent operator has the options mass, conductivity, and it is 'masses=lumped'",
         ),
         (
             ("spectrum", "disc.off", "--set", "mass"),

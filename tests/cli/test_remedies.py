@@ -23,7 +23,7 @@ from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.io.shape_files import write_points
-from eigenshape.io.surfaces import read_surface
+from eigenshape.io.surface_files import read_surface
 from eigenshape.operators.catalog import OPERATORS
 from eigenshape.shapes.surfaces import icosphere
 

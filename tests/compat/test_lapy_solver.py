@@ -64,6 +64,19 @@ def test_a_program_may_change_what_it_gets():
     np.testing.assert_allclose(4 * values, Solver(bumpy(), lump=True).eigs(3)[0], atol=1e-12)
 
 
+def test_its_text_makes_no_matrix():
+    class Lazy(Solver):
+        def __init__(self):
+            pass
+
+        @property
+        def stiffness(self):
+            raise AssertionError
+
+    assert repr(Solver(bumpy())) == "Solver(162 points)"
+    assert repr(Lazy()) == "Lazy()"
+
+
 def test_mass_alone():
     for lump in (False, True):
         difference = Solver.fem_tria_mass(bumpy(), lump) - lapy.Solver.fem_tria_mass(bumpy(), lump)

@@ -5,7 +5,7 @@ from bent_shapes import lump, lump_rig
 from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.deform import deform
 from eigenshape.deformation.handles import Rotation
-from eigenshape.deformation.transfer import transfer_deformation
+from eigenshape.deformation.pose_transfer import transfer_deformation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.creatures import make_creature

@@ -93,5 +93,5 @@ def test_the_diameter_of_many_points_needs_little_memory(mesh):
 
 
 def test_an_unknown_measure_is_named():
-    with pytest.raises(InvalidParameterError, match="measure must be one of box, area, diameter"):
+    with pytest.raises(InvalidParameterError, match="measure must be 'box', 'area' or 'diameter'"):
         unwrap(normalize_mesh)(MOVED, "volume")

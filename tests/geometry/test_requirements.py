@@ -31,9 +31,9 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.operators.smoothing import noise_level
-from eigenshape.retrieval.description import describe, describe_to_store
 from eigenshape.retrieval.heat.features import find_heat_features
 from eigenshape.retrieval.heat.recipe import SCALE_FREE
+from eigenshape.retrieval.kinds import describe, describe_to_store
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 from eigenshape.retrieval.labels.transfer import transfer_labels
 from eigenshape.retrieval.patches.descriptor import PatchRecipe

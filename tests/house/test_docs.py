@@ -44,3 +44,12 @@ def test_every_public_name_is_mentioned_beside_the_api_pages():
     files = [*PAGES, *(ROOT / "examples").rglob("*.py"), *(ROOT / "experiments").rglob("*.py")]
     words = {word for path in files for word in re.findall(r"\w+", path.read_text())}
     assert not sorted(public_things().keys() - words)
+
+
+def test_the_page_of_modes_runs():
+    """Its blocks follow one another, and need no file."""
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "modes.md").read_text(), re.DOTALL)
+    names: dict[str, object] = {}
+    exec("\n".join(blocks), names)
+    assert 0 < names["p_value"] < 0.5
+    assert len(names["modes"])

@@ -98,6 +98,15 @@ def test_readme_begins_with_exactly_two_commands():
     assert len([line for line in commands if line.strip()]) == 2
 
 
+@pytest.mark.long
+def test_two_groups_differ_in_the_left_arm():
+    found = runpy.run_path(str(ROOT / "examples" / "where_groups_differ.py"))["main"]()
+    region, places = found["region"], found["vertices"]
+    assert places[region > 0.5 * region.max(), 0].min() > 0.2  # no other limb is there
+    scores = found["scores"] * np.sign(found["scores"][-1])
+    assert scores[:3].max() < 0 < scores[3:].min()
+
+
 def test_every_example_has_a_test():
     tested = Path(__file__).read_text()
     examples = sorted((ROOT / "examples").glob("*.py"))

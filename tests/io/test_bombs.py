@@ -15,7 +15,7 @@ from tetrahedra import TETRAHEDRON
 
 from eigenshape import FileFormatError, read_shape
 from eigenshape.io.formats import off
-from eigenshape.io.formats.cursor import LZMA, ZLIB, unpack_block
+from eigenshape.io.formats.numbers import LZMA, ZLIB, unpack_block
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 
 GIGABYTES = 2**32 - 2**24

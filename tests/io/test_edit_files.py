@@ -8,7 +8,7 @@ from eigenshape.deformation.region import BoxRegion
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.deformation.session import replay
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.edits import read_edits, write_edits
+from eigenshape.io.edit_files import read_edits, write_edits
 from eigenshape.shapes.surfaces import icosphere
 
 BALL = icosphere(2)

@@ -113,7 +113,7 @@ def test_colors(tmp_path):
 def test_unknown_suffix_is_refused_with_the_list_of_known_ones(tmp_path, name):
     with pytest.raises(
         FileFormatError,
-        match=r"must be of a known format, \.off, .*, \.glb, \.gltf, \.vtu, .*\.msh; it (is|has)",
+        match=r"must be of a known format, \.off, .*, \.glb, \.gltf, \.vtu, .*\.swc; it (is|has)",
     ):
         read_mesh(tmp_path / name)
     with pytest.raises(

@@ -98,11 +98,19 @@ def test_the_docs_list_the_formats_with_what_they_can():
     assert list(rows) == [known.suffix for known in FORMATS]
     for known in FORMATS:
         _, _, read, written, besides = rows[known.suffix]
-        assert read == ("`read_points`" if "points" in known.traits else "`read_mesh`")
+        readers = {
+            "`read_mesh`": {"cells"},
+            "`read_points`": {"points"},
+            "`read_fields`": {"maps"},
+            "`read_parcellation`": {"parcels"},
+        }
+        names = [name for name, traits in readers.items() if traits & set(known.traits)]
+        assert read == (", ".join(names) if known.suffix != ".swc" else "`read_shape`")
         writers = {
             "`write_mesh`": {"text", "binary"},
             "`write_points`": {"cloud"},
-            "`write_fields`": {"fields"},
+            "`write_fields`": {"fields", "maps"},
+            "`write_parcellation`": {"parcels"},
         }
         names = [name for name, traits in writers.items() if traits & set(known.traits)]
         assert written == ", ".join(names), known.suffix
@@ -117,7 +125,14 @@ def cells_of(line):
 def test_every_module_of_a_format_has_what_its_traits_promise():
     for known in FORMATS:
         module = known.load()
-        assert callable(module.parse)
+        if {"cells", "points"} & set(known.traits):
+            assert callable(module.parse)
+        if "maps" in known.traits:
+            assert callable(module.parse_fields)
+            assert callable(module.format_maps)
+        if "parcels" in known.traits:
+            assert callable(module.parse_parcels)
+            assert callable(module.format_parcels)
         more = known.load("_attributes") if "attributes" in known.traits else module
         if "attributes" in known.traits:
             assert callable(more.read_attributes)

@@ -66,6 +66,11 @@ def matched() -> es.matching.ShapeMatch:
     return es.match_shapes(body(), target())
 
 
+@cache
+def collection() -> es.collections.Collection:
+    return es.collections.build_collection({"one": body(), "two": body()}, FOLDER / "bones")
+
+
 HEAD = es.deformation.BoxRegion([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
 TURN = es.Rotation([0, 0.5, 0], [1, 0, 0], 0.2)
 
@@ -105,6 +110,11 @@ def shelf() -> es.ShapeIndex:
 @cache
 def labels() -> np.ndarray:
     return described().parts.labels
+
+
+@cache
+def parcels() -> es.features.Parcellation:
+    return es.features.Parcellation((height() > 0).astype(int), ("low", "high"))
 
 
 @cache
@@ -165,7 +175,18 @@ def written_attributes() -> es.io.MeshAttributes:
     return attributes
 
 
+def skulls() -> np.ndarray:
+    """Landmarks of four specimens."""
+    return np.random.default_rng(0).standard_normal((4, 6, 3))
+
+
+def written_parcels() -> Path:
+    es.io.write_parcellation(body(), FOLDER / "parcels.annot", parcels())
+    return FOLDER / "parcels.annot"
+
+
 VALUES: dict[Any, Callable[[], Any]] = {
+    es.features.Parcellation: parcels,
     es.TriangleMesh: body,
     es.PointCloud: lambda: es.PointCloud(body().vertices),
     es.Laplacian: lambda: es.cotangent_laplacian(body()),
@@ -195,6 +216,11 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.matching.MatchTarget: target,
     es.matching.ShapeMatch: matched,
     es.matching.Registration: lambda: es.matching.register_scans(body(), body()),
+    es.collections.Collection: collection,
+    es.collections.CarriedLandmarks: lambda: es.collections.carry_landmarks(
+        collection(), {"one": es.morphometrics.Landmarks(["tip"], body().vertices[:1])}
+    ),
+    es.collections.Similarity: lambda: es.collections.Similarity(2.0, np.eye(3), np.ones(3)),
     es.matching.FusedScan: lambda: es.matching.fuse_scans([body()]),
     "fuse_scans.scans": lambda: [body()],
     es.stability.Perturbation: lambda: es.stability.measure_perturbation(body(), bent()),
@@ -204,7 +230,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.geometry.Quadrature: lambda: es.geometry.shape_quadrature(body()),
     es.spectral.Brackets: lambda: es.bracket_eigenvalues(body(), 10),
     es.stability.Rate: lambda: es.stability.Rate(1.0, -1.0),
-    es.plot.Camera: lambda: es.plot.three_quarter_view(body()),
+    es.plot.Camera: lambda: es.plot.aim_camera(body()),
     es.scans.DepthCamera: es.scans.DepthCamera,
     es.plot.Panel: lambda: es.plot.Panel(body(), "body", labels(), np.arange(3)),
     es.retrieval.LabeledShape: lambda: es.retrieval.LabeledShape(body(), labels()),
@@ -230,7 +256,19 @@ VALUES: dict[Any, Callable[[], Any]] = {
 }
 # A right value of each argument whose type is not ours, by its name; "function.name" where a name has several meanings.
 NAMED: dict[str, Callable[[], Any]] = {
+    "specimens": skulls,
+    "shapes": skulls,
+    "compare_groups.groups": lambda: [0, 0, 1, 1],
+    "fit_allometry.sizes": lambda: [1.0, 2.0, 3.0, 5.0],
+    "symmetric_components.pairs": lambda: [[0, 1]],
+    "warp_mesh.starts": lambda: body().vertices[:9],
+    "warp_mesh.ends": lambda: bent().vertices[:9],
     "alpha": lambda: 1.0,
+    "build_collection.specimens": lambda: {"one": body(), "two": body()},
+    "build_collection.folder": lambda: FOLDER / "bones",
+    "carry_landmarks.labelled": lambda: {
+        "one": es.morphometrics.Landmarks(["tip"], body().vertices[:1])
+    },
     "carry_attributes.attributes": written_attributes,
     "decimate.n_faces": lambda: 100,
     "write_fields.fields": lambda: {"height": height()},
@@ -242,6 +280,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "boundary_load.mesh": with_boundary,
     "boundary_surface.mesh": lambda: es.shapes.box(2, 2, 2),
     "build": lambda: es.cotangent_laplacian,
+    "conductivity": lambda: np.ones(body().n_vertices),
     "cache": lambda: FOLDER / "cache",
     "caption": lambda: "",
     "certify.eigenvalues": lambda: spectrum().eigenvalues,
@@ -284,11 +323,19 @@ NAMED: dict[str, Callable[[], Any]] = {
     "map_from_points.points": lambda: np.arange(body().n_vertices),
     "mask": lambda: es.deformation.region_mask(body(), HEAD),
     "move_skeleton.response": lambda: es.deformation.skeleton_response(binding()),
+    "compare_modes.one": lambda: [height(), 2 * height()],
+    "compare_modes.two": lambda: [1 - height(), height()],
+    "drive": lambda: np.ones((5, 4)),
+    "dt": lambda: 0.1,
+    "geometric_connectome.n_modes": lambda: 10,
+    "rotation_nulls.n_nulls": lambda: 5,
+    "weights": lambda: np.ones(body().n_vertices),
     "n": lambda: 50,
     "n_across": lambda: 8,
     "n_around": lambda: 9,
     "n_features": lambda: 3,
     "n_modes": lambda: 10,
+    "n_parcels": lambda: 4,
     "name": lambda: "body",
     "names": lambda: ["weld"],
     "neighbor_graph.points": lambda: body().vertices,
@@ -304,7 +351,9 @@ NAMED: dict[str, Callable[[], Any]] = {
     "radius": lambda: 0.4,
     "read": lambda: es.read_mesh,
     "query_indexes.folders": lambda: [shelf().folder],
+    "mask_surface.mask": lambda: height() > 0,
     "read_edits.path": written_edits,
+    "read_parcellation.path": written_parcels,
     "recover_geometry.eigenvalues": lambda: es.shapes.sphere_eigenvalues(60),
     "region": lambda: HEAD,
     "response": lambda: np.ones_like,
@@ -336,6 +385,14 @@ NAMED: dict[str, Callable[[], Any]] = {
     "vertices": lambda: np.arange(3),
     "view": lambda: [0.0, 0.0, 1.0],
     "winding_numbers.points": lambda: bent().vertices,
+    "figure_cortex.surfaces": lambda: {"left": body()},
+    "figure_cortex.values": lambda: {"left": height()},
+    "n_vertices": lambda: 9,
+    "Parcellation.labels": lambda: [0, 1, -1],
+    "Parcellation.names": lambda: ["low", "high"],
+    "unmask.values": lambda: [1.0, 2.0, 3.0],
+    "unparcellate.values": lambda: [1.0, 2.0],
+    "write_parcellation.path": lambda: FOLDER / "written.annot",
     "write_edits.path": lambda: FOLDER / "edits.json",
     "write_landmarks.path": lambda: FOLDER / "written.csv",
     "write_points.path": lambda: FOLDER / "written.xyz",

@@ -53,6 +53,7 @@ class Shapes:
 # The power of length that an answer is in, and the call. Parts of an answer in several powers are
 # several rows.
 LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
+    "align_surfaces": (0, lambda s: es.collections.align_surfaces(s.mesh, s.other).rotation),
     "angle_distortion": (0, lambda s: calculus.angle_distortion(s.mesh, s.other.vertices)),
     "anisotropic_laplacian": (
         0,
@@ -108,6 +109,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "farthest_points": (0, lambda s: geometry.farthest_points(s.mesh, 9)[0]),
     "fem_laplacian": (3, lambda s: operators.fem_laplacian(s.solid, 2).mass),
     "fem_nodes": (1, lambda s: operators.fem_nodes(s.solid, 2)),
+    "fit_surface": (1, lambda s: es.collections.fit_surface(s.mesh, s.other).vertices),
     "flatten_conformally": (1, lambda s: calculus.flatten_conformally(s.sheet)),
     "functional_map": (
         0,
@@ -219,6 +221,14 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     ),
     "vertex_normals": (0, lambda s: geometry.vertex_normals(s.mesh)),
     "compare_spectra": (0, lambda s: spectral.compare_spectra(s.spectrum, s.spectrum).relative),
+    "warp_mesh": (
+        1,
+        lambda s: (
+            es.morphometrics.warp_mesh(
+                s.mesh, s.mesh.vertices[::20], s.other.vertices[::20]
+            ).vertices
+        ),
+    ),
     "winding_numbers": (0, lambda s: geometry.winding_numbers(s.mesh, s.other.vertices)),
     "anchor_nodes": (1, lambda s: stability.anchor_nodes(s.mesh, 0.5 * s.u).points),
     "approximate_heat_signature": (
@@ -238,6 +248,13 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "find_heat_features": (0, lambda s: es.retrieval.find_heat_features(s.mesh).parts.labels),
     "geodesic_balls": (1, lambda s: geometry.geodesic_balls(s.mesh, 0.4 * s.u)),
     "geodesic_waves": (1, lambda s: geometry.geodesic_waves(s.mesh)(0, s.u)[1]),
+    "mask_surface": (1, lambda s: geometry.mask_surface(s.mesh, s.f > s.f.mean()).mesh),
+    "parcellate": (
+        0,
+        lambda s: es.features.parcellate(
+            s.mesh, s.f, es.features.Parcellation((s.f > s.f.mean()).astype(int))
+        ),
+    ),
     "orient_outward": (1, lambda s: geometry.orient_outward(s.mesh)),
     "part_spectrum": (-2, lambda s: es.features.part_spectrum(s.mesh).eigenvalues[1:]),
     "random_planes": (
@@ -302,6 +319,7 @@ WITHOUT = {
     "euler_characteristic",
     "facet_table",
     "fem_boundary_nodes",
+    "figure_cortex",
     "figure_eigenfunctions",
     "figure_field",
     "figure_label_transfer",
@@ -316,18 +334,19 @@ WITHOUT = {
     "local_triangles",
     "measure_perturbation",
     "nodal_domains",
+    "nodal_parcels",
     "normalized_cut",
     "one_form_edges",
     "part_colors",
     "query_indexes",
     "read_edits",
+    "read_parcellation",
     "region_boundary",
     "region_mask",
     "self_intersections",
     "simulate_scan",
     "smooth_boundaries",
     "suggest_repairs",
-    "three_quarter_view",
     "to_pyvista",
     "to_trimesh",
     "transfer_labels",
@@ -335,10 +354,12 @@ WITHOUT = {
     "view",
     "write_edits",
     "write_mesh",
+    "write_parcellation",
     "write_points",
 }
 # Others that are the same code as a row above, or have laws of the unit of their own.
 ELSEWHERE = {
+    "build_collection",
     "compress_mesh",
     "fuse_scans",
     "prepare_target",

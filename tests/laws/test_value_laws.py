@@ -33,6 +33,9 @@ CLASSES = {
 }
 # Calls whose answers hold the values that `Shared` has none of.
 CALLED = [
+    "align_modes",
+    "compare_modes",
+    "nodal_parcels",
     "DepthCamera",
     "ShapeIndex",
     "approximate_heat_signature",
@@ -41,6 +44,7 @@ CALLED = [
     "build_laplacian",
     "check_laplacian",
     "cheeger_estimate",
+    "compare_groups",
     "shape_quadrature",
     "cut_by_planes",
     "decompose_field",
@@ -51,6 +55,8 @@ CALLED = [
     "facet_table",
     "find_heat_features",
     "find_items",
+    "fit_allometry",
+    "fit_procrustes",
     "geodesic_path",
     "heat_trace",
     "match_patches",
@@ -58,8 +64,10 @@ CALLED = [
     "measure_distortion",
     "nodal_domains",
     "part_tree",
+    "principal_components",
     "principal_curvatures",
     "repair",
+    "symmetric_components",
     "theorem_rate",
     "weyl_bound",
 ]
@@ -78,6 +86,7 @@ MADE: dict[str, Callable[[Shared], Any]] = {
     "IndexReport": lambda v: v.index.verify(),
     "Operator": lambda v: es.operators.OPERATORS["cotangent"],
     "Panel": lambda v: es.plot.Panel(v.ball, "a", np.zeros(v.ball.n_faces, int), np.arange(3)),
+    "Parcellation": lambda v: v.halves,
     "PartDecomposition": lambda v: es.find_parts(v.animal),
     "SpectralClusterer": lambda v: es.spectral.SpectralClusterer(3),
     "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3),

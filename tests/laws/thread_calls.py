@@ -45,6 +45,10 @@ class Shared:
         self.fish_scan = es.partial_scan(es.make_creature("fish", n_vertices=1200), [0, 0, 1]).mesh
         self.motion = es.matching.register_scans(self.fish_scan, self.fish_scan)
         self.fish_match = es.match_shapes(self.fish, self.fish_target)
+        self.bones = {"one": self.fish, "two": self.fish}
+        self.collection = es.collections.build_collection(self.bones, self.folder / "bones")
+        self.similarity = es.collections.Similarity(2.0, np.eye(3), np.ones(3))
+        self.tip = es.morphometrics.Landmarks(["tip"], self.fish.vertices[[9]])
         self.camera = es.plot.Camera(np.eye(3), 60)
         self.labels = (self.animal.vertices[self.animal.faces[:, 0], 1] > 0).astype(np.int64)
         self.laplacian, self.other = (
@@ -178,10 +182,16 @@ class Shared:
         es.write_mesh(self.animal, self.labeled_folder / "animal.off")
         (self.labeled_folder / "animal.seg").write_text("\n".join(map(str, self.labels)))
         (self.labeled_folder / "names.txt").write_text("torso\nleg\n")
+        # Configurations of enough points for BLAS to cut its sums
+        self.skulls = rng().standard_normal((5, 1, 3)) + np.repeat(
+            self.animal.vertices[None], 5, axis=0
+        ) * np.exp(0.1 * rng().standard_normal((5, self.animal.n_vertices, 3)))
         self.skull = es.morphometrics.Landmarks(["nose", "left", "right"], np.eye(3))
         es.morphometrics.write_landmarks(self.skull, self.folder / "skull.mrk.json")
         self.bytes = es.retrieval.write_codebook(self.codebook)
         es.io.write_fields(self.animal, self.folder / "fields.vtu", {"heat": self.heat})
+        self.halves = es.features.Parcellation((self.animal.vertices[:, 1] > 0).astype(int))
+        es.io.write_parcellation(self.animal, self.folder / "halves.annot", self.halves)
         self.attributes = es.read_mesh(self.folder / "ball.ply", attributes=True)[1]
 
 
@@ -316,6 +326,14 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "decimate": decimated,
     "find_duplicates": lambda v: es.retrieval.find_duplicates(es.ShapeIndex.open(v.index.folder)),
     "read_fields": lambda v: es.io.read_fields(v.folder / "fields.vtu"),
+    "mask_surface": lambda v: es.geometry.mask_surface(v.animal, v.animal.vertices[:, 1] > 0),
+    "parcellate": lambda v: es.features.parcellate(v.animal, v.heat, v.halves),
+    "read_parcellation": lambda v: es.io.read_parcellation(v.folder / "halves.annot", v.animal),
+    "unmask": lambda v: es.geometry.unmask(v.heat, np.arange(v.animal.n_vertices), 900),
+    "unparcellate": lambda v: es.features.unparcellate([1.0, 2.0], v.halves),
+    "write_parcellation": lambda v: written(
+        v.folder, ".annot", lambda path: es.io.write_parcellation(v.animal, path, v.halves)
+    ),
     "split_solids": lambda v: es.geometry.split_solids(
         v.solid.points, [[0, 1, 5, 4, 16, 17, 21, 20]]
     ),
@@ -471,6 +489,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
             es.plot.Panel(v.ball, "ball", np.zeros(v.ball.n_faces, int), np.array([0])), []
         )
     ),
+    "figure_cortex": lambda v: drawn(
+        es.plot.figure_cortex({"left": v.ball}, {"left": v.ball.vertices[:, 0]})
+    ),
     "figure_diagram": lambda v: drawn(es.plot.figure_diagram(v.diagram)),
     "figure_eigenfunctions": lambda v: drawn(
         es.plot.figure_eigenfunctions(v.animal, v.spectrum, [1], camera=v.camera)
@@ -554,6 +575,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "irregular_grid": lambda v: es.shapes.irregular_grid(4, 5, rng=rng()),
     "is_closed": lambda v: es.geometry.is_closed(v.animal),
     "is_manifold": lambda v: es.geometry.is_manifold(v.animal),
+    "LatentBasis.differences": lambda v: v.latent.differences("conformal"),
+    "LatentBasis.map_between": lambda v: v.latent.map_between(1, 0),
     "latent_basis": lambda v: es.spectral.latent_basis({(0, 1): v.map, (0, 2): v.map}),
     "level_set": lambda v: es.calculus.level_set(v.solid, v.solid.points[:, 0], 0.4),
     "local_triangles": lambda v: es.operators.local_triangles(v.cloud),
@@ -634,10 +657,37 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_edits": lambda v: es.io.read_edits(v.folder / "edits.json", v.animal),
     "read_mesh": lambda v: es.read_mesh(v.folder / "ball.ply"),
     "read_surface": lambda v: es.io.read_surface(v.folder / "ball.ply"),
+    "Allometry.shapes": lambda v: es.morphometrics.fit_allometry(
+        v.skulls, [1.0, 2, 3, 4, 5]
+    ).shapes([2.5]),
+    "PrincipalComponents.shape": lambda v: es.morphometrics.principal_components(v.skulls).shape(
+        [0.1]
+    ),
+    "ProcrustesFit.distances": lambda v: es.morphometrics.fit_procrustes(v.skulls).distances(),
+    "ProcrustesFit.outliers": lambda v: es.morphometrics.fit_procrustes(v.skulls).outliers(),
+    "compare_groups": lambda v: es.morphometrics.compare_groups(v.skulls, [0, 0, 0, 1, 1]),
+    "estimate_missing": lambda v: es.morphometrics.estimate_missing(
+        np.where(
+            np.eye(5)[:, :, None] * (np.arange(5) == 2)[:, None, None], np.nan, v.skulls[:, :5]
+        )
+    ),
+    "figure_landmarks": lambda v: drawn(es.plot.figure_landmarks(v.skulls[:, :9])),
+    "figure_ordination": lambda v: drawn(
+        es.plot.figure_ordination(v.skulls[:, 0], [0, 0, 0, 1, 1])
+    ),
+    "fit_allometry": lambda v: es.morphometrics.fit_allometry(v.skulls, [1.0, 2, 3, 4, 5]),
+    "fit_procrustes": lambda v: es.morphometrics.fit_procrustes(
+        v.skulls[:, :60], curves=[range(20)]
+    ),
+    "principal_components": lambda v: es.morphometrics.principal_components(v.skulls),
+    "symmetric_components": lambda v: es.morphometrics.symmetric_components(v.skulls, [[0, 1]]),
+    "warp_mesh": lambda v: es.morphometrics.warp_mesh(
+        v.animal, v.animal.vertices[:20], v.pose.vertices[:20]
+    ),
     "read_landmarks": lambda v: es.morphometrics.read_landmarks(v.folder / "skull.mrk.json"),
     "read_specimens": lambda v: es.morphometrics.read_specimens(v.folder / "skull.mrk.json"),
     "write_landmarks": lambda v: written(
-        v.folder, ".csv", lambda path: es.morphometrics.write_landmarks(v.skull, path)
+        v.folder, ".csv", lambda path: es.morphometrics.write_landmarks({"a": v.skull}, path)
     ),
     "read_points": lambda v: es.io.read_points(v.folder / "cloud.ply"),
     "read_shape": lambda v: es.read_shape(v.folder / "square.mesh"),
@@ -722,7 +772,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "tangent_frames": lambda v: es.operators.tangent_frames(v.animal),
     "taubin_smooth": lambda v: es.calculus.taubin_smooth(v.many),
     "theorem_rate": lambda v: es.stability.theorem_rate("lipschitz", 2),
-    "three_quarter_view": lambda v: es.plot.three_quarter_view(v.many),
     "three_sphere": lambda v: es.shapes.three_sphere(60),
     "to_pyvista": lambda v: np.asarray(es.io.to_pyvista(v.ball).points),
     "to_trimesh": lambda v: np.asarray(es.io.to_trimesh(v.ball).vertices),
@@ -730,6 +779,20 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "adjacent_parts": lambda v: es.features.adjacent_parts(v.animal, v.labels),
     "trace_geodesic": lambda v: es.calculus.trace_geodesic(v.ball, 0, [6.0, 0.5]),
     "train_codebook": lambda v: es.retrieval.train_codebook(v.animal_patches),
+    "Similarity.move": lambda v: v.similarity.move(v.fish.vertices),
+    "Similarity.inverse": lambda v: v.similarity.inverse().translation,
+    "align_surfaces": lambda v: es.collections.align_surfaces(v.fish, v.fish),
+    "fit_surface": lambda v: es.collections.fit_surface(v.fish, v.fish),
+    "build_collection": lambda v: (
+        es.collections.build_collection(v.bones, v.folder / secrets.token_hex(8)).points
+    ),
+    "open_collection": lambda v: es.collections.open_collection(v.collection.folder).points,
+    "Collection.number": lambda v: v.collection.number("two"),
+    "Collection.read_specimen": lambda v: v.collection.read_specimen("two"),
+    "carry_landmarks": lambda v: es.collections.carry_landmarks(v.collection, {"one": v.tip}),
+    "CarriedLandmarks.save": lambda v: written(
+        v.folder, ".csv", es.collections.carry_landmarks(v.collection, {"one": v.tip}).save
+    ),
     "Registration.move": lambda v: v.motion.move(v.fish.vertices),
     "Registration.inverse": lambda v: v.motion.inverse().rotation,
     "Registration.after": lambda v: v.motion.after(v.motion).rotation,
@@ -795,6 +858,24 @@ def solved_like_lapy(mesh: es.TriangleMesh) -> list[np.ndarray]:
     return [*solver.eigs(5), solver.poisson(mesh.vertices), mass.data]
 
 
+CALLS |= {
+    "accuracy_curve": lambda v: es.modes.accuracy_curve(v.animal.vertices, v.spectrum),
+    "align_modes": lambda v: es.modes.align_modes(v.spectrum, v.spectrum2),
+    "blood_response": lambda v: es.modes.blood_response(v.animal.vertices[:4], 0.1),
+    "compare_modes": lambda v: es.modes.compare_modes(
+        v.animal.vertices.T, v.pose.vertices.T, v.spectrum, n_permutations=5, rng=rng()
+    ),
+    "fit_modes": lambda v: es.modes.fit_modes(
+        v.animal.vertices, v.spectrum, v.animal.vertices[:, 1] ** 2
+    ),
+    "geometric_connectome": lambda v: es.modes.geometric_connectome(v.spectrum, n_modes=30),
+    "nodal_parcels": lambda v: es.modes.nodal_parcels(v.laplacian, 5),
+    "ParcelTree.cut": lambda v: es.modes.nodal_parcels(v.laplacian, 5).cut(3),
+    "rotation_nulls": lambda v: es.modes.rotation_nulls(
+        v.animal.vertices, v.spectrum, 5, rng=rng(), residual="permute", resample="exact"
+    ),
+    "wave_response": lambda v: es.modes.wave_response(v.animal.vertices[:9], v.spectrum, 0.1),
+}
 CALLS["Solver"] = lambda v: solved_like_lapy(v.animal)
 
 

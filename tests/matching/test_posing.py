@@ -3,7 +3,7 @@ import pytest
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
-from eigenshape.deformation.transfer import transfer_deformation
+from eigenshape.deformation.pose_transfer import transfer_deformation
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.posing import take_pose
 

@@ -33,11 +33,11 @@ def test_a_list_of_landmarks_is_as_good_as_an_array():
 
 def test_what_is_no_list_of_specimens_is_refused():
     one, other = Landmarks("ab", np.zeros((2, 3))), Landmarks("ba", np.zeros((2, 3)))
-    with pytest.raises(es.InvalidParameterError, match=r"'1' has 'b'\. Give missing ones as NaN"):
+    with pytest.raises(es.InvalidParameterError, match=r"1 has 'b'\. Give missing ones as NaN"):
         as_configurations([one, other])
     with pytest.raises(es.InvalidParameterError, match="at least one specimen with a landmark"):
         as_configurations({})
-    with pytest.raises(es.InvalidParameterError, match=r"specimens\['1'\] must be a Landmarks"):
+    with pytest.raises(es.InvalidParameterError, match=r"specimens\[1\] must be a Landmarks"):
         as_configurations([one, np.zeros((2, 3))])
     with pytest.raises(es.InvalidParameterError, match=r"n specimens; the shape is \(2, 3\)"):
         as_configurations(np.zeros((2, 3)))

@@ -62,7 +62,7 @@ def test_unknown_names_and_options_are_refused():
     ):
         build_laplacian(SHAPES["triangles"], "heat")
     with pytest.raises(
-        InvalidParameterError, match="The cotangent operator takes mass; the option t was given"
+        InvalidParameterError, match="The cotangent operator takes mass, conductivity; the option t"
     ):
         build_laplacian(SHAPES["triangles"], "cotangent", t=1.0)
     with pytest.raises(

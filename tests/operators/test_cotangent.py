@@ -3,6 +3,7 @@ import pytest
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.operators.anisotropic import anisotropic_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import grid, torus
 
@@ -110,3 +111,29 @@ def test_areas_that_floats_cannot_hold_are_refused(scale):
 def test_a_far_vertex_without_face_is_named_as_such():
     with pytest.raises(InvalidShapeError, match=r"vertex 3 at \[1e\+300, 0\.0, 0\.0\] has none"):
         cotangent_laplacian(TriangleMesh([*RIGHT.vertices, [1e300, 0, 0]], RIGHT.faces))
+
+
+def test_conductivity_is_linear_on_each_triangle():
+    mesh = torus(12, 8)
+    plain = cotangent_laplacian(mesh, "consistent")
+    tripled = cotangent_laplacian(mesh, "consistent", conductivity=np.full(mesh.n_vertices, 3.0))
+    assert abs(tripled.stiffness - 3 * plain.stiffness).max() < 1e-12
+    assert abs(tripled.mass - plain.mass).max() == 0
+    # Over a triangle with the values 1, 2 and 6, a gradient of length 1 has 3 times its area.
+    found = cotangent_laplacian(RIGHT, conductivity=[1.0, 2.0, 6.0])
+    np.testing.assert_allclose(
+        found.stiffness.toarray(), 3 * cotangent_laplacian(RIGHT).stiffness.toarray(), atol=1e-15
+    )
+    # The same as a multiple of the identity for each triangle.
+    values = np.random.default_rng(0).uniform(0.5, 2, mesh.n_vertices)
+    tensors = values[mesh.faces].mean(axis=1)[:, None, None] * np.eye(3)
+    other = anisotropic_laplacian(mesh, tensors)
+    found = cotangent_laplacian(mesh, conductivity=values)
+    assert abs(found.stiffness - other.stiffness).max() < 1e-12
+
+
+def test_bad_conductivity_is_named():
+    with pytest.raises(InvalidParameterError, match="conductivity must hold one number per point"):
+        cotangent_laplacian(RIGHT, conductivity=[1.0])
+    with pytest.raises(InvalidParameterError, match=r"positive and finite; entry 2 is 0\.0"):
+        cotangent_laplacian(RIGHT, conductivity=[1.0, 1.0, 0.0])

@@ -100,6 +100,11 @@ def shared_names(folder: Path) -> dict[str, Any]:
         "times": [0.1, 0.5],
         "i": 3,
         "j": 90,
+        "data": np.sin(3 * mesh.vertices[:, 0]) + mesh.vertices[:, 1],
+        "holes": np.where(mesh.vertices[:, 2] > 0.7, np.nan, mesh.vertices[:, 1]),
+        "hetero": 1 + 0.3 * mesh.vertices[:, 1],
+        "ext_input": np.outer(mesh.vertices[:, 1], np.linspace(0, 1, 30) ** 2),
+        "pair": np.array(mesh.vertices[:, :2]),
         "k": 12,
         "n": 20,
         "m": 1.0,
@@ -182,12 +187,76 @@ def names_of_pyfm(shared: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def names_of_neuromodes(shared: dict[str, Any]) -> dict[str, Any]:
+    neuromodes, lapy = import_module("neuromodes"), import_module("lapy")
+    tria = lapy.TriaMesh(shared["V"].copy(), shared["F"].copy())
+    solver = neuromodes.EigenSolver(tria).solve(36)
+    names: dict[str, Any] = {}
+    for module in ("basis", "eigen", "network", "nulls", "stats", "waves"):
+        names |= vars(import_module(f"neuromodes.{module}"))
+    return names | {
+        "EigenSolver": Instance(neuromodes.EigenSolver, lambda: solver),
+        "tria": tria,
+        "emodes": solver.emodes,
+        "evals": solver.evals,
+        "mass": solver.mass,
+    }
+
+
 PEERS = {
     "lapy": names_of_lapy,
+    "neuromodes": names_of_neuromodes,
     "libigl": names_of_libigl,
     "potpourri3d": names_of_potpourri3d,
     "pyfm": names_of_pyfm,
 }
+
+
+def names_for_geomorph(folder: Path) -> dict[str, Any]:
+    """What our code beside geomorph's may use, which is in R and does not run here."""
+    morpho, rng = es.morphometrics, np.random.default_rng(0)
+    mesh = bumpy_ball()
+    points = mesh.vertices[::20]
+    n, k = 8, len(points)
+    A = points + 0.05 * rng.standard_normal((n, k, 3))
+    broken = A.copy()
+    broken[3, 2] = np.nan
+    normals = np.full(A.shape, np.nan)
+    normals[:, 6:] = es.geometry.vertex_normals(mesh)[::20][6:]
+    names = [str(number + 1) for number in range(k)]
+    mice = {"AKR": morpho.Landmarks(names, A[0]), "DBA": morpho.Landmarks(names, A[1])}
+    paths = {}
+    for name, suffix in (("tps", ".tps"), ("morphologika", ".txt"), ("fcsv", ".fcsv")):
+        paths[f"{name}_path"] = folder / f"mice{suffix}"
+        morpho.write_landmarks(mice["AKR"] if name == "fcsv" else mice, paths[f"{name}_path"])
+    es.write_mesh(mesh, folder / "shape.ply")
+    scientific = (
+        "sklearn.cross_decomposition",
+        "sklearn.manifold",
+        "scipy.cluster.hierarchy",
+        "scipy.spatial.distance",
+    )
+    modules = {name.split(".")[-1]: import_module(name) for name in scientific}
+    return (
+        paths
+        | modules
+        | {
+            "es": es,
+            "np": np,
+            "A": A,
+            "X": A.reshape(n, -1),
+            "n": n,
+            "mesh": mesh,
+            "points": points,
+            "broken": broken,
+            "curves": [[0, 1, 2, 3, 4, 5]],
+            "normals": normals,
+            "groups": np.array(list("aaabbbcc")),
+            "land_pairs": [[0, 1], [2, 3]],
+            "path": folder / "shape.ply",
+            "new_tps_path": folder / "new.tps",
+        }
+    )
 
 
 def rows_of(page: str) -> list[list[str]]:
@@ -268,7 +337,15 @@ def test_every_row_runs(page, tmp_path):
     assert not complaints, "\n".join(complaints)
 
 
-@pytest.mark.parametrize("page", PEERS)
+def test_every_row_beside_geomorph_runs(tmp_path):
+    names = names_for_geomorph(tmp_path)
+    n_values = 0
+    for _, cell in rows_of("geomorph"):
+        n_values += len(run(cell, names))
+    assert n_values > 25
+
+
+@pytest.mark.parametrize("page", [*PEERS, "geomorph"])
 def test_few_rows_have_no_code_and_they_say_what_is_missing(page):
     rows = rows_of(page)
     prose = [cells for cells in rows if "`" not in cells[1]]

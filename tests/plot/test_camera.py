@@ -8,7 +8,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.plot import fields, shape_pairs, sheet
-from eigenshape.plot.camera import aim_camera, in_picture, three_quarter_view
+from eigenshape.plot.camera import aim_camera, in_picture
 from eigenshape.plot.fields import figure_field, figure_segments
 from eigenshape.plot.render import draw
 from eigenshape.plot.sheet import Panel, figure_contact_sheet, figure_poses
@@ -32,7 +32,7 @@ def leaning_tower(up):
 def test_a_shape_that_stands_along_one_axis_is_shown_standing():
     for up in ("y", "z"):
         tower = leaning_tower(up)
-        automatic, told = three_quarter_view(tower), three_quarter_view(tower, up=up)
+        automatic, told = aim_camera(tower), aim_camera(tower, up=up)
         assert np.array_equal(automatic.rotation, told.rotation)
         head_row = in_picture(tower, automatic)[-1, 1]
         plate_row = in_picture(tower, automatic)[-3 * BALL.n_vertices, 1]
@@ -41,17 +41,15 @@ def test_a_shape_that_stands_along_one_axis_is_shown_standing():
 
 def test_y_is_up_where_both_would_stand_or_neither():
     for mesh in (BALL, torus(), leaning_tower("x")):
-        assert np.array_equal(
-            three_quarter_view(mesh).rotation, three_quarter_view(mesh, up="y").rotation
-        )
+        assert np.array_equal(aim_camera(mesh).rotation, aim_camera(mesh, up="y").rotation)
 
 
 def test_the_guess_does_not_depend_on_the_unit():
     tower = leaning_tower("z")
-    usual = three_quarter_view(tower).rotation
+    usual = aim_camera(tower).rotation
     for power in (-330, 330):
         scaled = TriangleMesh(tower.vertices * 2.0**power, tower.faces)
-        assert np.array_equal(three_quarter_view(scaled).rotation, usual)
+        assert np.array_equal(aim_camera(scaled).rotation, usual)
 
 
 def test_a_shape_is_shown_from_the_side_that_bends_more():
@@ -66,7 +64,7 @@ def test_a_shape_is_shown_from_the_side_that_bends_more():
             TriangleMesh(points * 2.0**-300, ball.faces),
             TriangleMesh(points, ball.faces[:, ::-1]),
         ):
-            right, down, towards = three_quarter_view(mesh).rotation
+            right, down, towards = aim_camera(mesh).rotation
             assert side * towards[2] > 0.5
             assert towards[1] > 0.3
             assert np.cross(right, towards) == pytest.approx(down, abs=1e-12)
@@ -74,7 +72,7 @@ def test_a_shape_is_shown_from_the_side_that_bends_more():
 
 def test_a_shape_without_area_has_a_view():
     needle = TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
-    camera = three_quarter_view(needle, size=50)
+    camera = aim_camera(needle, size=50)
     assert np.isfinite(in_picture(needle, camera)).all()
 
 
@@ -83,7 +81,7 @@ def test_a_shape_without_area_has_a_view():
 def test_cameras_are_rotations_with_up_upward_and_shapes_fill_the_picture(up, seed):
     points = np.random.default_rng(seed).standard_normal((30, 3)) * [1, 2, 3] + 5
     mesh = TriangleMesh(points, np.arange(30).reshape(10, 3))
-    camera = three_quarter_view(mesh, up=up, size=100)
+    camera = aim_camera(mesh, up=up, size=100)
     right, down, towards = camera.rotation
     assert camera.rotation @ camera.rotation.T == pytest.approx(np.eye(3), abs=1e-12)
     assert np.cross(right, towards) == pytest.approx(
@@ -98,9 +96,7 @@ def test_cameras_are_rotations_with_up_upward_and_shapes_fill_the_picture(up, se
 
 @pytest.mark.data
 def test_a_real_head_shows_its_face(data):
-    assert (
-        three_quarter_view(read_mesh(data / "classics" / "decimated-max.obj")).rotation[2, 2] < -0.5
-    )
+    assert aim_camera(read_mesh(data / "classics" / "decimated-max.obj")).rotation[2, 2] < -0.5
 
 
 @pytest.mark.long
@@ -137,9 +133,7 @@ def test_every_picture_of_a_classic_shape_shows_it_upright(data, name, down, mon
 def test_real_animals_are_shown_on_their_feet(data, name, up):
     (path,) = (data / "retrieval").rglob(f"{name}.*")
     mesh = read_mesh(path)
-    assert np.array_equal(
-        three_quarter_view(mesh).rotation, three_quarter_view(mesh, up=up).rotation
-    )
+    assert np.array_equal(aim_camera(mesh).rotation, aim_camera(mesh, up=up).rotation)
 
 
 @pytest.mark.parametrize(
@@ -172,13 +166,13 @@ def test_views_along_the_upward_direction_keep_the_front_at_the_viewers_side():
 )
 def test_the_upward_direction_points_up(up, down):
     assert aim_camera(BALL, view="front", up=up).rotation[1] == pytest.approx(down, abs=1e-12)
-    assert three_quarter_view(BALL, up=up).rotation[1] @ down > 0.8
+    assert aim_camera(BALL, up=up).rotation[1] @ down > 0.8
 
 
 def test_the_usual_view_is_from_the_front_left():
     for up in ("auto", "x", "-y"):
         named = aim_camera(BALL, view="front-left", up=up).rotation
-        assert three_quarter_view(BALL, up=up).rotation == pytest.approx(named, abs=1e-12)
+        assert aim_camera(BALL, up=up).rotation == pytest.approx(named, abs=1e-12)
 
 
 @pytest.mark.parametrize("bad", ["behind", "y", [0, 0, 0], [1, 2], [1, 0, np.nan]])
@@ -190,7 +184,7 @@ def test_a_view_that_is_none_is_refused(bad):
 
 def test_an_upward_direction_that_is_none_is_refused():
     with pytest.raises(InvalidParameterError, match="up must be one of auto, x, y, z, -x, -y, -z"):
-        three_quarter_view(BALL, up="front")
+        aim_camera(BALL, up="front")
 
 
 def test_figures_take_a_view_or_a_camera_but_not_both():

@@ -3,8 +3,8 @@ import pytest
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.plot.eigenvalues import figure_spectra
 from eigenshape.plot.figure import save_figure
+from eigenshape.plot.spectra import figure_spectra
 from eigenshape.shapes.exact import sphere_eigenvalues
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues

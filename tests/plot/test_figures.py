@@ -4,8 +4,7 @@ import pytest
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.plot.camera import in_picture, three_quarter_view
-from eigenshape.plot.eigenvalues import figure_spectrum
+from eigenshape.plot.camera import aim_camera, in_picture
 from eigenshape.plot.fields import (
     figure_eigenfunctions,
     figure_field,
@@ -16,6 +15,7 @@ from eigenshape.plot.fields import (
 from eigenshape.plot.figure import save_figure
 from eigenshape.plot.render import AMBIENT, INK, draw, palette
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
+from eigenshape.plot.spectra import figure_spectrum
 from eigenshape.scans.partial import partial_scan
 from eigenshape.shapes.surfaces import grid, icosphere, torus
 from eigenshape.spectral.bounds.brackets import bracket_eigenvalues
@@ -32,7 +32,7 @@ def colors_at(drawing, mask):
 
 
 def test_a_sphere_covers_a_disc():
-    drawing = draw(SPHERE, three_quarter_view(SPHERE, size=200))
+    drawing = draw(SPHERE, aim_camera(SPHERE, size=200))
     radius = 200 * 0.92 / 2
     assert drawing.image[..., 3].sum() == pytest.approx(np.pi * radius**2, rel=0.01)
     assert drawing.image[0, 0, 3] == 0
@@ -40,24 +40,24 @@ def test_a_sphere_covers_a_disc():
 
 
 def test_up_is_up_and_the_front_is_towards_us():
-    camera = three_quarter_view(SPHERE, size=100)
+    camera = aim_camera(SPHERE, size=100)
     places = in_picture(SPHERE, camera)
     _, y, z = SPHERE.vertices.T
     assert np.corrcoef(places[:, 1], -y)[0, 1] > 0.9
     assert np.corrcoef(places[:, 2], z)[0, 1] > 0.7
-    standing = in_picture(SPHERE, three_quarter_view(SPHERE, up="z", size=100))
+    standing = in_picture(SPHERE, aim_camera(SPHERE, up="z", size=100))
     assert np.corrcoef(standing[:, 1], -z)[0, 1] > 0.9
 
 
 def test_a_scan_is_looked_at_from_where_it_was_seen():
     view = np.array([-0.5, 0.2, -0.8])
     scan = partial_scan(torus(), view).mesh
-    towards = three_quarter_view(scan).rotation[2]
+    towards = aim_camera(scan).rotation[2]
     assert towards @ (view / np.linalg.norm(view)) > 0.9
 
 
 def test_halves_have_their_colors_on_their_sides():
-    camera = three_quarter_view(SPHERE, size=160)
+    camera = aim_camera(SPHERE, size=160)
     high = SPHERE.vertices[SPHERE.faces].mean(axis=1)[:, 1] > 0
     drawing = draw(SPHERE, camera, face_colors=np.where(high[:, None], RED, BLUE))
     rows = np.arange(160)[:, None] * np.ones((1, 160))
@@ -69,7 +69,7 @@ def test_halves_have_their_colors_on_their_sides():
 
 
 def test_the_nodal_line_lies_where_the_function_is_zero():
-    camera = three_quarter_view(SPHERE, size=300)
+    camera = aim_camera(SPHERE, size=300)
     height = (
         SPHERE.vertices @ camera.rotation[1]
     )  # rises down the picture: zero along the middle row
@@ -82,7 +82,7 @@ def test_the_nodal_line_lies_where_the_function_is_zero():
 
 
 def test_hidden_vertices_are_known():
-    camera = three_quarter_view(SPHERE, size=200)
+    camera = aim_camera(SPHERE, size=200)
     drawing = draw(SPHERE, camera)
     depth = SPHERE.vertices @ camera.rotation[2]
     assert drawing.visible[depth > 0.25].all()
@@ -91,7 +91,7 @@ def test_hidden_vertices_are_known():
 
 def test_boundaries_are_dark():
     sheet = grid(4, 4)
-    drawing = draw(sheet, three_quarter_view(sheet, size=120))
+    drawing = draw(sheet, aim_camera(sheet, size=120))
     column, row = drawing.places[:5].mean(axis=0).astype(int)  # the middle of one side
     near_side = drawing.image[row - 3 : row + 4, column - 3 : column + 4]
     assert near_side[near_side[..., 3] == 1][:, 0].min() == pytest.approx(INK)
@@ -99,11 +99,11 @@ def test_boundaries_are_dark():
 
 
 def test_the_same_picture_twice_and_at_any_scale():
-    first = draw(SPHERE, three_quarter_view(SPHERE, size=80)).image
-    again = draw(SPHERE, three_quarter_view(SPHERE, size=80)).image
+    first = draw(SPHERE, aim_camera(SPHERE, size=80)).image
+    again = draw(SPHERE, aim_camera(SPHERE, size=80)).image
     larger = TriangleMesh(SPHERE.vertices * 2.0**300, SPHERE.faces)
     assert np.array_equal(first, again)
-    assert np.array_equal(first, draw(larger, three_quarter_view(larger, size=80)).image)
+    assert np.array_equal(first, draw(larger, aim_camera(larger, size=80)).image)
 
 
 def test_palette_tells_fifteen_labels_apart_and_grays_the_rest():

@@ -11,7 +11,7 @@ from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, face_areas, scale_to_unit
+from eigenshape.geometry.measure import face_areas, scale_to_unit, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
 from eigenshape.geometry.simplices import scaled_corners, size_one, triangular_sides
@@ -216,7 +216,7 @@ def map_to_sphere(
     report_progress = progress or silent
     for number in range(most):
         report_progress(number / most, f"step {number + 1}, radii differ by {least:.2g}")
-        areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
+        areas = triangle_areas(points[mesh.faces])
         weights = np.bincount(
             mesh.faces.ravel(), weights=np.repeat(areas / 3, 3), minlength=mesh.n_vertices
         )

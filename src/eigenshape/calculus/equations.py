@@ -7,9 +7,9 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import (
-    finite_values,
+    finite_number,
     point_functions,
-    positive_values,
+    positive_number,
     real_numbers,
     step_number,
     vertex_values,
@@ -172,7 +172,7 @@ def solve_helmholtz(
     >>> es.calculus.solve_helmholtz(laplacian, -4.0, 1.0)[0].round(12).item()
     0.25
     """
-    (kappa,) = finite_values(squared_wavenumber, "squared_wavenumber")
+    kappa = finite_number(squared_wavenumber, "squared_wavenumber")
     if kappa == 0:
         return solve_poisson(laplacian, source, load=load, fixed=fixed, values=values)
     require_type(laplacian, Laplacian, "laplacian")
@@ -251,7 +251,7 @@ def solve_heat(  # noqa: PLR0913 - one keyword for each part of the equation
     require_type(laplacian, Laplacian, "laplacian")
     require_matrix(laplacian)
     count = step_number(n_steps, "n_steps")
-    (time,) = positive_values(t, "t")
+    time = positive_number(t, "t")
     current = point_functions(start, "start", laplacian.n_points)
     step = time / count
     solver = factor_definite(laplacian.mass + step * laplacian.stiffness, fixed)

@@ -3,7 +3,11 @@
 import numpy as np
 import scipy.sparse as sp
 
-from eigenshape._arrays import finite_values, positive_values, step_number
+from eigenshape._arrays import (
+    finite_number,
+    positive_number,
+    step_number,
+)
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike, Integer
@@ -89,7 +93,7 @@ def mean_curvature_flow(
     True
     """
     mesh = as_mesh(mesh)
-    (time,) = positive_values(t, "t")
+    time = positive_number(t, "t")
     count = step_number(n_steps, "n_steps")
     points, scale = size_one(mesh.vertices)
     step = time / count / scale / scale
@@ -174,8 +178,8 @@ def taubin_smooth(
     """
     mesh = as_simplicial(mesh)
     count = step_number(n_steps, "n_steps")
-    (weight,) = finite_values(shrink, "shrink")
-    (back,) = finite_values(inflate, "inflate")
+    weight = finite_number(shrink, "shrink")
+    back = finite_number(inflate, "inflate")
     if not 0 < weight <= 1 or not back < -weight:
         raise InvalidParameterError(
             f"shrink must lie in 0..1 and inflate below -shrink; they are {weight} and {back}."

@@ -1,12 +1,10 @@
 """Geodesic distances by heat, on meshes of any dimension and on point clouds."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly, positive_values, whole_numbers
+from eigenshape._arrays import ReadOnly, positive_number, record, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike
@@ -34,7 +32,7 @@ SOURCES_AT_ONCE = 8
 NO_SOURCE = "There must be at least one source; there is none."
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HeatGeodesics(ReadOnly):
     """A shape that is ready for geodesic distances by heat: two factors, used for all sources.
 
@@ -135,7 +133,7 @@ def prepare_heat_geodesics(
     (2, 642)
     """
     shape = as_shape(shape)
-    factor = float(positive_values(time_factor, "time_factor")[0])
+    factor = positive_number(time_factor, "time_factor")
     if isinstance(shape, PointCloud) or robust:
         if isinstance(shape, PointCloud):
             cover, scale = cloud_cover(shape)

@@ -1,15 +1,14 @@
 """Hodge decompositions: of vectors on faces, and of one-forms on edges."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, real_numbers, require_finite_rows
+from eigenshape._arguments import require_choice
+from eigenshape._arrays import ReadOnly, real_numbers, record, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.derivatives import sum_at_nodes
 from eigenshape.calculus.linear_solver import factorize_grounded
@@ -20,7 +19,6 @@ from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import scaled_corners
-from eigenshape.operators.choices import require_choice
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian
 from eigenshape.operators.directions import require_oriented_manifold
@@ -35,7 +33,7 @@ TANGENT = 1e-6
 SPARE_FIELDS = 2
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HodgeDecomposition(ReadOnly):
     """A field as the sum of three fields that are orthogonal to each other.
 
@@ -78,8 +76,6 @@ class HodgeDecomposition(ReadOnly):
     harmonic: Float[np.ndarray, "..."]
     potential: Float[np.ndarray, " n"]
     stream: Float[np.ndarray, " e"]
-
-    __repr__ = short_repr
 
 
 def decompose_field(

@@ -1,20 +1,23 @@
 """Level sets of piecewise linear functions: polylines on surfaces, triangles in solids."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, finite_values, point_functions, vertex_values
+from eigenshape._arrays import (
+    ReadOnly,
+    finite_number,
+    point_functions,
+    record,
+    vertex_values,
+)
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import in_length, size_one, volumes
+from eigenshape.geometry.simplices import cut_tetrahedra, in_length, size_one, volumes
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LevelSet(ReadOnly):
     """The points where a piecewise linear function has a value, as segments or triangles.
 
@@ -57,8 +60,6 @@ class LevelSet(ReadOnly):
     pieces: Int[np.ndarray, "q m"]
     edges: Int[np.ndarray, "p 2"]
     shares: Float[np.ndarray, " p"]
-
-    __repr__ = short_repr
 
     @property
     def size(self) -> float:
@@ -209,16 +210,15 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
             f"Level sets are found on triangles and tetrahedra; the mesh is a {mesh!r}."
         )
     heights = vertex_values(values, "values", mesh.n_points)
-    (wanted,) = finite_values(level, "level")
+    wanted = finite_number(level, "level")
     above = heights >= wanted
     crossed = np.flatnonzero(above[mesh.simplices].any(axis=1) & ~above[mesh.simplices].all(axis=1))
     corners = mesh.simplices[crossed]
     inside = above[corners]
-    n_inside = inside.sum(axis=1)
     # (q, m, 2): the crossed edge of each corner of each piece.
     if mesh.dim == 2:
         # From the lone corner to the two others, with larger values left of the segment.
-        is_above = (n_inside == 1)[:, None]
+        is_above = inside.sum(axis=1, keepdims=True) == 1
         lone = np.argmax(inside == is_above, axis=1)
         rows = np.arange(len(corners))
         tip, following, before = (corners[rows, (lone + turn) % 3] for turn in range(3))
@@ -226,17 +226,7 @@ def level_set(mesh: MeshLike, values: ArrayLike, level: float) -> LevelSet:
         ends = np.stack([first, second], axis=1)
         ends = np.where(is_above[:, None], ends, ends[:, ::-1])
     else:
-        # Corners above come first, in each tetrahedron. A lone corner is cut off by a triangle; two
-        # above and two below are parted by a quadrilateral, cut along a diagonal.
-        order = np.argsort(~inside, axis=1, kind="stable")
-        ordered = np.take_along_axis(corners, order, axis=1)
-        cuts = [
-            (1, [(0, 1), (0, 2), (0, 3)]),
-            (3, [(0, 3), (1, 3), (2, 3)]),
-            (2, [(0, 2), (0, 3), (1, 3)]),
-            (2, [(0, 2), (1, 3), (1, 2)]),
-        ]
-        ends = np.concatenate([ordered[n_inside == count][:, cut] for count, cut in cuts])
+        ends = cut_tetrahedra(corners, inside)
 
     # Points are numbered by their edges, the lower vertex first, so that neighbors share them.
     ends = np.sort(ends, axis=2)

@@ -1,6 +1,6 @@
 """Symmetric systems of equations on points: factored once, solved for many right-hand sides."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -8,9 +8,9 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import ReadOnly, point_functions, real_numbers, require_finite_rows
+from eigenshape._arrays import ReadOnly, point_functions, real_numbers, record, require_finite_rows
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import as_symmetric, find_zero_row_sums, require_points
@@ -33,7 +33,7 @@ MET = 1e-8
 SparseMatrix: TypeAlias = sp.sparray | sp.spmatrix
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LinearSolver(ReadOnly):
     """A symmetric system A x = b on points, factored once for many right-hand sides.
 
@@ -200,7 +200,7 @@ class LinearSolver(ReadOnly):
         return found
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Constraints:
     """Linear constraints C x = d of a solver, eliminated by a small dense system.
 
@@ -456,8 +456,8 @@ def _columns(value: ArrayLike, name: str, n_rows: int, noun: str) -> Float[np.nd
 
 # `LinearSolver` is for the systems of users: it checks pivots and right-hand sides at each call. What
 # follows is for systems that are built inside, where the remedy is a repair of the mesh.
-@dataclass(frozen=True, eq=False)
-class GroundedFactor:
+@record
+class GroundedFactor(Shown):
     """A stiffness matrix, factored with fixed points and one point of each component at 0.
 
     `factorize_grounded` makes it.
@@ -475,9 +475,6 @@ class GroundedFactor:
     components: Int[np.ndarray, " n"]
     free: Int[np.ndarray, " f"]
     factor: SymmetricFactor | None
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def solve(self, loads: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
         """Solve W x = loads, which sum to 0 on each component without a fixed point."""

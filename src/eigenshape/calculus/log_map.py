@@ -5,6 +5,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Complex, Float
 
+from eigenshape._arguments import require_choice
 from eigenshape._arrays import whole_number
 from eigenshape._typing import Integer
 from eigenshape.calculus.vector_heat import (
@@ -21,7 +22,6 @@ from eigenshape.calculus.vector_heat import (
 )
 from eigenshape.geometry.conversion import MeshLike
 from eigenshape.geometry.simplices import in_length
-from eigenshape.operators.choices import require_choice
 from eigenshape.operators.directions import corner_products
 from eigenshape.operators.tufted import side_ends
 

@@ -4,6 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Int
 
+from eigenshape._arguments import require_choice
 from eigenshape._arrays import real_numbers, require_finite_rows
 from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
 from eigenshape._typing import ArrayLike
@@ -15,7 +16,6 @@ from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
-from eigenshape.operators.choices import require_choice
 
 # Share of a face's weight in the penalty on d ω: small enough that a few rounds are exact, large
 # enough that rounding leaves half of the digits to each round.

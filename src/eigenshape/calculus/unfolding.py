@@ -1,12 +1,9 @@
 """Faces laid flat one after another, for paths that cross them straight."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly
-from eigenshape._text import short_repr
+from eigenshape._arrays import ReadOnly, record
 from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import in_length, size_one
@@ -21,7 +18,7 @@ STRAIGHT = 1e-10
 SAME = 1e-14
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class GeodesicPath(ReadOnly):
     """A polyline on a surface.
 
@@ -50,10 +47,8 @@ class GeodesicPath(ReadOnly):
     points: Float[np.ndarray, "p 3"]
     length: float
 
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@record
 class Sides:
     """What a walk over faces needs; side 3f + s runs from corner s of face f to the next."""
 

@@ -1,15 +1,14 @@
 """Parallel transport and scalar extension by short heat flow."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from eigenshape._arrays import (
     ReadOnly,
     finite_values,
-    positive_values,
+    positive_number,
     real_numbers,
+    record,
     require_finite_rows,
 )
 from eigenshape._errors import InvalidParameterError
@@ -32,7 +31,7 @@ from eigenshape.operators.tufted import side_ends
 from eigenshape.sparse.symmetric_factor import SymmetricFactor
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class VectorHeat(ReadOnly):
     """A surface that is ready for transport by heat: three factors, used for all sources.
 
@@ -125,7 +124,7 @@ def prepare_vector_heat(
     (162, 2)
     """
     mesh = as_mesh(mesh)
-    factor = float(positive_values(time_factor, "time_factor")[0])
+    factor = positive_number(time_factor, "time_factor")
     points, scale = scale_to_unit(mesh)
     unit = TriangleMesh(points, mesh.faces)
     report_progress = progress or silent

@@ -121,8 +121,18 @@ def deform(
         es.io.write_edits(session.edits, surface, save_edits)
         print_written(save_edits)
     if picture:
+        # How much each vertex follows, from 0 to 1: by the binding of one edit, or by where several
+        # have moved it
+        if len(session.edits) == 1:
+            (edit,) = session.edits
+            regions = [move.region for move in edit.moves]
+            bound = es.deformation.bind(rig, regions, fixed=edit.fixed, n_modes=edit.n_modes)
+            follows: Any = bound.shares.sum(axis=0)
+        else:
+            moved = ((session.mesh.vertices - surface.vertices) ** 2).sum(axis=1) ** 0.5
+            follows = moved / max(moved.max(), 1e-300)
         poses = {"before": surface, "after": session.mesh}
-        figure = es.plot.figure_poses(poses, _displacement_shares(rig, session, surface), **side)
+        figure = es.plot.figure_poses(poses, follows, **side)
         steps.save_picture(figure, picture)
 
 
@@ -229,20 +239,3 @@ def _print(session: es.DeformationSession, before: es.TriangleMesh, *, as_json: 
             "Faces cross that did not before. A wider bend may help (--fixed with a smaller part), "
             "or --mode uncrossed."
         )
-
-
-def _displacement_shares(
-    rig: es.deformation.EigenRig, session: es.DeformationSession, before: es.TriangleMesh
-) -> Any:
-    """Return, for each vertex, by how much it follows: 1 moves fully, 0 not at all.
-
-    After one edit these are the shares of the binding, after several the displacements over the
-    largest.
-    """
-    if len(session.edits) == 1:
-        edit = session.edits[0]
-        regions = [move.region for move in edit.moves]
-        binding = es.deformation.bind(rig, regions, fixed=edit.fixed, n_modes=edit.n_modes)
-        return binding.shares.sum(axis=0)
-    moved = ((session.mesh.vertices - before.vertices) ** 2).sum(axis=1) ** 0.5
-    return moved / max(moved.max(), 1e-300)

@@ -102,28 +102,21 @@ def add(
         facts = {"index": index, "shapes": len(shelf), **result_facts(report)}
         print_json(facts | {"pruned": pruned, "doubles": doubles})
     else:
-        _print_report(shelf, report, pruned, doubles)
+        for name, done in report.repaired:
+            err.print(f"[yellow]repaired:[/] {escape_text(name)}: {escape_text('; '.join(done))}")
+        counts = f"{len(report.added)} described, {len(report.skipped)} indexed already"
+        if pruned:
+            counts += f", {len(pruned)} removed"
+        out.print(f"{counts}, {len(report.failed)} failed; the index holds {len(shelf)} shapes.")
+        # On a terminal each file was named when it failed.
+        for name, reason in () if out.is_terminal and err.is_terminal else report.failed:
+            out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
+        for one, two in doubles:
+            out.print(
+                f"  [yellow]{escape_text(two)}[/]: the same file content as {escape_text(one)}"
+            )
     if report.failed:
         raise typer.Exit(SOME_FAILED)
-
-
-def _print_report(
-    shelf: es.ShapeIndex,
-    report: es.retrieval.BatchReport,
-    pruned: list[str],
-    doubles: list[tuple[str, str]],
-) -> None:
-    for name, done in report.repaired:
-        err.print(f"[yellow]repaired:[/] {escape_text(name)}: {escape_text('; '.join(done))}")
-    counts = f"{len(report.added)} described, {len(report.skipped)} indexed already"
-    if pruned:
-        counts += f", {len(pruned)} removed"
-    out.print(f"{counts}, {len(report.failed)} failed; the index holds {len(shelf)} shapes.")
-    # On a terminal each file was named when it failed.
-    for name, reason in () if out.is_terminal and err.is_terminal else report.failed:
-        out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
-    for one, two in doubles:
-        out.print(f"  [yellow]{escape_text(two)}[/]: the same file content as {escape_text(one)}")
 
 
 def ls(index: Path, *, where: list[str] | None = None, as_json: bool = False) -> None:

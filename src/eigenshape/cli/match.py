@@ -64,7 +64,14 @@ def match(
     """
     side = steps.picture_side(view, up, picture)
     steps.require_output(output, MAP_FILES, "A map")
-    size = _parse_scale(scale)
+    size: Any = scale
+    if scale not in ("auto", "known", "unknown"):
+        try:
+            size = float(scale)
+        except ValueError as error:
+            raise InvalidParameterError(
+                f"--scale takes auto, known, unknown or a number; it is {scale!r}."
+            ) from error
     ours, theirs = (steps.load_surface(path, repair) for path in (mesh, whole))
     with progress_bar("match") as progress:
         found = es.match_shapes(ours, theirs, scale=size, progress=progress)
@@ -77,18 +84,6 @@ def match(
         steps.save_match(found, output)
     if picture:
         steps.save_picture(es.plot.figure_match(ours, theirs, found, **side), picture)
-
-
-def _parse_scale(text: str) -> Any:
-    """Return "auto", "known" and "unknown" as they are, and a number as a number."""
-    if text in ("auto", "known", "unknown"):
-        return text
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InvalidParameterError(
-            f"--scale takes auto, known, unknown or a number; it is {text!r}."
-        ) from error
 
 
 def _match_facts(found: es.matching.ShapeMatch) -> dict[str, Any]:

@@ -225,7 +225,12 @@ def _print(answers: Sequence[_Answer], *, classify: bool) -> None:
         if len(answers) > 1:
             title = f"{title}: {answer.title}"
         if answer.matches:
-            _print_matches(title, answer.matches)
+            rows = []
+            for match in answer.matches:
+                chance = "" if match.chance is None else f"{100 * match.chance:.2g} %"
+                n_points = str(len(match.correspondences))
+                rows.append([match.name, match.label or "", f"{match.score:.3f}", chance, n_points])
+            print_table(title, ["shape", "label", "score", "chance", "corresponding points"], rows)
         else:
             out.print(
                 f"{escape_text(title)}: none; the index holds no other shape, or none agrees with the filters"
@@ -253,15 +258,6 @@ def _print(answers: Sequence[_Answer], *, classify: bool) -> None:
     )
 
 
-def _print_matches(title: str, matches: es.retrieval.Matches) -> None:
-    rows = []
-    for match in matches:
-        chance = "" if match.chance is None else f"{100 * match.chance:.2g} %"
-        n_points = str(len(match.correspondences))
-        rows.append([match.name, match.label or "", f"{match.score:.3f}", chance, n_points])
-    print_table(title, ["shape", "label", "score", "chance", "corresponding points"], rows)
-
-
 def _draw(
     answer: _Answer,
     index: Path,
@@ -280,10 +276,10 @@ def _draw(
             f"{literal(index.name)} ({steps.CAPTION})"
         )
         sheet = steps.contact_sheet(
-            answer.colored, title, answer.matches, repairs=repairs, caption=caption, **side
+            answer.colored, title, answer.matches, repairs=repairs, caption=caption, side=side
         )
         steps.save_picture(sheet, picture)
     if explain:
         best = answer.matches[0]
-        figure = steps.explanation(answer.colored, title, best, repairs=repairs, **side)
+        figure = steps.explanation(answer.colored, title, best, repairs=repairs, side=side)
         steps.save_picture(figure, explain)

@@ -66,9 +66,17 @@ def stability(
     """
     side = steps.picture_side(view, up, picture)
     partners = None if map_file is None else steps.read_map(map_file)
-    first, second = (
-        _normalized(steps.load_shape(path, repair, dim), normalize) for path in (one, two)
-    )
+    shapes: list[Any] = []
+    for path in (one, two):
+        shape: Any = steps.load_shape(path, repair, dim)
+        if normalize != "none":
+            if not isinstance(shape, es.TriangleMesh):
+                raise InvalidParameterError(
+                    f"--normalize is for triangle meshes; the shape is {shape!r}."
+                )
+            shape = es.geometry.normalize_mesh(shape, normalize)
+        shapes.append(shape)
+    first, second = shapes
     plan = StabilityPlan(
         k=k, n_samples=n_samples, times=tuple(t or ()), seed=seed, brackets=brackets
     )
@@ -85,15 +93,6 @@ def stability(
         titles = (literal(one.stem), literal(two.stem))
         figure = es.plot.figure_stability(report, first, second, titles=titles, **side)
         steps.save_picture(figure, picture)
-
-
-def _normalized(shape: Any, how: Normalization) -> Any:
-    """Center a shape and scale it to area 1 or to diameter 1, as --normalize says."""
-    if how == "none":
-        return shape
-    if not isinstance(shape, es.TriangleMesh):
-        raise InvalidParameterError(f"--normalize is for triangle meshes; the shape is {shape!r}.")
-    return es.geometry.normalize_mesh(shape, how)
 
 
 def _print(report: es.stability.StabilityReport) -> None:

@@ -9,6 +9,7 @@ from .edits import Move as Move
 from .handles import Rotation as Rotation
 from .handles import Translation as Translation
 from .handles import rotation_from_drag as rotation_from_drag
+from .pose_transfer import transfer_deformation as transfer_deformation
 from .region import BoxRegion as BoxRegion
 from .region import BrushRegion as BrushRegion
 from .region import region_boundary as region_boundary
@@ -24,4 +25,3 @@ from .thesis import detailed_skeleton as detailed_skeleton
 from .thesis import eigen_deformation as eigen_deformation
 from .thesis import move_skeleton as move_skeleton
 from .thesis import skeleton_response as skeleton_response
-from .transfer import transfer_deformation as transfer_deformation

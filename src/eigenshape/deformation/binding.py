@@ -1,15 +1,14 @@
 """Bind regions to handles: by how much each vertex follows each handle."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import describe_value, require_type
-from eigenshape._arrays import ReadOnly, whole_number
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.deformation.region import Region, region_mask, require_boundary
@@ -41,7 +40,7 @@ SMOOTHNESS = 1e-3
 FREE_DEPTH = 0.5
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Binding(ReadOnly):
     """Regions of a rig that handles can move.
 
@@ -79,8 +78,6 @@ class Binding(ReadOnly):
     distances: Float[np.ndarray, "r n"]
     shares: Float[np.ndarray, "r n"]
     part: FreePart
-
-    __repr__ = short_repr
 
     @property
     def held(self) -> Bool[np.ndarray, " n"]:

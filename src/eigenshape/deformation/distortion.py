@@ -1,13 +1,10 @@
 """Measure how much a deformation stretches, squeezes and folds a shape."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape.deformation.rigidity import edge_weights, fit_turns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, bounding_box, edge_lengths
@@ -16,7 +13,7 @@ from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.cotangent import cotangent_laplacian
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Distortion(ReadOnly):
     """Changes of edges and faces in a deformation.
 
@@ -51,8 +48,6 @@ class Distortion(ReadOnly):
     edge_error_of_box: float
     area_ratios: Float[np.ndarray, " f"]
     flipped: Int[np.ndarray, " k"]
-
-    __repr__ = short_repr
 
 
 def measure_distortion(before: MeshLike, after: MeshLike) -> Distortion:

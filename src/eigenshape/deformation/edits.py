@@ -9,9 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import describe_value, require_each
-from eigenshape._arrays import ReadOnly, whole_number
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.handles import Handle, Rotation, Translation, require_handle
@@ -55,7 +54,7 @@ def mesh_fingerprint(mesh: TriangleMesh) -> MeshFingerprint:
     return MeshFingerprint(mesh.n_vertices, mesh.n_faces, digest)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Move(ReadOnly):
     """A region and the handle that moves it.
 
@@ -80,14 +79,12 @@ class Move(ReadOnly):
     region: Region
     handle: Handle
 
-    __repr__ = short_repr
-
     def __post_init__(self) -> None:
         require_handle(self.handle)
-        object.__setattr__(self, "region", copy_region(self.region))
+        vars(self).update(region=copy_region(self.region))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Edit(ReadOnly):
     """One edit of a shape: regions that move together, and the region that stays.
 
@@ -129,11 +126,9 @@ class Edit(ReadOnly):
     n_modes: int | None = None
     mode: Mode = "graded"
 
-    __repr__ = short_repr
-
     def __post_init__(self) -> None:
         require_each(self.moves, Move, "moves")
-        object.__setattr__(self, "fixed", None if self.fixed is None else copy_region(self.fixed))
+        vars(self).update(fixed=None if self.fixed is None else copy_region(self.fixed))
 
 
 def apply_edit(rig: EigenRig, edit: Edit) -> EigenRig:

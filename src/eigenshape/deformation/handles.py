@@ -1,14 +1,13 @@
 """Handles: the motions of regions."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, finite_values, freeze
+from eigenshape._arrays import ReadOnly, finite_number, finite_values, freeze, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 
@@ -17,7 +16,7 @@ from eigenshape._typing import ArrayLike
 PARALLEL = 1e-12
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class Rotation(ReadOnly):
     """A rotation about an axis through a pivot, by any angle.
 
@@ -64,9 +63,11 @@ class Rotation(ReadOnly):
         if abs(length - 1) > 4 * np.finfo(float).eps:
             direction = direction / largest
             direction = direction / np.linalg.norm(direction)
-        object.__setattr__(self, "pivot", freeze(as_vector(pivot, "pivot")))
-        object.__setattr__(self, "axis", freeze(direction))
-        object.__setattr__(self, "angle", float(finite_values(angle, "angle")[0]))
+        vars(self).update(
+            pivot=freeze(as_vector(pivot, "pivot")),
+            axis=freeze(direction),
+            angle=finite_number(angle, "angle"),
+        )
 
     @property
     def turn(self) -> Float[np.ndarray, " 3"]:
@@ -86,7 +87,7 @@ class Rotation(ReadOnly):
         return np.sin(angle) * across + 2 * np.sin(angle / 2) ** 2 * np.cross(self.axis, across)
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class Translation(ReadOnly):
     """A translation by a vector.
 
@@ -115,7 +116,7 @@ class Translation(ReadOnly):
     vector: Float[np.ndarray, " 3"]
 
     def __init__(self, vector: ArrayLike) -> None:
-        object.__setattr__(self, "vector", freeze(as_vector(vector, "vector")))
+        vars(self).update(vector=freeze(as_vector(vector, "vector")))
 
     @property
     def turn(self) -> Float[np.ndarray, " 3"]:

@@ -1,7 +1,6 @@
 """Regions of a shape: vertices given by a mask, indices, a box or a brush."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,8 +13,9 @@ from eigenshape._arrays import (
     ReadOnly,
     as_array,
     freeze,
-    positive_values,
+    positive_number,
     real_numbers,
+    record,
     whole_numbers,
 )
 from eigenshape._errors import InvalidParameterError
@@ -26,7 +26,7 @@ from eigenshape.geometry.distances.geodesic import geodesic_distances
 from eigenshape.geometry.mesh import TriangleMesh
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class BoxRegion(ReadOnly):
     """The vertices inside a box with sides parallel to the axes.
 
@@ -72,11 +72,10 @@ class BoxRegion(ReadOnly):
             raise InvalidParameterError(
                 f"low must lie below high; along axis {axis[0]} they are {below} and {above}."
             )
-        object.__setattr__(self, "low", freeze(corners[0]))
-        object.__setattr__(self, "high", freeze(corners[1]))
+        vars(self).update(low=freeze(corners[0]), high=freeze(corners[1]))
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class BrushRegion(ReadOnly):
     """The vertices within a geodesic distance of the vertex nearest to a point.
 
@@ -109,8 +108,9 @@ class BrushRegion(ReadOnly):
     radius: float
 
     def __init__(self, center: ArrayLike, radius: float) -> None:
-        object.__setattr__(self, "center", freeze(as_vector(center, "center")))
-        object.__setattr__(self, "radius", float(positive_values(radius, "radius")[0]))
+        vars(self).update(
+            center=freeze(as_vector(center, "center")), radius=positive_number(radius, "radius")
+        )
 
 
 Region = TypeAliasType("Region", BoxRegion | BrushRegion | np.ndarray | Iterable[int])

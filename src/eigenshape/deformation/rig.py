@@ -1,6 +1,6 @@
 """A rig: what is computed once for a shape, so that it can be deformed many times."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -8,10 +8,9 @@ from jaxtyping import Float, Int
 from scipy.linalg import cho_solve
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
@@ -27,7 +26,7 @@ from eigenshape.spectral.spectrum import Spectrum
 N_MODES = 300
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class EigenRig(ReadOnly):
     """A shape, its lowest modes and the matrices that deformation needs.
 
@@ -66,8 +65,6 @@ class EigenRig(ReadOnly):
     areas: Float[np.ndarray, " n"]
     factor: Float[np.ndarray, "k k"]
     edges: EdgeWeights
-
-    __repr__ = short_repr
 
     @property
     def n_modes(self) -> int:

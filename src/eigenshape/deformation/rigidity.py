@@ -1,13 +1,14 @@
 """As-rigid-as-possible deformation: local fits of rotations and global solves, alternating."""
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._arrays import record
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
@@ -31,7 +32,7 @@ LEAST_WEIGHT = 1e-3
 PARALLEL_CHANGES = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class EdgeWeights:
     """Weights w of the edges in the rigidity energy (Sorkine and Alexa 2007).
 
@@ -55,7 +56,7 @@ class EdgeWeights:
     weights: Float[np.ndarray, " e"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FreePart:
     """The free vertices and their equations.
 

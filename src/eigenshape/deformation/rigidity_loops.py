@@ -1,7 +1,5 @@
 """Compiled loops of `rigidity`: the best rotation at each vertex, and the rotated edges."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -20,7 +18,6 @@ HALFWAY = 3.0
 
 
 @njit
-@no_type_check
 def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
     """Update the rotations of some vertices so that they fit the posed edges best.
 
@@ -56,7 +53,6 @@ def fit_rotations(vertices, starts, others, weights, rest, posed, turns):
 
 
 @njit
-@no_type_check
 def _settle(covariance, turns, i):
     """Maximize by Newton steps, or by safe steps where it is not concave; return the maximum."""
     w, x, y, z = turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3]
@@ -125,7 +121,6 @@ def _settle(covariance, turns, i):
 
 
 @njit
-@no_type_check
 def turn_edges(vertices, starts, others, weights, rest, turns, sums):
     """Write Σ_j w_ij ((R_i + R_j)/2 - 1) (x_i - x_j) to `sums` for some vertices."""
     n = len(turns)

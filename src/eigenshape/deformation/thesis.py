@@ -1,15 +1,13 @@
 """Eigen deformation of the thesis (6.2, 6.3): a skeleton that handles move, and its details in frames."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly
-from eigenshape._text import short_repr
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset, require_handles
@@ -28,7 +26,7 @@ Points = Float[np.ndarray, "n 3"]
 Details = Literal["blended", "frames", "handle"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SkeletonResponse(ReadOnly):
     """The eigen-skeleton, and how it responds to the motions of handles.
 
@@ -66,8 +64,6 @@ class SkeletonResponse(ReadOnly):
 
     skeleton: Float[np.ndarray, "n 3"]
     weights: Float[np.ndarray, "r n 4"]
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()
@@ -153,7 +149,7 @@ def move_skeleton(
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FramedDetails:
     """Details of a shape on a skeleton, in the local frames of the skeleton.
 
@@ -242,7 +238,7 @@ def _local_frames(
     return np.stack([normals, along, np.cross(normals, along)], axis=1), has_frame
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class DetailedSkeleton(ReadOnly):
     """An eigen-skeleton that handles can move, and the details of the shape on it.
 
@@ -281,8 +277,6 @@ class DetailedSkeleton(ReadOnly):
     fine: Points
     first: FramedDetails
     second: FramedDetails
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()

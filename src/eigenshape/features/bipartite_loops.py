@@ -1,14 +1,11 @@
 """Compiled loops of a maximum matching (Hopcroft and Karp 1973)."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
 
 
 @njit
-@no_type_check
 def match_rows(starts, columns, n_columns, first):
     """Match as many rows as possible with a column each.
 
@@ -38,7 +35,6 @@ def match_rows(starts, columns, n_columns, first):
 
 
 @njit
-@no_type_check
 def _layer(starts, columns, row_of, column_of, depth, queue):
     """Fill the distance of each row from a free row; return whether a free column is reached.
 
@@ -69,7 +65,6 @@ def _layer(starts, columns, row_of, column_of, depth, queue):
 
 
 @njit
-@no_type_check
 def _augment(free, columns, starts, row_of, column_of, depth, following, path):
     """Find a path through the layers from a free row to a free column, and flip its edges."""
     height = 1

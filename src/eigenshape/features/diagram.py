@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, vertex_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 from eigenshape._typing import ArrayLike
 from eigenshape.features.least_matching import least_distance, least_perfect
 from eigenshape.features.loops import extended_loops
@@ -50,8 +50,6 @@ class PersistencePairs(ReadOnly):
     births: Float[np.ndarray, " p"]
     deaths: Float[np.ndarray, " p"]
 
-    __repr__ = short_repr
-
     @property
     def persistence(self) -> Float[np.ndarray, " p"]:
         """|birth - death|, in the function's unit."""
@@ -59,7 +57,7 @@ class PersistencePairs(ReadOnly):
 
 
 @dataclass(frozen=True, eq=False)
-class PersistenceDiagram:
+class PersistenceDiagram(Shown):
     """Persistence of a function on a shape, in dimension 0, and its essential loops.
 
     Attributes
@@ -99,9 +97,6 @@ class PersistenceDiagram:
     minima: PersistencePairs
     components: PersistencePairs
     loops: PersistencePairs | None
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def persistence_diagram(

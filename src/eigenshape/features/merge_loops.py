@@ -6,15 +6,12 @@ few sides at one vertex must be sorted. The caller allocates all arrays: compili
 takes longer than compiling a small loop.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
 
 
 @njit
-@no_type_check
 def find_corners(faces, rank, corners):
     """Fill the ranks of each face's corners, highest first."""
     for face in range(len(faces)):
@@ -29,7 +26,6 @@ def find_corners(faces, rank, corners):
 
 
 @njit
-@no_type_check
 def file_sides(corners, place, lower, owner):
     """Group the three sides of each face by their higher vertex.
 
@@ -47,7 +43,6 @@ def file_sides(corners, place, lower, owner):
 
 
 @njit
-@no_type_check
 def join_faces(corners, starts, lower, owner, climbs_to, highest, ended):
     """Join faces across edges in falling order; return the number of basins that end.
 
@@ -88,7 +83,6 @@ def join_faces(corners, starts, lower, owner, climbs_to, highest, ended):
 
 
 @njit
-@no_type_check
 def _is_lower(corners, one, two):
     """Return whether a face precedes another by highest, middle and lowest vertex, then number."""
     for corner in range(3):
@@ -98,7 +92,6 @@ def _is_lower(corners, one, two):
 
 
 @njit
-@no_type_check
 def _sort_sides(corners, lower, owner, first, end):
     """Sort the sides of a vertex by falling lower vertex; equal ones by rising face.
 
@@ -123,7 +116,6 @@ def _sort_sides(corners, lower, owner, first, end):
 
 
 @njit
-@no_type_check
 def join_points(starts, neighbors, order):
     """Add points in the given order, and join each to its neighbors that are already there.
 
@@ -155,7 +147,6 @@ def join_points(starts, neighbors, order):
 
 
 @njit
-@no_type_check
 def spanning_forest(ends, order, n):
     """Return, for each edge, whether it joins two components when edges are added in order."""
     root = np.arange(n)
@@ -169,7 +160,6 @@ def spanning_forest(ends, order, n):
 
 
 @njit
-@no_type_check
 def find_root(root, point):
     """Return the root of a point's tree, with path halving (Tarjan and van Leeuwen 1984)."""
     while root[point] != point:

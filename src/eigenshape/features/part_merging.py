@@ -1,6 +1,7 @@
 """Part tree of a surface: its parts, merged in the order in which diffusion equalizes them."""
 
 from collections.abc import Callable
+from functools import partial
 from heapq import heapify, heappop, heappush
 
 import numpy as np
@@ -99,9 +100,7 @@ def part_tree(mesh: MeshLike, spectrum: Spectrum, *, time: float = PART_TIME) ->
         weight = areas[one] * areas[two] / (areas[one] + areas[two])
         return float(weight * np.square(means[one] - means[two]).sum())
 
-    def join(remains: int, ends: int) -> None:
-        join_means(areas, means, remains, ends)
-
+    join = partial(join_means, areas, means)
     adjacent = adjacent_parts(mesh, seeds.labels)
     return tree_of_merges(seeds, merge_cheapest(adjacent, seeds.features.values, price, join))
 

@@ -7,7 +7,6 @@ from jaxtyping import Float
 
 from eigenshape._arrays import ReadOnly, finite_values, whole_number
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape.features.boundaries import CONCAVITY, move_boundaries, smooth_boundaries
 from eigenshape.features.contrast import FINE_CONTRAST, contrast_at
 from eigenshape.features.part_contrast import weigh_parts
@@ -70,8 +69,6 @@ class PartDecomposition(ReadOnly):
     tree: PartTree
     fine: Segmentation
     parts: Segmentation
-
-    __repr__ = short_repr
 
 
 def find_parts(

@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arrays import ReadOnly
-from eigenshape._text import short_repr
 from eigenshape.geometry.facet_lists import label_components
 
 
@@ -67,8 +66,6 @@ class MergeTree(RegionTree):
 
     saddles: Int[np.ndarray, "m 2"]
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True, eq=False)
 class PartTree(RegionTree):
@@ -111,8 +108,6 @@ class PartTree(RegionTree):
     >>> whole.labels.shape == (two_balls.n_faces,)
     True
     """
-
-    __repr__ = short_repr
 
 
 def number_regions(

@@ -8,7 +8,6 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.topology import edge_table, face_pairs
@@ -47,8 +46,6 @@ class FeaturePoints(ReadOnly):
     values: Float[np.ndarray, " m"]
     persistence: Float[np.ndarray, " m"]
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True, eq=False)
 class Segmentation(ReadOnly):
@@ -77,8 +74,6 @@ class Segmentation(ReadOnly):
 
     labels: Int[np.ndarray, " f"]
     features: FeaturePoints
-
-    __repr__ = short_repr
 
 
 def segment(
@@ -150,7 +145,11 @@ def segment(
         # The last region of a component has no parent, so it stays whatever the number.
         ends = (np.arange(len(tree.maxima)) >= count) & (tree.parent >= 0)
     else:
-        least = _above_largest_gap(tree) if persistence is None else persistence
+        least = persistence
+        if least is None:  # just above the largest gap; all stay if none is finite
+            finite = tree.persistence[tree.parent >= 0]
+            gaps = finite - np.append(finite[1:], 0.0)
+            least = float(finite[np.argmax(gaps)]) if len(finite) else float(np.inf)
         if not least >= 0:
             raise InvalidParameterError(f"persistence must be at least 0; it is {least}.")
         ends = tree.persistence < least
@@ -163,14 +162,6 @@ def segment(
         persistence=tree.persistence[kept],
     )
     return Segmentation(np.searchsorted(kept, regions), features)
-
-
-def _above_largest_gap(tree: Tree) -> float:
-    """Return the persistence just above the largest gap, or infinity if all are infinite."""
-    finite = tree.persistence[tree.parent >= 0]
-    if not len(finite):
-        return float(np.inf)
-    return float(finite[np.argmax(finite - np.append(finite[1:], 0.0))])
 
 
 def adjacent_parts(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> Int[np.ndarray, "p 2"]:

@@ -29,6 +29,8 @@ from .measure import vertex_normals as vertex_normals
 from .mesh import TriangleMesh as TriangleMesh
 from .normalize import normalize_mesh as normalize_mesh
 from .orientation import orient_outward as orient_outward
+from .repairs.masks import mask_surface as mask_surface
+from .repairs.masks import unmask as unmask
 from .repairs.repair import repair as repair
 from .repairs.repair import suggest_repairs as suggest_repairs
 from .repairs.repair_report import RepairedCloud as RepairedCloud

@@ -1,18 +1,16 @@
 """Point clouds: points that sample a manifold of known dimension."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, record, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.simplicial import Mesh
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class PointCloud(ReadOnly):
     """Points in R^d that sample a manifold of dimension m.
 
@@ -49,8 +47,9 @@ class PointCloud(ReadOnly):
         coordinates = finite_rows(points, "points")
         if not coordinates.size:
             raise InvalidShapeError("A point cloud must have points; it has none.")
-        object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
-        object.__setattr__(self, "points", freeze(coordinates))
+        vars(self).update(
+            dim=whole_number(dim, "dim", 1, coordinates.shape[1]), points=freeze(coordinates)
+        )
 
     @property
     def n_points(self) -> int:

@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import attribute_of, describe_value
+from eigenshape._arguments import attribute_of, describe_value, require_choice
 from eigenshape._arrays import as_array
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
@@ -255,8 +255,8 @@ def from_arrays(
     >>> es.geometry.from_arrays(square, [[0, 1, 2, 3]], cells="quads")
     TriangleMesh(4 vertices, 2 faces)
     """
-    if cells not in (None, "tetrahedra", "quads"):
-        raise InvalidParameterError(f"cells must be 'tetrahedra' or 'quads'; it is {cells!r}.")
+    if cells is not None:
+        require_choice(cells, Cells, "cells")
     if simplices is None:
         return PointCloud(points, dim)
     corners = _width(simplices)

@@ -1,14 +1,11 @@
 """Curvature of a mesh: Gaussian by the angles around its vertices, principal by fitted polynomials."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import scale_to_unit, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -99,7 +96,7 @@ def gaussian_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     return angle_defects(mesh) / dual_volumes(mesh)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PrincipalCurvatures(ReadOnly):
     """The principal curvatures of a surface at its vertices, and their directions.
 
@@ -126,8 +123,6 @@ class PrincipalCurvatures(ReadOnly):
 
     values: Float[np.ndarray, "n 2"]
     directions: Float[np.ndarray, "n 2 3"]
-
-    __repr__ = short_repr
 
     @property
     def mean(self) -> Float[np.ndarray, " n"]:

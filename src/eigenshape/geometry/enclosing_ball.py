@@ -1,14 +1,12 @@
 """The smallest ball around given points."""
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, finite_rows
+from eigenshape._arrays import ReadOnly, finite_rows, record
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 
@@ -16,7 +14,7 @@ Points = Float[np.ndarray, "n d"]
 Support = list[int]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class EnclosingBall(ReadOnly):
     """A ball in R^d, as found by `enclosing_ball`.
 
@@ -36,8 +34,6 @@ class EnclosingBall(ReadOnly):
 
     center: Float[np.ndarray, " d"]
     radius: float
-
-    __repr__ = short_repr
 
 
 def enclosing_ball(points: ArrayLike) -> EnclosingBall:
@@ -79,28 +75,20 @@ def enclosing_ball(points: ArrayLike) -> EnclosingBall:
     unit, scale = size_one(rows)
     middle = (unit.min(axis=0) + unit.max(axis=0)) / 2
     unit, inner = size_one(unit - middle)
-    center = _center(unit)
-    radius = np.sqrt(((unit - center) ** 2).sum(axis=1).max())
-    return EnclosingBall(scale * (middle + inner * center), float(scale * inner * radius))
-
-
-def _center(points: Points) -> Float[np.ndarray, " d"]:
-    dim = points.shape[1]
-    support, center, value = [0], points[0], 0.0
-    while True:
-        far = int(((points - center) ** 2).sum(axis=1).argmax())
-        if far in support:
-            return center
+    support, center, value = [0], unit[0], 0.0
+    while (far := int(((unit - center) ** 2).sum(axis=1).argmax())) not in support:
         # The new ball touches the far point and at most d points of the old support.
         candidates = [
-            _circumscribed_ball(points, [*subset, far])
-            for size in range(min(dim, len(support)) + 1)
+            _circumscribed_ball(unit, [*subset, far])
+            for size in range(min(unit.shape[1], len(support)) + 1)
             for subset in combinations(support, size)
         ]
         grown = max(candidates, key=lambda ball: ball[0])
         if grown[0] <= value:  # the far point is outside by rounding only
-            return center
+            break
         value, center, support = grown
+    radius = np.sqrt(((unit - center) ** 2).sum(axis=1).max())
+    return EnclosingBall(scale * (middle + inner * center), float(scale * inner * radius))
 
 
 def _circumscribed_ball(

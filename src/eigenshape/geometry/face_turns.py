@@ -1,12 +1,11 @@
 """Whether the faces of a mesh are turned alike, and which to turn over so that they are."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._arrays import record
 from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, half_edges
@@ -28,7 +27,7 @@ def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
     return table.edges[(table.n_faces == 2) & (n_forward != 1)]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FaceTurns:
     """Which faces to turn over so that neighbors agree.
 
@@ -69,7 +68,7 @@ def face_turns(mesh: TriangleMesh) -> FaceTurns:
     return FaceTurns(turned, np.minimum(as_is, over), as_is != over)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Neighbors:
     """Pairs of faces that share an edge without a third face.
 

@@ -1,6 +1,5 @@
 """The facets of simplices without duplicates, and where each simplex has them."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,15 +7,14 @@ import scipy.sparse as sp
 from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import ReadOnly
-from eigenshape._text import short_repr
+from eigenshape._arrays import ReadOnly, record
 
 # The corners of a facet are packed into one integer while that stays below this bound: sorting
 # integers is several times as fast as sorting rows.
 PACKED_BELOW = 2**63
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FacetTable(ReadOnly):
     """The facets of a mesh without duplicates, and where each simplex has them.
 
@@ -46,8 +44,6 @@ class FacetTable(ReadOnly):
     facets: Int[np.ndarray, "q m"]
     simplex_facets: Int[np.ndarray, "s corners"]
     n_simplices: Int[np.ndarray, " q"]
-
-    __repr__ = short_repr
 
     @property
     def boundary(self) -> Int[np.ndarray, " b"]:

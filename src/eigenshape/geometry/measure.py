@@ -28,6 +28,11 @@ def area_vectors(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 3"
     return 0.5 * np.cross(b - a, c - a)
 
 
+def triangle_areas(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, " f"]:
+    """Return the area of each triangle, in the unit of its corners."""
+    return np.linalg.norm(area_vectors(corners), axis=1)
+
+
 def face_areas(mesh: MeshLike) -> Float[np.ndarray, " f"]:
     """Compute the area of each face.
 
@@ -54,7 +59,7 @@ def face_areas(mesh: MeshLike) -> Float[np.ndarray, " f"]:
     """
     mesh = as_mesh(mesh)
     corners, scale = scaled_corners(mesh)
-    return in_length(np.linalg.norm(area_vectors(corners), axis=1), scale, 2)
+    return in_length(triangle_areas(corners), scale, 2)
 
 
 def surface_area(mesh: MeshLike) -> float:

@@ -1,18 +1,17 @@
 """Triangle meshes: arrays that are checked once and then read-only."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows, record
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_without_facets
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class TriangleMesh(ReadOnly):
     """A triangle mesh in R³.
 
@@ -64,8 +63,7 @@ class TriangleMesh(ReadOnly):
                 f"A mesh must have faces; it has {len(points)} vertices and no face. "
                 "Use PointCloud for points without faces."
             )
-        object.__setattr__(self, "vertices", freeze(points))
-        object.__setattr__(self, "faces", freeze(corners))
+        vars(self).update(vertices=freeze(points), faces=freeze(corners))
 
     @property
     def n_vertices(self) -> int:

@@ -1,14 +1,15 @@
 """Scaling of meshes to size 1."""
 
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import cdist
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._arguments import require_choice
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, scale_to_unit
+from eigenshape.geometry.measure import scale_to_unit, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
 
@@ -49,13 +50,14 @@ def normalize_mesh(mesh: MeshLike, measure: Measure) -> TriangleMesh:
     [0.3, 0.4, 0.0]
     """
     mesh = as_mesh(mesh)
+    require_choice(measure, Measure, "measure")
     points, _ = scale_to_unit(mesh)
     if measure == "box":
         size = float(np.ptp(points, axis=0).max())
     elif measure == "area":
         sound = np.delete(mesh.faces, degenerate_simplices(mesh), axis=0)
-        size = float(np.linalg.norm(area_vectors(points[sound]), axis=1).sum()) ** 0.5
-    elif measure == "diameter":
+        size = float(triangle_areas(points[sound]).sum()) ** 0.5
+    else:
         # The ends of a diameter are corners of the convex hull: of the space, of a plane, or of a line.
         axes = np.linalg.svd(points, full_matrices=False)[2]
         along = points @ axes[0]
@@ -69,10 +71,6 @@ def normalize_mesh(mesh: MeshLike, measure: Measure) -> TriangleMesh:
         # All points of a sphere lie on its hull, so distances are computed for a thousand at a time.
         blocks = np.split(corners, range(1000, len(corners), 1000))
         size = max(float(cdist(rows, corners).max()) for rows in blocks)
-    else:
-        raise InvalidParameterError(
-            f"measure must be one of {', '.join(get_args(Measure))}; it is {measure!r}."
-        )
     if not size > 0:
         raise InvalidShapeError(
             "A mesh must have a size above zero to be normalized; "

@@ -7,7 +7,7 @@ from scipy.spatial import ConvexHull, QhullError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import face_turns, turn_faces
-from eigenshape.geometry.measure import area_vectors, enclosed_volume, mean_normals, scale_to_unit
+from eigenshape.geometry.measure import enclosed_volume, mean_normals, scale_to_unit, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.simplices import scaled_corners, size_one
@@ -72,7 +72,7 @@ def outward_vote(mesh: TriangleMesh) -> float:
         hull = ConvexHull(points)
     except QhullError:
         return 0.0
-    areas = np.linalg.norm(area_vectors(points[hull.simplices]), axis=1)
+    areas = triangle_areas(points[hull.simplices])
     means = mean_normals(mesh)[hull.simplices].mean(axis=1)
     return float(areas @ np.einsum("fi,fi->f", means, hull.equations[:, :3]) / areas.sum())
 
@@ -141,7 +141,7 @@ def _faces_in(
         local, _ = size_one(faces - faces.mean(axis=(0, 1)))
         a, b, c = local.transpose(1, 0, 2)
         volume = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6
-        area = float(np.linalg.norm(area_vectors(local), axis=1).sum())
+        area = float(triangle_areas(local).sum())
         inward[number] = area > 0 and volume / area**1.5 < -NEGLIGIBLE_VOLUME
     if not inward.any() or len(pieces) == 1:
         return inward

@@ -4,7 +4,7 @@ from itertools import combinations
 from math import factorial
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -255,6 +255,25 @@ def require_span(points: Float[np.ndarray, "n d"], dim: int, noun: str) -> None:
                 f"{noun} must span {dim} dimensions; "
                 f"all {len(points)} lie {flat} through point 0, {points[0].tolist()}."
             )
+
+
+def cut_tetrahedra(
+    corners: Int[np.ndarray, "t 4"], inside: Bool[np.ndarray, "t 4"]
+) -> Int[np.ndarray, "q 3 2"]:
+    """Return the triangles that part the inner corners of tetrahedra from the others.
+
+    Each corner of a triangle is given by the edge that it lies on, the inner end first. A lone
+    corner is cut off by a triangle; two and two are parted by a quadrilateral, cut along a diagonal.
+    """
+    order = np.argsort(~inside, axis=1, kind="stable")
+    ordered, n_inside = np.take_along_axis(corners, order, axis=1), inside.sum(axis=1)
+    cuts = [
+        (1, [(0, 1), (0, 2), (0, 3)]),
+        (3, [(0, 3), (1, 3), (2, 3)]),
+        (2, [(0, 2), (0, 3), (1, 3)]),
+        (2, [(0, 2), (1, 3), (1, 2)]),
+    ]
+    return np.concatenate([ordered[n_inside == count][:, cut] for count, cut in cuts])
 
 
 def require_volumes(mesh: Mesh) -> None:

@@ -1,20 +1,19 @@
 """Simplicial meshes of any dimension: arrays that are checked once and then read-only."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 from typing_extensions import TypeAliasType
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows, record
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_without_facets
 from eigenshape.geometry.mesh import TriangleMesh
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class SimplicialMesh(ReadOnly):
     """A mesh of m-simplices in R^d: segments, triangles, tetrahedra and so on.
 
@@ -67,8 +66,7 @@ class SimplicialMesh(ReadOnly):
                 f"Simplices in R^{ambient} must have dimension 1..{ambient}; "
                 f"these have {dim + 1} corners, which is dimension {dim}."
             )
-        object.__setattr__(self, "points", freeze(coordinates))
-        object.__setattr__(self, "simplices", freeze(corners))
+        vars(self).update(points=freeze(coordinates), simplices=freeze(corners))
 
     @property
     def n_points(self) -> int:

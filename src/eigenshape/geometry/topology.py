@@ -1,14 +1,11 @@
 """Connectivity of meshes: edges, boundaries, components, manifoldness, parts and unions."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
-from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.facet_lists import label_components, shared_facets
 from eigenshape.geometry.facets import boundary_facets, corner_fans, facet_table
@@ -19,7 +16,7 @@ from eigenshape.geometry.simplicial import Mesh
 HASH_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class EdgeTable(ReadOnly):
     """The edges of a triangle mesh without duplicates, and the edges of each face.
 
@@ -48,8 +45,6 @@ class EdgeTable(ReadOnly):
     edges: Int[np.ndarray, "e 2"]
     face_edges: Int[np.ndarray, "f 3"]
     n_faces: Int[np.ndarray, " e"]
-
-    __repr__ = short_repr
 
 
 def edge_table(mesh: MeshLike) -> EdgeTable:
@@ -313,27 +308,21 @@ def boundary_loops(mesh: MeshLike) -> list[Int[np.ndarray, " k"]]:
     loops: list[Int[np.ndarray, " k"]] = []
     for first in sorted(leaving):
         while leaving[first]:
-            loops += [np.array(loop, dtype=np.int64) for loop in _walks(leaving, first)]
+            # Follow unused edges, and cut off a loop whenever the path meets itself. The last walk is
+            # open if the path does not return.
+            path, place = [first], {first: 0}
+            while leaving.get(path[-1]):
+                end = leaving[path[-1]].pop()
+                if end in place:
+                    loops.append(np.array(path[place[end] :], dtype=np.int64))
+                    for vertex in path[place[end] + 1 :]:
+                        del place[vertex]
+                    del path[place[end] + 1 :]
+                else:
+                    place[end] = len(path)
+                    path.append(end)
+            loops += [np.array(path, dtype=np.int64)] if len(path) > 1 else []
     return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
-
-
-def _walks(leaving: dict[int, list[int]], first: int) -> list[list[int]]:
-    """Follow unused edges from a vertex, and cut off a loop whenever the path meets itself.
-
-    The edges are removed from `leaving`. The last walk is open if the path does not return.
-    """
-    loops, path, place = [], [first], {first: 0}
-    while leaving.get(path[-1]):
-        end = leaving[path[-1]].pop()
-        if end in place:
-            loops.append(path[place[end] :])
-            for vertex in path[place[end] + 1 :]:
-                del place[vertex]
-            del path[place[end] + 1 :]
-        else:
-            place[end] = len(path)
-            path.append(end)
-    return [*loops, path] if len(path) > 1 else loops
 
 
 def non_manifold_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:

@@ -5,10 +5,10 @@ from .bridges import from_trimesh as from_trimesh
 from .bridges import to_pyvista as to_pyvista
 from .bridges import to_trimesh as to_trimesh
 from .carrying import carry_attributes as carry_attributes
-from .edits import read_edits as read_edits
-from .edits import write_edits as write_edits
-from .fields import read_fields as read_fields
-from .fields import write_fields as write_fields
+from .edit_files import read_edits as read_edits
+from .edit_files import write_edits as write_edits
+from .field_files import read_fields as read_fields
+from .field_files import write_fields as write_fields
 from .folders import find_items as find_items
 from .formats.registry import MESH_FORMATS as MESH_FORMATS
 from .formats.registry import SHAPE_FORMATS as SHAPE_FORMATS
@@ -17,7 +17,9 @@ from .labeled_shapes import read_labeled_shape as read_labeled_shape
 from .labeled_shapes import read_labeled_shapes as read_labeled_shapes
 from .mesh_files import read_mesh as read_mesh
 from .mesh_files import write_mesh as write_mesh
+from .parcellations import read_parcellation as read_parcellation
+from .parcellations import write_parcellation as write_parcellation
 from .shape_files import read_points as read_points
 from .shape_files import read_shape as read_shape
 from .shape_files import write_points as write_points
-from .surfaces import read_surface as read_surface
+from .surface_files import read_surface as read_surface

@@ -9,16 +9,16 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy.sparse import csr_array, eye_array
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape._files import as_path, read_regular
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import html_repr
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.registry import suffix_of
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SourceFile:
     """A file as it was read, of which a file of the same format is made again."""
 
@@ -75,7 +75,7 @@ class Material:
     _repr_html_ = html_repr
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MeshAttributes(ReadOnly):
     r"""What a mesh file holds besides positions and faces.
 
@@ -134,8 +134,6 @@ class MeshAttributes(ReadOnly):
     others: tuple[str, ...] = ()
     source: SourceFile | None = None
 
-    __repr__ = short_repr
-
     @property
     def from_file(self) -> Bool[np.ndarray, " f"]:
         """Whether each face is one of the file: each of its corners is one of the same face."""
@@ -158,7 +156,7 @@ class MeshAttributes(ReadOnly):
         }
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class WriteJob:
     """A mesh to write with its attributes, and a list of what the file does not keep."""
 

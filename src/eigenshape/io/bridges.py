@@ -12,6 +12,7 @@ from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
+from eigenshape.io.formats.cells import CellLists
 
 VTK_CELLS = {1: 3, 2: 5, 3: 10}  # VTK's numbers for segment, triangle and tetrahedron
 POINTS, LINES = (
@@ -141,7 +142,7 @@ def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
     points = np.asarray(grid.points, dtype=np.float64)
     kinds = np.asarray(grid.celltypes)
     starts = np.asarray(pyvista.convert_array(grid.GetCells().GetOffsetsArray()), dtype=np.int64)
-    corners = np.asarray(grid.cell_connectivity, dtype=np.int64)
+    lists = CellLists(starts, np.asarray(grid.cell_connectivity, dtype=np.int64))
     others = np.setdiff1d(kinds, [*POINTS, *LINES, *VTK_CELLS.values()])
     if others.size:
         count = np.count_nonzero(kinds == others[0])
@@ -149,17 +150,13 @@ def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
             f"Cells must be simplices; {count} are of VTK's type {others[0]}. Triangulate them first."
         )
     for dim_of_cells in (3, 2):
-        at = starts[:-1][kinds == VTK_CELLS[dim_of_cells]]
+        at = np.flatnonzero(kinds == VTK_CELLS[dim_of_cells])
         if at.size:
-            cells = corners[at[:, None] + np.arange(dim_of_cells + 1)]
+            cells = lists.rows(at, dim_of_cells + 1)
             return (
                 TriangleMesh(points, cells) if dim_of_cells == 2 else SimplicialMesh(points, cells)
             )
-    # The pairs of successive points of segments and polylines
-    sizes = np.diff(starts)
-    cell = np.repeat(np.arange(len(sizes)), sizes)
-    chained = (cell[1:] == cell[:-1]) & np.isin(kinds, LINES)[cell[1:]]
-    segments = np.column_stack([corners[:-1][chained], corners[1:][chained]])
+    segments = lists.pairs(np.flatnonzero(np.isin(kinds, LINES)))
     return SimplicialMesh(points, segments) if segments.size else PointCloud(points, dim)
 
 

@@ -15,7 +15,7 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape._workers import Item
-from eigenshape.io.formats.registry import POINT_FORMATS, SHAPE_FORMATS
+from eigenshape.io.formats.registry import POINT_FORMATS, SHAPE_FORMATS, suffix_in
 from eigenshape.retrieval.store.damage import StoreWarning
 
 NAME, LABEL, TAGS = "name", "label", "tags"  # columns of a table of labels; others are attributes
@@ -110,7 +110,7 @@ def _items_of(source: Path) -> Iterator[Item]:
         source.stat()
         yield Item(source.stem, source)
         return
-    known = sorted(path for path in _files_below(source) if path.suffix.lower() in SHAPE_FORMATS)
+    known = sorted(path for path in _files_below(source) if suffix_in(path.name) in SHAPE_FORMATS)
     meshes = {path.with_suffix("") for path in known if path.suffix.lower() not in POINT_FORMATS}
     paths = [
         path

@@ -9,9 +9,9 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import as_path, read_regular, replace_file
+from eigenshape.io.formats.numbers import INT64, Line, lines_of, quote_line, whole, whole_table
 from eigenshape.io.formats.ply import parse_labels
 from eigenshape.io.formats.registry import MESH_FORMATS
-from eigenshape.io.formats.text import INT64, Line, lines_of, quote_line, whole, whole_table
 from eigenshape.io.mesh_files import read_mesh
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 

@@ -23,7 +23,7 @@ from eigenshape.io.attributes import (
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.fields import format_fields, read_field_attributes
+from eigenshape.io.field_files import format_fields, read_field_attributes
 from eigenshape.io.formats.cells import SEGMENTS, require_kind, select_cells, split_sentence
 from eigenshape.io.formats.registry import (
     MESH_FORMATS,
@@ -75,6 +75,7 @@ def read_mesh(
     ----------
     path : str or Path
         A file of a format in `eigenshape.io.MESH_FORMATS`, such as .off, .obj, .ply, .stl or .glb.
+        A surface of FreeSurfer, such as lh.pial, is recognized by its first bytes.
     file_format : str, optional
         Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
     cells : {"triangles", "quads", "tetrahedra"}, optional
@@ -85,7 +86,7 @@ def read_mesh(
         raise an error.
     attributes : bool
         Whether to return also what the file holds besides: texture coordinates, materials, images,
-        colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTK and NPZ files hold such content.
+        colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTK, NPZ and GIFTI files hold such content.
 
     Returns
     -------
@@ -271,7 +272,8 @@ def write_mesh(
     """Write a mesh to a file, in the format of its suffix.
 
     The file appears complete or not at all. `read_mesh` reads OFF, OBJ and PLY back exactly. STL
-    stores triangles without shared vertices; GLB and binary STL store single precision.
+    stores triangles without shared vertices; GLB, binary STL, GIFTI and FreeSurfer (.surf, or a name
+    such as lh.pial) store single precision.
 
     Parameters
     ----------

@@ -36,7 +36,12 @@ def assign_far_points(
     """
     if len(part.points) < N_FAR:
         return []
-    far = _far_points(part)
+    # Points that are far from each other and, if possible, from the rim
+    inside = part.weights.min(axis=1).astype(np.float64)
+    found = [int((inside * part.between.mean(axis=1)).argmax())]
+    while len(found) < N_FAR:
+        found.append(int((inside * part.between[found].min(axis=0)).argmax()))
+    far = np.array(found)
     # In each cell of the whole, each far point has one candidate: the most similar point.
     cell = whole.between[:, :N_PLACES].argmin(axis=1)
     order = np.lexsort((costs[far], np.broadcast_to(cell, (len(far), len(cell)))), axis=1)
@@ -73,18 +78,14 @@ def assign_far_points(
         sums = np.hstack([sums[old] + for_old[old, :, one], for_new[old, one][:, None]])
         chosen = np.hstack([chosen[old], new[one][:, None]])
         cost, kind = costs_now[old, one], kinds
-    return [
-        Pairs(far, ends, np.ones(len(far))) for ends in _different(whole, partners.ravel()[chosen])
-    ]
-
-
-def _far_points(part: Surface) -> Int[np.ndarray, " f"]:
-    """Return points of a part that are far from each other and, if possible, from its rim."""
-    inside = part.weights.min(axis=1).astype(np.float64)
-    found = [int((inside * part.between.mean(axis=1)).argmax())]
-    while len(found) < N_FAR:
-        found.append(int((inside * part.between[found].min(axis=0)).argmax()))
-    return np.array(found)
+    # The first assignments that differ from all that were taken before
+    different: list[Int[np.ndarray, " f"]] = []
+    for ends in partners.ravel()[chosen]:
+        if all((whole.between[ends, other] > APART).mean() > DIFFERENT for other in different):
+            different.append(ends)
+            if len(different) == N_ASSIGNMENTS:
+                break
+    return [Pairs(far, ends, np.ones(len(far))) for ends in different]
 
 
 def _best_of_kinds(
@@ -96,14 +97,3 @@ def _best_of_kinds(
     ranks = np.arange(len(order)) - np.searchsorted(sorted_kinds, sorted_kinds)
     kept = order[ranks < N_ALIKE]
     return kept[np.argsort(-worth[kept], kind="stable")]
-
-
-def _different(whole: Surface, images: Int[np.ndarray, "a f"]) -> list[Int[np.ndarray, " f"]]:
-    """Return the first images that differ from all that were taken before."""
-    found: list[Int[np.ndarray, " f"]] = []
-    for ends in images:
-        if all((whole.between[ends, other] > APART).mean() > DIFFERENT for other in found):
-            found.append(ends)
-            if len(found) == N_ASSIGNMENTS:
-                break
-    return found

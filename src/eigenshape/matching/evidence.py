@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.special import expit
 
-from eigenshape.geometry.measure import area_vectors, face_areas
+from eigenshape.geometry.measure import area_vectors, face_areas, triangle_areas
 from eigenshape.geometry.simplices import at_points
 from eigenshape.geometry.topology import edge_table, neighbor_links
 from eigenshape.matching.fitting import Fit
@@ -65,7 +65,7 @@ def signed_area_ratios(
 ) -> Float[np.ndarray, " f"]:
     """Return the signed ratio of areas of each face of the part, between -1 and 1."""
     faces = part.mesh.faces
-    areas = np.linalg.norm(area_vectors(part.mesh.vertices[faces]), axis=1)
+    areas = triangle_areas(part.mesh.vertices[faces])
     moved = area_vectors(whole.mesh.vertices[places[faces]])
     normals = whole.normals[places[faces]].sum(axis=1)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)

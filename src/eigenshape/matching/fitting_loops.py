@@ -1,7 +1,5 @@
 """Compiled loops of `fitting`: the pull on frames, and their turns."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -11,7 +9,6 @@ SMALLEST_TURN = 1e-4  # radians; the next round starts from there
 
 
 @njit
-@no_type_check
 def add_pulls(turns, carriers, portions, arms, pull, targets, right):
     """Add the pull of samples on the frames that carry them, in the current turns of the frames.
 
@@ -34,7 +31,6 @@ def add_pulls(turns, carriers, portions, arms, pull, targets, right):
 
 
 @njit
-@no_type_check
 def add_tensions(turns, one, two, arms, weight, right):
     """Add what edges between frames demand: minus `weight` times the arm in the mean turn."""
     for edge in range(len(one)):
@@ -47,7 +43,6 @@ def add_tensions(turns, one, two, arms, weight, right):
 
 
 @njit
-@no_type_check
 def turn_frames(places, one, two, arms, least, most, turns):
     """Turn each frame to follow its edges, and give it the size that fits them best.
 
@@ -80,7 +75,6 @@ def turn_frames(places, one, two, arms, least, most, turns):
 
 
 @njit
-@no_type_check
 def _nearest_rotation(product, turn):
     """Turn a rotation to the one nearest to a matrix, and return their inner product."""
     for _ in range(MOST_TURNS):

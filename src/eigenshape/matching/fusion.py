@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -65,8 +64,6 @@ class FusedScan(ReadOnly):
     scores: Float[np.ndarray, "k k"]
     source_scans: Int[np.ndarray, " n"]
     source_vertices: Int[np.ndarray, " n"]
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()

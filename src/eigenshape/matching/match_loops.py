@@ -1,14 +1,11 @@
 """Compiled loops of `matching`: agreement of pairs, points placed by distances, and nearest points of faces."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
 
 
 @njit
-@no_type_check
 def couple_pairs(points, images, part, whole, slack, least, longer, couplings):
     """Write how two pairs support each other: a complex number for each pair of pairs.
 
@@ -41,7 +38,6 @@ def couple_pairs(points, images, part, whole, slack, least, longer, couplings):
 
 
 @njit
-@no_type_check
 def nearest_rows(rows, count):
     """Return, for each column of a table, the rows of the least entries, the least first.
 
@@ -68,7 +64,6 @@ def nearest_rows(rows, count):
 
 
 @njit
-@no_type_check
 def place_by_distances(rows, partners, columns, near, starts, softness, cap, longer, misfits):
     """Return, for each point of a part, the vertex of the whole that keeps its distances best.
 
@@ -111,7 +106,6 @@ def place_by_distances(rows, partners, columns, near, starts, softness, cap, lon
 
 
 @njit
-@no_type_check
 def nearest_face_points(points, corners, faces, starts, around, places):
     """Return the face at a given vertex that comes nearest to each point, and the weights there.
 
@@ -152,7 +146,6 @@ def nearest_face_points(points, corners, faces, starts, around, places):
 
 
 @njit
-@no_type_check
 def _foot(one_one, one_two, two_two, one_point, two_point):
     """Return the place (s, t) in a triangle, s, t >= 0 and s + t <= 1, nearest to a point."""
     area = one_one * two_two - one_two * one_two

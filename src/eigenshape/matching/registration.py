@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, finite_rows
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -80,8 +79,6 @@ class Registration(ReadOnly):
     rotation: Float[np.ndarray, "3 3"]
     translation: Float[np.ndarray, " 3"]
     score: float
-
-    __repr__ = short_repr
 
     def move(self, points: ArrayLike) -> Float[np.ndarray, "n 3"]:
         """Return points of the first scan, placed on the second."""
@@ -229,24 +226,20 @@ def register_described(first: Scan, second: Scan) -> Registration:
     return replace(best, translation=away)
 
 
-def _pair_patches(first: Scan, second: Scan) -> Int[np.ndarray, "p 2"]:
-    """Pair each patch of either scan with those that are most like it, the most similar first."""
-    # Radii of patches are shares of the box, and lengths are the same on both scans.
-    step = np.log(first.size / second.size) / np.log(RADII[1] / RADII[0])
-    costs = squared_distances(first.points, second.points, int(np.clip(np.rint(step), -2, 2)))
+def _find_motions(first: Scan, second: Scan, unit: float) -> list[Registration]:
+    """Return motions that groups of agreeing pairs of patches give, the best supported first."""
+    # Pair each patch of either scan with those that are most like it, the most similar first. Radii
+    # of patches are shares of the box, and lengths are the same on both scans.
+    size_step = np.log(first.size / second.size) / np.log(RADII[1] / RADII[0])
+    costs = squared_distances(first.points, second.points, int(np.clip(np.rint(size_step), -2, 2)))
     m, n = costs.shape
     columns = np.argsort(costs, axis=1, kind="stable")[:, :N_CANDIDATES]
     rows = np.argsort(costs, axis=0, kind="stable")[:N_CANDIDATES]
-    ours = np.column_stack([np.repeat(np.arange(m), columns.shape[1]), columns.ravel()])
-    theirs = np.column_stack([rows.T.ravel(), np.repeat(np.arange(n), len(rows))])
-    pairs = np.unique(np.concatenate([ours, theirs]), axis=0)
+    forth = np.column_stack([np.repeat(np.arange(m), columns.shape[1]), columns.ravel()])
+    back = np.column_stack([rows.T.ravel(), np.repeat(np.arange(n), len(rows))])
+    pairs = np.unique(np.concatenate([forth, back]), axis=0)
     order = np.argsort(costs[pairs[:, 0], pairs[:, 1]], kind="stable")
-    return pairs[order[:MOST_CANDIDATES]]
-
-
-def _find_motions(first: Scan, second: Scan, unit: float) -> list[Registration]:
-    """Return motions that groups of agreeing pairs of patches give, the best supported first."""
-    pairs = _pair_patches(first, second)
+    pairs = pairs[order[:MOST_CANDIDATES]]
     ours, theirs = first.points.vertices[pairs[:, 0]], second.points.vertices[pairs[:, 1]]
     starts, ends = first.mesh.vertices[ours], second.mesh.vertices[theirs]
     start_normals, end_normals = first.normals[ours], second.normals[theirs]

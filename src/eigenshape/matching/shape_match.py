@@ -9,7 +9,6 @@ from numpy.typing import DTypeLike, NDArray
 
 from eigenshape._arrays import ReadOnly, as_array
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 
 
@@ -83,8 +82,6 @@ class ShapeMatch(ReadOnly):
     n_equally_good: int
     scale: float
     report: tuple[str, ...]
-
-    __repr__ = short_repr
 
     @property
     def n_vertices(self) -> int:

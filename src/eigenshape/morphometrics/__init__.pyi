@@ -2,3 +2,15 @@ from .landmark_files import read_landmarks as read_landmarks
 from .landmark_files import read_specimens as read_specimens
 from .landmark_files import write_landmarks as write_landmarks
 from .landmarks import Landmarks as Landmarks
+from .procrustes import ProcrustesFit as ProcrustesFit
+from .procrustes import fit_procrustes as fit_procrustes
+from .splines import warp_mesh as warp_mesh
+from .variation import Allometry as Allometry
+from .variation import GroupComparison as GroupComparison
+from .variation import PrincipalComponents as PrincipalComponents
+from .variation import SymmetricComponents as SymmetricComponents
+from .variation import compare_groups as compare_groups
+from .variation import estimate_missing as estimate_missing
+from .variation import fit_allometry as fit_allometry
+from .variation import principal_components as principal_components
+from .variation import symmetric_components as symmetric_components

@@ -3,9 +3,9 @@
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -21,7 +21,8 @@ SCHEMA = (
     "Schema/markups-schema-v1.0.3.json#"
 )
 # Slicer's coordinate systems, also as numbers of old .fcsv files. Meshes of Slicer are in LPS.
-TO_LPS = {"LPS": (1.0, 1.0), "1": (1.0, 1.0), "RAS": (-1.0, -1.0), "0": (-1.0, -1.0)}
+TURNED, AS_IT_IS = (-1.0, -1.0, 1.0), (1.0, 1.0, 1.0)
+TO_LPS = {"LPS": AS_IT_IS, "1": AS_IT_IS, "RAS": TURNED, "0": TURNED}
 FCSV_COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 # Slicer 5 adds two cells, which its header does not name: whether a point was placed, and how.
 STATUS_COLUMN = 14
@@ -147,7 +148,8 @@ def write_landmarks(landmarks: Landmarks | Mapping[str, Landmarks], path: str | 
         If the name ends otherwise.
     InvalidParameterError
         If the format holds one specimen and there are several, there is none, landmarks of
-        specimens differ, or the name of one is empty or holds a line break.
+        specimens differ, or the name of one is empty, holds a line break, or begins with [ where
+        that begins a section.
     OSError
         If the system cannot write there.
 
@@ -174,6 +176,10 @@ def write_landmarks(landmarks: Landmarks | Mapping[str, Landmarks], path: str | 
     require_same_names(landmarks)
     for specimen in landmarks:
         require_name(specimen, "The name of a specimen")
+        if suffix == ".txt" and specimen.startswith("["):
+            raise InvalidParameterError(
+                f"Names in files of Morphologika must not begin with [, as sections do; {specimen!r} does."
+            )
     if suffix in OF_ONE and len(landmarks) > 1:
         raise InvalidParameterError(
             f"A {suffix} file holds one specimen; there are {len(landmarks)}. Write one file for each."
@@ -208,24 +214,21 @@ def _lines(text: str) -> list[str]:
     return [line.strip() for line in text.splitlines()]
 
 
-def _rows(lines: Sequence[str]) -> list[list[float]]:
-    """Return three numbers of each line."""
-    rows = [[_number(word) for word in line.split()] for line in lines]
-    for line, row in zip(lines, rows, strict=True):
-        if len(row) != 3:
+def _numbered(lines: Sequence[str], scale: float = 1.0) -> Landmarks:
+    """Return the points of lines of three numbers, named by their own numbers."""
+    for line in lines:
+        if len(line.split()) != 3:
             raise FileFormatError(f"a point must have three numbers; a line is {line!r}.")
-    return rows
-
-
-def _numbered(rows: list[list[float]], scale: float = 1.0) -> Landmarks:
-    names = tuple(str(number + 1) for number in range(len(rows)))
+    rows = [[_number(word) for word in line.split()] for line in lines]
+    names = [str(number + 1) for number in range(len(rows))]
     return Landmarks(names, scale * np.reshape(rows, (-1, 3)))
 
 
-def _add(specimens: Table, name: str, landmarks: Landmarks) -> None:
-    if name in specimens:
-        raise FileFormatError(f"specimens must have different names; two are {name!r}.")
-    specimens[name] = landmarks
+def _by_name(names: Sequence[str], found: Sequence[Landmarks]) -> Table:
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise FileFormatError(f"specimens must have different names; two are {name!r}.")
+    return dict(zip(names, found, strict=True))
 
 
 def _texts(landmarks: Landmarks) -> list[list[str]]:
@@ -237,57 +240,54 @@ def _texts(landmarks: Landmarks) -> list[list[str]]:
 
 
 def _parse_markups(text: str, stem: str) -> Table:
-    names: list[str] = []
-    places: list[tuple[float, ...]] = []
+    rows: dict[str, int] = {}
+    places: list[list[float]] = []
     curves = []
     for markup in json.loads(text)["markups"]:
         is_curve = markup.get("type") in ("Curve", "ClosedCurve")
         signs = _signs(markup.get("coordinateSystem", "LPS"))
-        rows = []
+        members = []
         for point in markup["controlPoints"]:
-            name = str(point.get("label") or point.get("id") or len(names) + 1).strip()
-            place: tuple[float, ...] = (np.nan,) * 3
+            name = str(point.get("label") or point.get("id") or len(rows) + 1).strip()
+            place = [np.nan] * 3
             if point.get("positionStatus", "defined") == "defined":
-                place = tuple(map(float, point["position"]))
-                if len(place) != 3:
-                    raise FileFormatError(f"a point must have three numbers; {name!r} is {place}.")
-                place = (signs[0] * place[0], signs[1] * place[1], place[2])
-            # Ends of curves are landmarks of another list, too: one point has one row.
-            if is_curve and name in names and places[names.index(name)] == place:
-                rows.append(names.index(name))
-                continue
-            rows.append(len(names))
-            names.append(name)
-            places.append(place)
+                if len(point["position"]) != 3:
+                    raise FileFormatError(
+                        f"a point must have three numbers; {name!r} is {point['position']}."
+                    )
+                place = [sign * float(x) for sign, x in zip(signs, point["position"], strict=True)]
+            # Points of curves may be landmarks of another list, too: one point has one row.
+            if not (is_curve and name in rows and places[rows[name]] == place):
+                if name in rows:
+                    raise FileFormatError(f"names must differ; two points are {name!r}.")
+                rows[name] = len(rows)
+                places.append(place)
+            members.append(rows[name])
         if is_curve:
-            curves.append(rows + rows[:1] * (markup["type"] == "ClosedCurve"))
-    return {
-        stem: Landmarks(tuple(names), np.reshape(places, (-1, 3)), curves=tuple(map(tuple, curves)))
-    }
+            curves.append(members + members[:1] * (markup["type"] == "ClosedCurve"))
+    return {stem: Landmarks(rows, np.reshape(places, (-1, 3)), curves=curves)}
 
 
 def _format_markups(specimens: Table) -> str:
     (landmarks,) = specimens.values()
-    points = [
-        {"id": str(row + 1), "label": name, "position": place, "positionStatus": "defined"}
-        for row, (name, place) in enumerate(
-            zip(landmarks.names, landmarks.points.tolist(), strict=True)
-        )
-    ]
-    for row in np.flatnonzero(np.isnan(landmarks.points[:, 0])):
-        points[row] |= {"position": [0.0, 0.0, 0.0], "positionStatus": "undefined"}
-    lists: list[tuple[str, list[dict[str, Any]]]] = [("Fiducial", points)]
+    points = []
+    for name, place in zip(landmarks.names, landmarks.points.tolist(), strict=True):
+        is_missing = place[0] != place[0]  # NaN
+        status = "undefined" if is_missing else "defined"
+        position = [0.0] * 3 if is_missing else place
+        points.append({"label": name, "position": position, "positionStatus": status})
+    lists = [("Fiducial", points)]
     for curve in landmarks.curves:
         is_closed = len(curve) > 2 and curve[0] == curve[-1]
-        rows = curve[:-1] if is_closed else curve
-        lists.append(("ClosedCurve" if is_closed else "Curve", [points[row] for row in rows]))
+        kind = "ClosedCurve" if is_closed else "Curve"
+        lists.append((kind, [points[row] for row in curve[: len(curve) - is_closed]]))
     markups = [
         {"type": kind, "coordinateSystem": "LPS", "controlPoints": listed} for kind, listed in lists
     ]
     return json.dumps({"@schema": SCHEMA, "markups": markups}, indent=1)
 
 
-def _signs(system: str) -> tuple[float, float]:
+def _signs(system: str) -> tuple[float, float, float]:
     if system not in TO_LPS:
         raise FileFormatError(f"the coordinate system must be LPS or RAS; it is {system!r}.")
     return TO_LPS[system]
@@ -295,47 +295,42 @@ def _signs(system: str) -> tuple[float, float]:
 
 def _parse_fcsv(text: str, stem: str) -> Table:
     system, columns = "RAS", FCSV_COLUMNS.split(",")  # of files that do not name theirs
-    names: list[str] = []
-    places = []
+    names, places = [], []
     for line in text.splitlines():
-        if line.startswith("#"):
-            key, _, value = line[1:].partition("=")
-            if key.strip() == "CoordinateSystem":
-                system = value.strip()
-            elif key.strip() == "columns":
-                columns = value.strip().split(",")
-        elif line.strip():
+        key, _, value = line.partition("=")
+        if key.split() == ["#", "CoordinateSystem"]:
+            system = value.strip()
+        elif key.split() == ["#", "columns"]:
+            columns = value.strip().split(",")
+        elif line.strip() and not line.startswith("#"):
             cells = next(csv.reader([line]))
-            if len(cells) < len(columns) or not {"x", "y", "z", "label"} <= set(columns):
-                raise FileFormatError(
-                    f"a line must have {len(columns)} cells, x, y, z and label among them; one is "
-                    f"{line!r}."
-                )
-            place = [_number(cells[columns.index(axis)]) for axis in "xyz"]
-            if cells[STATUS_COLUMN:] and cells[STATUS_COLUMN] in NOT_PLACED:
-                place = [np.nan] * 3
-            names.append(cells[columns.index("label")].strip() or str(len(names) + 1))
-            places.append(place)
-    points = np.reshape(places, (-1, 3))
-    points[:, :2] *= _signs(system)
-    return {stem: Landmarks(tuple(names), points)}
+            row = dict(zip(columns, cells, strict=False))
+            if len(row) < len(columns):
+                raise FileFormatError(f"a line must have {len(columns)} cells; one is {line!r}.")
+            is_placed = (cells[STATUS_COLUMN:] or [PLACED])[0] not in NOT_PLACED
+            places.append([_number(row[axis]) if is_placed else np.nan for axis in "xyz"])
+            names.append(row["label"].strip() or str(len(places)))
+    return {stem: Landmarks(names, np.reshape(places, (-1, 3)) * _signs(system))}
 
 
 def _format_fcsv(specimens: Table) -> str:
     (landmarks,) = specimens.values()
+    rows = []
+    for number, (name, place) in enumerate(zip(landmarks.names, _texts(landmarks), strict=True)):
+        status = NOT_PLACED[1] if "NA" in place else PLACED
+        place = [text.replace("NA", "0.0") for text in place]  # noqa: PLW2901
+        rows.append([number + 1, *place, 0, 0, 0, 1, 1, 1, 0, name, "", "", status, 0])
+    head = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"
+    return f"{head}# columns = {FCSV_COLUMNS},positionStatus,autoCreated\n{_csv_text(rows)}"
+
+
+def _csv_text(rows: Iterable[Iterable[object]]) -> str:
     lines = io.StringIO()
-    lines.write("# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n")
-    lines.write(f"# columns = {FCSV_COLUMNS},positionStatus,autoCreated\n")
-    table = csv.writer(lines, lineterminator="\n")
-    for row, (name, place) in enumerate(zip(landmarks.names, _texts(landmarks), strict=True)):
-        status = PLACED if "NA" not in place else NOT_PLACED[1]
-        numbers = ["0.0" if number == "NA" else number for number in place]
-        table.writerow([row + 1, *numbers, 0, 0, 0, 1, 1, 1, 0, name, "", "", status, 0])
+    csv.writer(lines, lineterminator="\n").writerows(rows)
     return lines.getvalue()
 
 
 def _parse_tps(text: str, _: str) -> Table:
-    specimens: Table = {}
     blocks: list[tuple[dict[str, str], list[str]]] = []
     for line in filter(None, _lines(text)):
         key, equals, value = line.partition("=")
@@ -352,23 +347,22 @@ def _parse_tps(text: str, _: str) -> Table:
             )
         else:
             blocks[-1][0][key] = value.strip()
+    names, found = [], []
     for number, (fields, lines) in enumerate(blocks):
         if fields.keys() != blocks[0][0].keys():
             odd = min(fields.keys() ^ blocks[0][0].keys())
             raise FileFormatError(
                 f"all specimens, or none, must have {odd}=; specimen {number} differs."
             )
-        if fields["LM3"] != str(len(lines)):
-            raise FileFormatError(
-                f"LM3= must give the number of points; specimen {number} has LM3={fields['LM3']} and "
-                f"{len(lines)} points."
-            )
         scale = _number(fields.get("SCALE", "1"))
-        if not scale > 0:
-            raise FileFormatError(f"SCALE= must be positive; that of specimen {number} is {scale}.")
-        name = fields.get("ID") or fields.get("IMAGE") or str(number + 1)
-        _add(specimens, name, _numbered(_rows(lines), scale))
-    return specimens
+        if fields["LM3"] != str(len(lines)) or not scale > 0:
+            raise FileFormatError(
+                f"LM3= must be the number of points, and SCALE= positive; specimen {number} has "
+                f"LM3={fields['LM3']}, {len(lines)} points and a scale of {scale}."
+            )
+        names.append(fields.get("ID") or fields.get("IMAGE") or str(number + 1))
+        found.append(_numbered(lines, scale))
+    return _by_name(names, found)
 
 
 def _format_tps(specimens: Table) -> str:
@@ -396,10 +390,7 @@ def _parse_morphologika(text: str, _: str) -> Table:
             f"there must be {n} names and {n} times {k} points in 3 dimensions; there are "
             f"{len(names)} names and {len(lines)} points in {sections['dimensions'][0]}."
         )
-    specimens: Table = {}
-    for number, name in enumerate(names):
-        _add(specimens, name, _numbered(_rows(lines[number * k : (number + 1) * k])))
-    return specimens
+    return _by_name(names, [_numbered(lines[row : row + k]) for row in range(0, n * k, k)])
 
 
 def _format_morphologika(specimens: Table) -> str:
@@ -412,43 +403,40 @@ def _format_morphologika(specimens: Table) -> str:
 
 
 def _parse_csv(text: str, _: str) -> Table:
-    head, *rows = csv.reader(io.StringIO("\n".join(_lines(text))), strict=True)
-    absent = [column for column in CSV_COLUMNS[:-1] if column not in head]
+    reader = csv.DictReader(_lines(text), strict=True)
+    absent = set(CSV_COLUMNS[:-1]) - set(reader.fieldnames or ())
     if absent:
-        raise FileFormatError(f"columns must be {', '.join(CSV_COLUMNS)}; {absent[0]} is missing.")
-    places = [head.index(column) for column in CSV_COLUMNS if column in head]
+        raise FileFormatError(
+            f"columns must be {', '.join(CSV_COLUMNS)}; {min(absent)} is missing."
+        )
     found: dict[str, list[list[str]]] = {}
-    for row in rows:
-        if row and len(row) != len(head):
-            raise FileFormatError(f"a line must have {len(head)} cells; one is {','.join(row)!r}.")
-        if row:
-            specimen, *cells = [row[place] for place in places]
-            found.setdefault(specimen.strip(), []).append(cells)
-    specimens: Table = {}
+    for row in reader:
+        if None in row or None in row.values():  # too many cells, or too few
+            raise FileFormatError(
+                f"a line must have as many cells as the first; one is {list(row.values())}."
+            )
+        specimen, *cells = [row.get(column, "NA").strip() for column in CSV_COLUMNS]
+        found.setdefault(specimen, []).append(cells)
+    specimens = {}
     for specimen, lines in found.items():
         numbers = np.array([[_number(cell) for cell in cells[1:]] for cells in lines])
-        spread = (
-            numbers[:, 3] if numbers.shape[1] == 4 and np.isfinite(numbers[:, 3]).any() else None
-        )
-        specimens[specimen] = Landmarks(
-            tuple(cells[0].strip() for cells in lines), numbers[:, :3], spread
-        )
+        points, spread = numbers[:, :3], numbers[:, 3]
+        names = [cells[0] for cells in lines]
+        specimens[specimen] = Landmarks(names, points, None if np.isnan(spread).all() else spread)
     return specimens
 
 
 def _format_csv(specimens: Table) -> str:
-    lines = io.StringIO()
-    table = csv.writer(lines, lineterminator="\n")
-    table.writerow(CSV_COLUMNS)
+    rows: list[list[object]] = [list(CSV_COLUMNS)]
     for specimen, landmarks in specimens.items():
-        spread = (
-            [np.nan] * len(landmarks.names)
-            if landmarks.spread is None
-            else landmarks.spread.tolist()
+        widths = (
+            np.full(len(landmarks.names), np.nan) if landmarks.spread is None else landmarks.spread
         )
-        for name, place, width in zip(landmarks.names, _texts(landmarks), spread, strict=True):
-            table.writerow([specimen, name, *place, "NA" if np.isnan(width) else repr(width)])
-    return lines.getvalue()
+        for name, place, width in zip(
+            landmarks.names, _texts(landmarks), widths.tolist(), strict=True
+        ):
+            rows.append([specimen, name, *place, "NA" if np.isnan(width) else width])
+    return _csv_text(rows)
 
 
 FORMATS: dict[str, tuple[Callable[[str, str], Table], Callable[[Table], str]]] = {

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -10,7 +11,6 @@ from typing_extensions import TypeAliasType
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 
 
@@ -96,8 +96,6 @@ class Landmarks(ReadOnly):
         object.__setattr__(self, "spread", widths)
         object.__setattr__(self, "curves", as_curves(curves, len(names)))
 
-    __repr__ = short_repr
-
 
 Specimens = TypeAliasType("Specimens", Mapping[str, Landmarks] | Sequence[Landmarks] | ArrayLike)
 
@@ -124,12 +122,11 @@ def as_configurations(specimens: Specimens) -> Float[np.ndarray, "n k 3"]:
 
     Raise InvalidParameterError if they are no such points, or names of landmarks differ.
     """
+    if isinstance(specimens, Sequence) and any(isinstance(each, Landmarks) for each in specimens):
+        specimens = dict(enumerate(specimens))  # type: ignore[arg-type]
     if isinstance(specimens, Mapping):
-        return _stack(dict(specimens))
-    if isinstance(specimens, list | tuple) and any(
-        isinstance(each, Landmarks) for each in specimens
-    ):
-        return _stack({str(number): each for number, each in enumerate(specimens)})
+        require_same_names(specimens)
+        return np.stack([landmarks.points for landmarks in specimens.values()])
     points = real_numbers(specimens, "specimens").astype(np.float64)  # type: ignore[arg-type]
     if points.ndim != 3 or points.shape[2] != 3 or not points.size:
         raise InvalidParameterError(
@@ -139,12 +136,7 @@ def as_configurations(specimens: Specimens) -> Float[np.ndarray, "n k 3"]:
     return points
 
 
-def _stack(specimens: dict[str, Landmarks]) -> Float[np.ndarray, "n k 3"]:
-    require_same_names(specimens)
-    return np.stack([landmarks.points for landmarks in specimens.values()])
-
-
-def require_same_names(specimens: Mapping[str, Landmarks]) -> None:
+def require_same_names(specimens: Mapping[Any, Landmarks]) -> None:
     """Raise an error if there is no specimen, or two differ in the names or the order of landmarks."""
     names: tuple[str, ...] | None = None
     for specimen, landmarks in specimens.items():

@@ -3,13 +3,14 @@
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_choice
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import surface_area, vertex_normals
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, triangular_sides
 from eigenshape.operators import elements
-from eigenshape.operators.choices import Mass, require_choice
+from eigenshape.operators.choices import Mass
 from eigenshape.operators.cotangent import linear_mass
 from eigenshape.operators.laplacian import Laplacian
 

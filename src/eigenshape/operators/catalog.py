@@ -10,7 +10,7 @@ from typing import Any
 import scipy.sparse as sp
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
@@ -29,7 +29,7 @@ GRAPHS = (*MESHES, sp.sparray)
 
 
 @dataclass(frozen=True)
-class Operator:
+class Operator(Shown):
     """An operator that can be built by name.
 
     Attributes
@@ -47,15 +47,12 @@ class Operator:
     >>> es.operators.OPERATORS["cotangent"].description
     'linear finite elements'
     >>> es.operators.OPERATORS["cotangent"].options
-    ('mass',)
+    ('mass', 'conductivity')
     """
 
     build: Callable[..., Laplacian]
     shapes: tuple[type, ...]
     description: str
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def options(self) -> tuple[str, ...]:

@@ -4,6 +4,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from eigenshape._arguments import require_choice
+from eigenshape._arrays import positive_values
+from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import scale_to_unit, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -11,14 +15,16 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import dual_volumes, in_length
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
-from eigenshape.operators.choices import Mass, require_choice
+from eigenshape.operators.choices import Mass
 from eigenshape.operators.laplacian import Laplacian
 
 # Dimension in which the default mass is averaged: experiments/ch3_tetrahedra chose it.
 TETRAHEDRA = 3
 
 
-def cotangent_laplacian(mesh: MeshLike, mass: Mass | None = None) -> Laplacian:
+def cotangent_laplacian(
+    mesh: MeshLike, mass: Mass | None = None, *, conductivity: ArrayLike | None = None
+) -> Laplacian:
     """Build the cotangent Laplacian: linear finite elements on a mesh of any dimension.
 
     On triangles w_ij = (cot α_ij + cot β_ij) / 2, with the angles opposite to the edge (thesis
@@ -35,6 +41,9 @@ def cotangent_laplacian(mesh: MeshLike, mass: Mass | None = None) -> Laplacian:
         full matrix ∫ φ_i φ_j; its eigenvalues are upper bounds for those of the surface.
         "averaged": the mean of the two, whose leading errors cancel. By default "averaged" for
         tetrahedra, which are rarely fine enough for another, and otherwise "lumped".
+    conductivity : (n,) float, optional
+        Positive numbers c at the points, linear on each simplex, without unit. The operator is then
+        -div(c grad), as for a cortex whose heterogeneity is known. By default 1 everywhere.
 
     Returns
     -------
@@ -47,10 +56,11 @@ def cotangent_laplacian(mesh: MeshLike, mass: Mass | None = None) -> Laplacian:
         If a simplex has no volume or the same corners as another, a point belongs to no simplex, or
         coordinates are so large or small that floats cannot hold these powers of lengths.
     InvalidParameterError
-        If `mass` is not one of the three.
+        If `mass` is not one of the three, or `conductivity` not one positive number per point.
 
     See Also
     --------
+    anisotropic_laplacian : One tensor per simplex.
     robust_laplacian : For slivers and non-manifold meshes.
     fem_laplacian : Elements of order 2 and 3.
     solve_spectrum : Compute eigenvalues and eigenvectors.
@@ -70,6 +80,15 @@ def cotangent_laplacian(mesh: MeshLike, mass: Mass | None = None) -> Laplacian:
     require_choice(mass, Mass, "mass")
     require_sound(mesh)
     products = elements.gradient_products(mesh)
+    if conductivity is not None:
+        values = positive_values(conductivity, "conductivity")
+        if len(values) != mesh.n_points:
+            raise InvalidParameterError(
+                f"conductivity must hold one number per point, shape ({mesh.n_points},); the shape is "
+                f"{values.shape}."
+            )
+        # Gradients are constant on a simplex, so the integral takes the mean.
+        products = products * values[mesh.simplices].mean(axis=1)[:, None, None]
     return Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
 
 

@@ -1,10 +1,9 @@
 """Directions of edges in the tangent planes of their ends."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
@@ -17,7 +16,7 @@ from eigenshape.geometry.topology import (
 from eigenshape.operators.tufted import edge_keys, side_ends
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Directions:
     """The directions of the sides of all faces; side 3f + s runs from corner s of face f to the next.
 

@@ -6,21 +6,17 @@ The sides of triangle f are 3f, 3f + 1, 3f + 2, in order around it. Side h start
 same.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
 
 
 @njit(error_model="numpy")
-@no_type_check
 def next_side(side):
     return side - 2 if side % 3 == 2 else side + 1
 
 
 @njit(error_model="numpy")
-@no_type_check
 def area_of(a, b, c):
     # Heron's formula in Kahan's order, which is accurate for needles too.
     low, high = min(a, b), max(a, b)
@@ -31,7 +27,6 @@ def area_of(a, b, c):
 
 
 @njit(error_model="numpy")
-@no_type_check
 def areas(lengths):
     found = np.empty(len(lengths) // 3)
     for f in range(len(found)):
@@ -40,7 +35,6 @@ def areas(lengths):
 
 
 @njit(error_model="numpy")
-@no_type_check
 def cotangent(lengths, side):
     """Return the cotangent of the angle opposite to a side, and the size of its terms."""
     a = lengths[side]
@@ -51,7 +45,6 @@ def cotangent(lengths, side):
 
 
 @njit(error_model="numpy")
-@no_type_check
 def cotangents(lengths):
     found = np.empty(len(lengths))
     for side in range(len(lengths)):
@@ -60,7 +53,6 @@ def cotangents(lengths):
 
 
 @njit(error_model="numpy")
-@no_type_check
 def _apex(lengths, side):
     """Return the coordinates of the opposite corner, along a side and perpendicular to it."""
     a = lengths[side]
@@ -70,7 +62,6 @@ def _apex(lengths, side):
 
 
 @njit(error_model="numpy")
-@no_type_check
 def flip_to_delaunay(tails, twins, lengths, tolerance, most):
     """Flip edges in place until all are Delaunay; return the number of flips.
 

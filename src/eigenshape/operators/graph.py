@@ -5,13 +5,13 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 
+from eigenshape._arguments import require_choice
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import adjacency_matrix
-from eigenshape.operators.choices import require_choice
 from eigenshape.operators.laplacian import Laplacian, require_square
 
 Kind = Literal["combinatorial", "weighted", "normalized"]

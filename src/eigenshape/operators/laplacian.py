@@ -12,9 +12,9 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, as_array
+from eigenshape._arrays import ReadOnly, as_array, record
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 
 
@@ -82,7 +82,7 @@ class GaussianKernel:
         return 2 * self.t**0.5
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Laplacian(ReadOnly):
     """A discrete Laplace operator L = B⁻¹W, given by its stiffness and mass matrices.
 
@@ -131,8 +131,6 @@ class Laplacian(ReadOnly):
     stiffness: sp.csr_array
     mass: sp.csr_array
     kernel: GaussianKernel | None = None
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass"):

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import positive_values
+from eigenshape._arrays import positive_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -106,7 +106,7 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
     """
     mesh = as_mesh(mesh)
     edges = (
-        float(positive_values(reach, "reach")[0])
+        positive_number(reach, "reach")
         if reach is not None
         else (noise_level(mesh) / ONE_EDGE) ** 2
     )

@@ -1,10 +1,9 @@
 """Intrinsic triangulations: edge lengths made fit to live with, the tufted cover, Delaunay flips."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape._errors import ConvergenceError
 from eigenshape.operators import flip_loops
 
@@ -15,7 +14,7 @@ MOLLIFY = 1e-5
 MOST_FLIPS = 1000  # a side: far more than any shape takes, which is about one
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Triangulation:
     """Triangles that know lengths only, glued along whole sides into a surface without boundary.
 

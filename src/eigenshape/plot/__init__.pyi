@@ -1,14 +1,14 @@
 from .camera import Camera as Camera
 from .camera import aim_camera as aim_camera
-from .camera import three_quarter_view as three_quarter_view
-from .eigenvalues import figure_spectra as figure_spectra
-from .eigenvalues import figure_spectrum as figure_spectrum
+from .cortex import figure_cortex as figure_cortex
 from .fields import figure_eigenfunctions as figure_eigenfunctions
 from .fields import figure_field as figure_field
 from .fields import figure_segments as figure_segments
 from .fields import part_colors as part_colors
 from .fields import value_colors as value_colors
 from .figure import save_figure as save_figure
+from .ordination import figure_landmarks as figure_landmarks
+from .ordination import figure_ordination as figure_ordination
 from .persistence import figure_diagram as figure_diagram
 from .persistence import figure_merge_tree as figure_merge_tree
 from .render import Drawing as Drawing
@@ -19,4 +19,6 @@ from .sheet import Panel as Panel
 from .sheet import figure_contact_sheet as figure_contact_sheet
 from .sheet import figure_label_transfer as figure_label_transfer
 from .sheet import figure_poses as figure_poses
+from .spectra import figure_spectra as figure_spectra
+from .spectra import figure_spectrum as figure_spectrum
 from .view import view as view

@@ -176,25 +176,50 @@ def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each cho
     mesh = as_mesh(mesh)
     figure = Figure(figsize=(2 * PANEL + 1.2, 2 * PANEL), layout="constrained")
     axes = figure.subplots()
+    field = vertex_field(values, mesh.n_vertices)
+    scale, extend = value_scale(field, limits)
+    colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
+    camera = choose_camera(mesh, camera, view, up)
+    show(axes, draw(mesh, camera, vertex_colors=map_colors(field, scale, colors)))
+    bar = figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8, extend=extend)
+    bar.set_label(bar_label(label, field))
+    return figure
+
+
+def vertex_field(values: ArrayLike, n_vertices: int) -> np.ma.MaskedArray:
+    """Return one number per vertex, masked where it is NaN.
+
+    Raise InvalidParameterError if there is another number of values, or one is infinite.
+    """
     field = real_numbers(values, "values").astype(np.float64)
     missing = np.isnan(field)
-    if field.size and missing.all():
+    vertex_values(np.where(missing, 0.0, field), "values", n_vertices)
+    return np.ma.masked_array(field, missing)
+
+
+def value_scale(
+    field: np.ma.MaskedArray, limits: tuple[float, float] | None
+) -> tuple[Normalize, str]:
+    """Return the scale of the colors of a field, and at which ends it has values beyond that.
+
+    Raise InvalidParameterError if there is no value, or `limits` are not two ascending numbers.
+    """
+    known = field.compressed()
+    if not known.size:
         raise InvalidParameterError("values must hold a number; all are NaN.")
-    known = vertex_values(np.where(missing, 0.0, field), "values", mesh.n_vertices)[~missing]
     ends = finite_values([known.min(), known.max()] if limits is None else [*limits], "limits")
     if len(ends) != 2 or ends[0] > ends[1]:
         raise InvalidParameterError(
             f"limits must be two numbers, the lower one first; they are {ends.tolist()}."
         )
-    scale, colors = Normalize(*ends), mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
-    camera = choose_camera(mesh, camera, view, up)
-    shown = map_colors(np.ma.masked_array(field, missing), scale, colors)
-    show(axes, draw(mesh, camera, vertex_colors=shown))
     below, above = bool((known < ends[0]).any()), bool((known > ends[1]).any())
     extend = {(1, 1): "both", (1, 0): "min", (0, 1): "max", (0, 0): "neither"}[below, above]
-    bar = figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8, extend=extend)
-    bar.set_label(f"{label} (gray: no value)".strip() if missing.any() else label)
-    return figure
+    return Normalize(*ends), extend
+
+
+def bar_label(label: str, field: np.ma.MaskedArray) -> str:
+    """Return the text beside a color bar, which says what gray means where there is any."""
+    return f"{label} (gray: no value)".strip() if np.ma.is_masked(field) else label
 
 
 def map_colors(

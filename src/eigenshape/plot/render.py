@@ -1,14 +1,11 @@
 """A shaded picture of a mesh, drawn pixel by pixel in numpy."""
 
-from dataclasses import dataclass
-
 import matplotlib as mpl
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly
-from eigenshape._text import short_repr
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
@@ -29,7 +26,7 @@ GRAY_PAIR = 7  # of matplotlib's tab20, left to what has no label
 Image = Float[np.ndarray, "h w 4"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Drawing(ReadOnly):
     """A picture and the places of the vertices in it.
 
@@ -50,7 +47,7 @@ class Drawing(ReadOnly):
     --------
     >>> import eigenshape as es
     >>> ball = es.icosphere(2)
-    >>> drawing = es.plot.draw(ball, es.plot.three_quarter_view(ball, size=64))
+    >>> drawing = es.plot.draw(ball, es.plot.aim_camera(ball, size=64))
     >>> drawing.places.shape
     (162, 2)
     """
@@ -58,8 +55,6 @@ class Drawing(ReadOnly):
     image: Image
     places: Float[np.ndarray, "n 2"]
     visible: Bool[np.ndarray, " n"]
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()
@@ -98,7 +93,7 @@ def draw(
     --------
     >>> import eigenshape as es
     >>> ball = es.icosphere(2)
-    >>> es.plot.draw(ball, es.plot.three_quarter_view(ball, size=64)).image.shape
+    >>> es.plot.draw(ball, es.plot.aim_camera(ball, size=64)).image.shape
     (64, 64, 4)
     """
     mesh = as_mesh(mesh)

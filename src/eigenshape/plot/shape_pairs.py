@@ -14,10 +14,10 @@ from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh, as_shap
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.matching.shape_match import ShapeMatch
 from eigenshape.plot.camera import Up, View, aim_camera
-from eigenshape.plot.eigenvalues import draw_comparison
 from eigenshape.plot.fields import PANEL, map_colors, show
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw
+from eigenshape.plot.spectra import draw_comparison
 from eigenshape.stability.report import StabilityReport
 
 GRAY = 0.72  # of points that the map is not sure of

@@ -1,7 +1,6 @@
 """Several shapes in one picture: a query and what answers it, labels copied, poses side by side."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -11,9 +10,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, vertex_values
+from eigenshape._arrays import ReadOnly, record, vertex_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
@@ -30,7 +28,7 @@ MATCHES_IN_A_ROW = 3  # matches in a row at most
 NO_MESH = "#808080"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Panel(ReadOnly):
     """A shape on a contact sheet.
 
@@ -71,8 +69,6 @@ class Panel(ReadOnly):
     title: str
     colors: Int[np.ndarray, " f"]
     vertices: Int[np.ndarray, " m"]
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         super().__post_init__()

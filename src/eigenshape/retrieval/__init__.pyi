@@ -3,7 +3,6 @@ from .building.batch import Item as Item
 from .building.batch import Workers as Workers
 from .building.batch import build_index as build_index
 from .building.batch import train_codebook_from_files as train_codebook_from_files
-from .description import describe as describe
 from .duplicates import find_duplicates as find_duplicates
 from .heat.features import HeatFeatures as HeatFeatures
 from .heat.features import find_heat_features as find_heat_features
@@ -15,6 +14,7 @@ from .heat.score import HeatDescriptor as HeatDescriptor
 from .heat.score import match_features as match_features
 from .heat.score import matching_score as matching_score
 from .index import ShapeIndex as ShapeIndex
+from .kinds import describe as describe
 from .labels.labeled_shape import LabeledShape as LabeledShape
 from .labels.transfer import LabelTransfer as LabelTransfer
 from .labels.transfer import labels_from_votes as labels_from_votes

@@ -14,8 +14,7 @@ from eigenshape._files import as_path
 from eigenshape._text import html_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.retrieval.description import describe_to_store
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_store
 from eigenshape.retrieval.search.matches import Matches
 from eigenshape.retrieval.search.reader import EngineMaker, IndexReader, choose_recipe
 from eigenshape.retrieval.store.damage import warn_of_damage
@@ -540,10 +539,7 @@ class ShapeIndex:
             If there is no shape of that name, or the picture is damaged.
         """
         state = self._read()
-        facts = state.find(name)
-        if facts is None:
-            raise StoreError(f"A shape must be in the index to have a picture; {name!r} is not.")
-        return state.picture(facts)
+        return state.picture(state.require(name, "have a picture"))
 
     def verify(self) -> IndexReport:
         """Compare everything in the index with its checksums.
@@ -661,13 +657,7 @@ class ShapeIndex:
         state = self._read()
         chosen = None
         if names is not None:
-            found = [state.find(name) for name in names]
-            for name, facts in zip(names, found, strict=True):
-                if facts is None:
-                    raise StoreError(
-                        f"A shape must be in the index to be exported; {name!r} is not."
-                    )
-            chosen = {facts.id for facts in found if facts is not None}
+            chosen = {state.require(name, "be exported").id for name in names}
         export_index(state, _records(state, chosen), Path(folder))
 
 

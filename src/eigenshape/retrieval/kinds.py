@@ -1,16 +1,9 @@
-"""The kinds of descriptors: how each is computed, stored, compared and paired.
+"""What an index must know of the two kinds of descriptors: heat and patches.
 
-An index knows a kind by the functions below. It stores the `rows` of a descriptor, which are
-compared with every query, apart from its `details`, which only the nearest shapes need.
-
-- `describe_query`: the descriptor of a mesh that is searched for.
-- `describe_to_store`: those of a mesh that an index keeps, of the whole and of its views.
-- `rows`: the (m, q) numbers that are stored as rows; `name` is for error messages.
-- `details`: the rest of a descriptor, as bytes; `restore` undoes both.
-- `as_stored`: a descriptor whose numbers are rounded as those of an index are.
-- `scores`: of a query against the rows and the isolations of k descriptors.
-- `verify`: scores improved by details; `other` returns the descriptor of a number below k.
-- `correspondences`: pairs of features or patches of two descriptors, surest pairs first.
+An index stores the rows of a descriptor, which are compared with every query, apart from its
+details, which only the nearest shapes need. Of heat, each feature has a row, and each view a
+descriptor of its own. Of patches, each code has a row, packed, and one descriptor holds a shape with
+all its views.
 """
 
 import json
@@ -21,8 +14,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arguments import require_type
 from eigenshape._arrays import freeze
 from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import Integer
+from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.heat.features import N_VIEWS, describe_views, find_heat_features
 from eigenshape.retrieval.heat.recipe import HeatRecipe
@@ -40,135 +36,144 @@ from eigenshape.retrieval.patches.packing import (
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
 from eigenshape.retrieval.patches.patches import extract_patches
 from eigenshape.retrieval.patches.verification import verified_scores
+from eigenshape.scans.partial import view_number
 
 AnyRecipe = HeatRecipe | PatchRecipe
 Descriptor = HeatDescriptor | PatchDescriptor
 VERTEX = np.dtype("<i8")  # how a vertex is stored
 
 
-class _HeatKind:
-    """Feature points with heat vectors: one row for each feature, one descriptor for each view."""
+def describe(mesh: MeshLike, recipe: AnyRecipe | None = None) -> Descriptor:
+    """Describe a mesh, to search an index for similar shapes or to compare it with another.
 
-    n_views = N_VIEWS  # from which a closed shape is described for an index by default
-    row_type = np.dtype("<f4")  # of one number of a row
+    `ShapeIndex.query` describes a mesh by itself; describe it here to ask several indexes, or by a
+    recipe of your choice. `ShapeIndex.add` describes a mesh that is to be found.
 
-    def describe_query(self, mesh: TriangleMesh, recipe: HeatRecipe) -> HeatDescriptor:
+    Parameters
+    ----------
+    mesh : MeshLike
+        A closed or open surface, of any size and in any pose. Patches of a surface of more than
+        30,000 vertices are those of one that is thinned out to fewer (`extract_patches`).
+    recipe : HeatRecipe or PatchRecipe, optional
+        By default patches with the codebook that comes with the library, ``PatchRecipe()``. The
+        presets of heat are ``SCALE_FREE`` and ``THESIS``.
+
+    Returns
+    -------
+    HeatDescriptor or PatchDescriptor
+
+    Raises
+    ------
+    InvalidShapeError
+        If a face has no area or occurs twice, a vertex has no face, or the mesh is a soup (faces
+        lie edge on edge without sharing vertices).
+
+    See Also
+    --------
+    ShapeIndex, matching_score, patch_scores, find_heat_features, extract_patches
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> fish = es.make_creature("fish", n_vertices=500)
+    >>> es.describe(fish).codes.shape  # the whole and six views of it
+    (7, 3, 3, 1280)
+    >>> es.describe(fish, es.retrieval.SCALE_FREE).vectors.shape  # 15 feature points
+    (15, 15)
+    """
+    mesh = as_mesh(mesh)
+    require_type(recipe, AnyRecipe | None, "recipe")
+    if isinstance(recipe, HeatRecipe):
         return find_heat_features(mesh, recipe).descriptor
-
-    def describe_to_store(
-        self, mesh: TriangleMesh, recipe: HeatRecipe, n_views: int
-    ) -> list[HeatDescriptor]:
-        return [self.describe_query(mesh, recipe), *describe_views(mesh, recipe, n_views)]
-
-    def rows(self, descriptor: HeatDescriptor, name: str) -> np.ndarray:
-        vectors = descriptor.vectors
-        with np.errstate(over="ignore"):
-            rows = vectors.astype(self.row_type)
-        bad = np.argwhere(~np.isfinite(rows))
-        if bad.size or not vectors.size:
-            entry = bad[0].tolist() if bad.size else None
-            where = f"entry {entry} is {vectors[tuple(entry)]}" if entry else "it has none"
-            raise InvalidParameterError(
-                f"A descriptor must hold finite single-precision numbers; of {name!r} {where}."
-            )
-        if descriptor.vertices.shape != vectors.shape[:1]:
-            raise InvalidParameterError(
-                f"A descriptor must name one vertex a feature; of {name!r} {len(vectors)} features "
-                f"have vertices of shape {descriptor.vertices.shape}."
-            )
-        return rows
-
-    def details(self, descriptor: HeatDescriptor) -> bytes:
-        return descriptor.vertices.astype(VERTEX).tobytes()
-
-    def restore(self, rows: np.ndarray, details: bytes, recipe: HeatRecipe) -> HeatDescriptor:
-        return HeatDescriptor(rows.astype(np.float64), np.frombuffer(details, VERTEX), recipe)
-
-    def as_stored(self, descriptor: HeatDescriptor) -> HeatDescriptor:
-        rows = self.rows(descriptor, "the query")
-        return self.restore(rows, self.details(descriptor), descriptor.recipe)
-
-    def scores(
-        self,
-        query: HeatDescriptor,
-        rows: Sequence[np.ndarray],
-        isolations: Float[np.ndarray, " k"],
-    ) -> Float[np.ndarray, " k"]:
-        starts = np.cumsum([0, *(len(each) for each in rows)])[:-1]
-        vectors = np.concatenate(rows).astype(np.float64)
-        scores, _ = matching_scores(query.vectors, vectors, starts, query.recipe)
-        return scores
-
-    def verify(
-        self,
-        query: HeatDescriptor,
-        other: Callable[[int], HeatDescriptor],
-        scores: Float[np.ndarray, " k"],
-    ) -> Float[np.ndarray, " k"]:
-        return scores  # of all features already
-
-    def correspondences(
-        self, first: HeatDescriptor, second: HeatDescriptor
-    ) -> Int[np.ndarray, "p 2"]:
-        return match_features(first, second)
+    return patch_descriptor(extract_patches(mesh), recipe or PatchRecipe())
 
 
-class _PatchKind:
-    """Patches: one packed row for each code; one descriptor for a shape with all its views."""
+def describe_to_store(
+    mesh: TriangleMesh, recipe: AnyRecipe, n_views: Integer | None = None
+) -> list[Descriptor]:
+    """Describe a mesh as an index keeps it: the whole, and what viewpoints see if it is closed."""
+    usual = N_VIEWS if isinstance(recipe, HeatRecipe) else N_PATCH_VIEWS
+    count = usual if n_views is None else view_number(n_views, "n_views")
+    if isinstance(recipe, HeatRecipe):
+        return [describe(mesh, recipe), *describe_views(mesh, recipe, count)]
+    patches = extract_patches(mesh, n_views=count, n_frames=recipe.n_frames)
+    return [patch_descriptor(patches, recipe)]
 
-    n_views = N_PATCH_VIEWS
-    row_type = np.dtype("u1")
 
-    def describe_query(self, mesh: TriangleMesh, recipe: PatchRecipe) -> PatchDescriptor:
-        return patch_descriptor(extract_patches(mesh), recipe)
+def row_type(recipe: AnyRecipe) -> "np.dtype[Any]":
+    """Return the type of one number of a row."""
+    return np.dtype("<f4" if isinstance(recipe, HeatRecipe) else "u1")
 
-    def describe_to_store(
-        self, mesh: TriangleMesh, recipe: PatchRecipe, n_views: int
-    ) -> list[PatchDescriptor]:
-        patches = extract_patches(mesh, n_views=n_views, n_frames=recipe.n_frames)
-        return [patch_descriptor(patches, recipe)]
 
-    def rows(self, descriptor: PatchDescriptor, name: str) -> np.ndarray:
+def rows_of(descriptor: Descriptor, name: str) -> np.ndarray:
+    """Return the (m, q) numbers that are stored as rows; `name` is for error messages."""
+    if isinstance(descriptor, PatchDescriptor):
         return pack_codes(descriptor.codes.reshape(-1, descriptor.codes.shape[-1]))
+    vectors = descriptor.vectors
+    with np.errstate(over="ignore"):
+        rows = vectors.astype(row_type(descriptor.recipe))
+    bad = np.argwhere(~np.isfinite(rows))
+    if bad.size or not vectors.size:
+        entry = bad[0].tolist() if bad.size else None
+        where = f"entry {entry} is {vectors[tuple(entry)]}" if entry else "it has none"
+        raise InvalidParameterError(
+            f"A descriptor must hold finite single-precision numbers; of {name!r} {where}."
+        )
+    if descriptor.vertices.shape != vectors.shape[:1]:
+        raise InvalidParameterError(
+            f"A descriptor must name one vertex a feature; of {name!r} {len(vectors)} features "
+            f"have vertices of shape {descriptor.vertices.shape}."
+        )
+    return rows
 
-    def details(self, descriptor: PatchDescriptor) -> bytes:
+
+def details_of(descriptor: Descriptor) -> bytes:
+    """Return the rest of a descriptor as bytes."""
+    if isinstance(descriptor, PatchDescriptor):
         return pack_points(descriptor.points[0])
+    return descriptor.vertices.astype(VERTEX).tobytes()
 
-    def restore(self, rows: np.ndarray, details: bytes, recipe: PatchRecipe) -> PatchDescriptor:
-        codes = unpack_codes(rows).reshape(-1, *recipe.codebook.code_shape)
-        return PatchDescriptor(freeze(codes), (unpack_points(details),), recipe)
 
-    def as_stored(self, descriptor: PatchDescriptor) -> PatchDescriptor:
-        return descriptor  # whose numbers were rounded when it was made
+def restore(rows: np.ndarray, details: bytes, recipe: AnyRecipe) -> Descriptor:
+    """Return the descriptor of stored rows and details."""
+    if isinstance(recipe, HeatRecipe):
+        return HeatDescriptor(rows.astype(np.float64), np.frombuffer(details, VERTEX), recipe)
+    codes = unpack_codes(rows).reshape(-1, *recipe.codebook.code_shape)
+    return PatchDescriptor(freeze(codes), (unpack_points(details),), recipe)
 
-    def scores(
-        self,
-        query: PatchDescriptor,
-        rows: Sequence[np.ndarray],
-        isolations: Float[np.ndarray, " k"],
-    ) -> Float[np.ndarray, " k"]:
+
+def as_stored(descriptor: Descriptor) -> Descriptor:
+    """Return a descriptor whose numbers are rounded as those of an index are."""
+    if isinstance(descriptor, PatchDescriptor):  # rounded when it was made
+        return descriptor
+    return restore(rows_of(descriptor, "the query"), details_of(descriptor), descriptor.recipe)
+
+
+def score_rows(
+    query: Descriptor, rows: Sequence[np.ndarray], isolations: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, " k"]:
+    """Score a query against the rows and the isolations of k descriptors."""
+    if isinstance(query, PatchDescriptor):
         return scale_distances(query.codes, packed_distances(query.codes, rows), isolations)
+    starts = np.cumsum([0, *(len(each) for each in rows)])[:-1]
+    vectors = np.concatenate(rows).astype(np.float64)
+    return matching_scores(query.vectors, vectors, starts, query.recipe)[0]
 
-    def verify(
-        self,
-        query: PatchDescriptor,
-        other: Callable[[int], PatchDescriptor],
-        scores: Float[np.ndarray, " k"],
-    ) -> Float[np.ndarray, " k"]:
+
+def verify_scores(
+    query: Descriptor, other: Callable[[int], Any], scores: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, " k"]:
+    """Improve scores with details; `other` returns the descriptor of a number below k."""
+    if isinstance(query, PatchDescriptor):
         return verified_scores(query, other, scores)
+    return scores  # of all features already
 
-    def correspondences(
-        self, first: PatchDescriptor, second: PatchDescriptor
-    ) -> Int[np.ndarray, "p 2"]:
+
+def pair_points(first: Descriptor, second: Any) -> Int[np.ndarray, "p 2"]:
+    """Pair the features or patches of two descriptors by one recipe, surest pairs first."""
+    if isinstance(first, PatchDescriptor):
         return match_patches(first.points[0], second.points[0]).points
-
-
-HEAT, PATCHES = _HeatKind(), _PatchKind()
-
-
-def kind_of(recipe: AnyRecipe) -> Any:
-    """Return the kind of the descriptors that a recipe makes."""
-    return PATCHES if isinstance(recipe, PatchRecipe) else HEAT
+    return match_features(first, second)
 
 
 def recipe_to_text(recipe: AnyRecipe) -> tuple[str, bytes | None]:

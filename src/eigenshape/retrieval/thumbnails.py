@@ -48,7 +48,19 @@ def draw_thumbnail(mesh: MeshLike) -> bytes:
     """
     mesh = as_mesh(mesh)
     size = SIZE * FINER
-    points = _in_picture(mesh.vertices, size)
+    # Points in pixels: right, down, and towards the viewer
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    span = float((high - low).max()) or 1.0
+    centered = (mesh.vertices - low) / span - (high - low) / span / 2
+    turn = np.array([[np.cos(TURN), 0, -np.sin(TURN)], [0, -1, 0], [np.sin(TURN), 0, np.cos(TURN)]])
+    tilt = np.array([[1, 0, 0], [0, np.cos(TILT), np.sin(TILT)], [0, -np.sin(TILT), np.cos(TILT)]])
+    points = centered @ (tilt @ turn).T
+    flat = points[:, :2]
+    middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
+    extent = float(np.ptp(flat, axis=0).max()) or 1.0
+    scale = size * (1 - 2 * MARGIN) / extent
+    points *= scale
+    points[:, :2] += size / 2 - middle * scale
     raster = rasterize(points, mesh.faces, size, size)
     corners = points[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -64,23 +76,6 @@ def draw_thumbnail(mesh: MeshLike) -> bytes:
         if len(png) <= 8192:  # noise of a surface that fills the picture may need fewer grays
             break
     return png
-
-
-def _in_picture(vertices: Float[np.ndarray, "n 3"], size: int) -> Float[np.ndarray, "n 3"]:
-    """Return points in pixels: right, down, and towards the viewer."""
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    span = float((high - low).max()) or 1.0
-    centered = (vertices - low) / span - (high - low) / span / 2
-    turn = np.array([[np.cos(TURN), 0, -np.sin(TURN)], [0, -1, 0], [np.sin(TURN), 0, np.cos(TURN)]])
-    tilt = np.array([[1, 0, 0], [0, np.cos(TILT), np.sin(TILT)], [0, -np.sin(TILT), np.cos(TILT)]])
-    points = centered @ (tilt @ turn).T
-    flat = points[:, :2]
-    middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
-    extent = float(np.ptp(flat, axis=0).max()) or 1.0
-    scale = size * (1 - 2 * MARGIN) / extent
-    points *= scale
-    points[:, :2] += size / 2 - middle * scale
-    return points
 
 
 def _png(image: Float[np.ndarray, "h w"]) -> bytes:

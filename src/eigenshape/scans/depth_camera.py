@@ -8,7 +8,7 @@ from jaxtyping import Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
@@ -106,8 +106,6 @@ class DepthScan(ReadOnly):
     mesh: TriangleMesh
     source_faces: Int[np.ndarray, " n"]
     pixels: Int[np.ndarray, "n 2"]
-
-    __repr__ = short_repr
 
 
 def simulate_scan(

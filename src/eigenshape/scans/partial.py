@@ -8,7 +8,6 @@ from jaxtyping import Bool, Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, real_numbers, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -53,8 +52,6 @@ class MeshPart(ReadOnly):
     mesh: TriangleMesh
     source_vertices: Int[np.ndarray, " n"]
     source_faces: Int[np.ndarray, " f"]
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()

@@ -4,15 +4,12 @@ Every number is rounded after each step in the order that is written here, so th
 not depend on how faces are grouped.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
 
 
 @njit
-@no_type_check
 def fill_buffer(points, faces, least_doubled_area, slack, face_at, weights, depth):
     """Write the nearest face at the middle of each pixel, its weights there, and its height.
 

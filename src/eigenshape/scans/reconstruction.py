@@ -11,10 +11,10 @@ from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import area_vectors, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
-from eigenshape.geometry.simplices import size_one
+from eigenshape.geometry.simplices import cut_tetrahedra, size_one
 from eigenshape.geometry.topology import submesh, vertex_components
 
 FEWEST_POINTS = 100  # below, a grid as fine as the points has about ten cells a side
@@ -203,17 +203,7 @@ def _level_set(
     inside = flat[cell_corners] > 0
     crossed = inside.any(axis=1) & ~inside.all(axis=1)
     ids = cell_corners[crossed][:, TETRAHEDRA].reshape(-1, 4)
-    # Corners inside come first: then two kinds of cuts are left, a triangle and a quad.
-    order = np.argsort(flat[ids] <= 0, axis=1, kind="stable")
-    ids = np.take_along_axis(ids, order, axis=1)
-    n_inside = (flat[ids] > 0).sum(axis=1)
-    cuts = [
-        (1, [(0, 1), (0, 2), (0, 3)]),
-        (3, [(0, 3), (1, 3), (2, 3)]),
-        (2, [(0, 2), (0, 3), (1, 3)]),
-        (2, [(0, 2), (1, 3), (1, 2)]),
-    ]
-    edges = np.concatenate([ids[n_inside == number][:, cut] for number, cut in cuts])
+    edges = cut_tetrahedra(ids, flat[ids] > 0)
     ends, faces = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
     faces = faces.reshape(-1, 3)
     values = flat[ends]
@@ -244,7 +234,7 @@ def _large_pieces(mesh: TriangleMesh, chosen: Bool[np.ndarray, " f"]) -> Bool[np
     pieces, _ = submesh(mesh, chosen)
     count, labels = vertex_components(pieces)
     owner = labels[pieces.faces[:, 0]]
-    sizes = np.linalg.norm(area_vectors(pieces.vertices[pieces.faces]), axis=1)
+    sizes = triangle_areas(pieces.vertices[pieces.faces])
     areas = np.bincount(owner, weights=sizes, minlength=count)
     large = np.zeros(mesh.n_faces, dtype=bool)
     large[chosen] = areas[owner] > np.pi * REACH**2

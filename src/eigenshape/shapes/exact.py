@@ -198,21 +198,10 @@ def box_eigenvalues(
     frequencies = [(np.arange(first, first + count) / length) ** 2 for length in lengths]
     sums = frequencies[0]
     for others in frequencies[1:]:
-        sums = _lowest_sums(sums, others)
+        # Of two ascending lists, the lowest sums: the j-th of one needs few of the other.
+        pairs = [sums[: count // j] + others[j - 1] for j in range(1, count + 1)]
+        sums = np.sort(np.concatenate(pairs))[:count]
     return np.pi**2 * sums
-
-
-def _lowest_sums(
-    one: Float[np.ndarray, " k"], two: Float[np.ndarray, " k"]
-) -> Float[np.ndarray, " k"]:
-    """Return the k lowest sums of one number from each of two ascending lists of length k.
-
-    At least i·j sums are at most the sum of the i-th and the j-th number. So sums with i·j > k are
-    not needed.
-    """
-    count = len(one)
-    sums = np.concatenate([one[: count // j] + two[j - 1] for j in range(1, count + 1)])
-    return np.sort(sums)[:count]
 
 
 def flat_torus_eigenvalues(k: Integer, periods: ArrayLike) -> Float[np.ndarray, " k"]:

@@ -79,7 +79,15 @@ def _is_sound(mesh: TriangleMesh) -> bool:
 def _nets(
     field: Field, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"], spacing: float
 ) -> tuple[Float[np.ndarray, "p 3"], Int[np.ndarray, "q 4"]]:
-    values = _lattice_values(field, low, np.ceil((high - low) / spacing).astype(int), spacing)
+    # Evaluate the field at the points of a lattice near its surface. In a block far from the surface
+    # all points get the value at the middle of the block.
+    blocks = tuple(-(-np.ceil((high - low) / spacing).astype(int) // BLOCK))
+    middles = BLOCK * np.indices(blocks).reshape(3, -1).T + (BLOCK - 1) / 2
+    values = _in_chunks(field, low + spacing * middles).reshape(blocks)
+    near = np.abs(values) < STEEPEST_FIELD * spacing * np.sqrt(3) * (BLOCK + 1) / 2
+    for axis in range(3):
+        values, near = values.repeat(BLOCK, axis), near.repeat(BLOCK, axis)
+    values[near] = _in_chunks(field, low + spacing * np.argwhere(near))
     # The surface crosses the cells with corners inside and outside. Count the inside corners of
     # pairs, then squares, then cubes of lattice points.
     counts = (values < 0).astype(np.int8)
@@ -93,25 +101,6 @@ def _nets(
     cell_number[tuple(cells.T)] = np.arange(len(cells))
     quads = np.concatenate([_quads(values, cell_number, number, axis) for axis in range(3)])
     return low + spacing * points, quads
-
-
-def _lattice_values(
-    field: Field, low: Float[np.ndarray, "3"], shape: Int[np.ndarray, "3"], spacing: float
-) -> Float[np.ndarray, "x y z"]:
-    """Evaluate a field at the points of a lattice near its surface.
-
-    In a block far from the surface all points get the value at the middle of the block.
-    """
-    blocks = tuple(-(-shape // BLOCK))
-    middles = BLOCK * np.indices(blocks).reshape(3, -1).T + (BLOCK - 1) / 2
-    coarse = _in_chunks(field, low + spacing * middles).reshape(blocks)
-    reach = STEEPEST_FIELD * spacing * np.sqrt(3) * (BLOCK + 1) / 2
-    values, near = coarse, np.abs(coarse) < reach
-    for axis in range(3):
-        values, near = values.repeat(BLOCK, axis), near.repeat(BLOCK, axis)
-    places = np.argwhere(near)
-    values[near] = _in_chunks(field, low + spacing * places)
-    return values
 
 
 def _in_chunks(field: Field, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, " p"]:

@@ -79,11 +79,19 @@ def place_limbs(plan: Sequence[Limb], individual: int = 0) -> Body:
         group: np.exp(VARIATION * rng.uniform(-1, 1, 2)) if individual else np.ones(2)
         for group in dict.fromkeys(_group(limb.name) for limb in plan)
     }
-    drawn = {
-        _name_side(limb.name, side): _mirror_limb(limb, side)
-        for limb in plan
-        for side in ((1, -1) if limb.name.endswith("*") else (1,))
-    }
+    drawn: dict[str, Limb] = {}
+    for limb in plan:
+        for side in (1, -1) if limb.name.endswith("*") else (1,):
+            # In the mirror a rotation about y stays the same, and one about x or z changes its sense.
+            mirrored = limb._replace(
+                parent=_name_side(limb.parent, side),
+                nodes=tuple((x, side * y, z, radius) for x, y, z, radius in limb.nodes),
+                swings=tuple(
+                    (node, (side * x, y, side * z), low, high)
+                    for node, (x, y, z), low, high in limb.swings
+                ),
+            )
+            drawn[_name_side(limb.name, side)] = mirrored
     numbers = {name: number for number, name in enumerate(drawn)}
     placed: list[PlacedLimb] = []
     for name, limb in drawn.items():
@@ -120,18 +128,6 @@ def _group(name: str) -> str:
 
 def _name_side(name: str, side: int) -> str:
     return name.replace("*", "+" if side > 0 else "-")
-
-
-def _mirror_limb(limb: Limb, side: int) -> Limb:
-    """Return one limb of a mirrored pair.
-
-    In the mirror a rotation about y stays the same, and one about x or z changes its sense.
-    """
-    nodes = tuple((x, side * y, z, radius) for x, y, z, radius in limb.nodes)
-    swings = tuple(
-        (node, (side * x, y, side * z), low, high) for node, (x, y, z), low, high in limb.swings
-    )
-    return limb._replace(parent=_name_side(limb.parent, side), nodes=nodes, swings=swings)
 
 
 def distance_to_body(points: Float[np.ndarray, "p 3"], body: Body) -> Float[np.ndarray, " p"]:

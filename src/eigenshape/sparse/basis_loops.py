@@ -1,7 +1,5 @@
 """Compiled loops of products with tall blocks whose columns are packed by eight."""
 
-from typing import no_type_check
-
 from eigenshape._compile import njit
 from eigenshape.sparse.lane_loops import (
     AHEAD,
@@ -17,7 +15,6 @@ CHUNK = 4096  # rows of a block that take a quarter of the second-level cache
 
 
 @njit
-@no_type_check
 def add_products(space, columns, parts, begin, end):
     """Add the rows of the product spaceᵀ columns that belong to slots begin to end - 1 to `parts`.
 
@@ -43,7 +40,6 @@ def add_products(space, columns, parts, begin, end):
 
 
 @njit
-@no_type_check
 def subtract_combination(space, parts, columns, begin, end):
     """Subtract the product of `space` and `parts` from rows begin to end - 1 of the columns.
 
@@ -72,7 +68,6 @@ def subtract_combination(space, parts, columns, begin, end):
 
 
 @njit
-@no_type_check
 def multiply_lanes(matrix, given, before, factor, share, begin, end, out):
     """Fill rows begin to end - 1 of `out` with factor A given - share before.
 

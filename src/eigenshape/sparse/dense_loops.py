@@ -3,8 +3,6 @@
 Only entries on and below the diagonal are used.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -16,7 +14,6 @@ LONG = 256  # terms of a sum in one product: shorter sums have less rounding err
 
 
 @njit
-@no_type_check
 def eliminate_plain(front, height, width, pivots, low):
     """Eliminate the first columns one by one; return whether all pivots are finite and not zero.
 
@@ -41,7 +38,6 @@ def eliminate_plain(front, height, width, pivots, low):
 
 
 @njit
-@no_type_check
 def eliminate_blocked(front, height, width, pivots, low, times, begin, stop, alone, blas):
     """Eliminate columns begin to stop - 1 by recursive halving, so that most work is in matrix products.
 
@@ -84,7 +80,6 @@ def eliminate_blocked(front, height, width, pivots, low, times, begin, stop, alo
 
 
 @njit
-@no_type_check
 def update_rows(front, height, width, times, end, begin, stop, blas):
     """Update rows begin to stop - 1 to the right of the columns before `end`, which are eliminated.
 

@@ -4,8 +4,6 @@ The points of a segment are those whose `owner` is its name. The caller allocate
 scratch: compiling an allocation takes longer than compiling a small loop.
 """
 
-from typing import no_type_check
-
 from eigenshape._compile import njit
 
 LEAF = 160  # most points of a segment that is ordered by minimum degree
@@ -14,7 +12,6 @@ SMOOTHINGS = 4  # smoothing passes over the keys: smooth keys have short cuts
 
 
 @njit
-@no_type_check
 def breadth_first(indptr, indices, root, owner, name, distance, queue):
     """Fill the distances from a root within a segment; return the number of points reached.
 
@@ -40,7 +37,6 @@ def breadth_first(indptr, indices, root, owner, name, distance, queue):
 
 
 @njit
-@no_type_check
 def smooth_keys(indptr, indices, segment, owner, name, key, smoothed):
     """Smooth the keys within a segment, which shortens cuts. `smoothed` is scratch."""
     for _ in range(SMOOTHINGS):
@@ -57,7 +53,6 @@ def smooth_keys(indptr, indices, segment, owner, name, key, smoothed):
 
 
 @njit
-@no_type_check
 def count_cuts(indptr, indices, segment, owner, name, key, low, below, from_above, from_below):
     """Count the points below and on the cut at each value of the keys.
 
@@ -87,7 +82,6 @@ def count_cuts(indptr, indices, segment, owner, name, key, low, below, from_abov
 
 
 @njit
-@no_type_check
 def take_sides(indptr, indices, segment, owner, name, key, level, above, side):
     """Fill the side of each point of a segment: 0 below the level, 1 above, 2 on the cut."""
     for i in range(len(segment)):
@@ -101,7 +95,6 @@ def take_sides(indptr, indices, segment, owner, name, key, level, above, side):
 
 
 @njit
-@no_type_check
 def order_leaf(indptr, indices, nodes, start, stop, owner, place, local, order, degree, bits):
     """Order a leaf by minimum degree, with its outer neighbors counted in the degrees.
 

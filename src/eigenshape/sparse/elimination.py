@@ -1,11 +1,10 @@
 """The symbolic analysis of symmetric matrices that share a pattern: an order, and fronts."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Int
 
+from eigenshape._arrays import record
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
 from eigenshape.sparse.dense_loops import LONG, NARROW
@@ -15,7 +14,7 @@ from eigenshape.sparse.tasks import Tasks, divide_fronts
 Indices = Int[np.ndarray, " ..."]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Elimination:
     """The symbolic analysis of a symmetric pattern: an order of elimination, and fronts (Liu 1992).
 

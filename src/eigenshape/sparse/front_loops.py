@@ -3,8 +3,6 @@
 The caller allocates all arrays: compiling an allocation takes longer than compiling a small loop.
 """
 
-from typing import no_type_check
-
 from eigenshape._compile import njit
 from eigenshape.sparse.dense_loops import eliminate_blocked, eliminate_plain
 from eigenshape.sparse.lane_loops import (
@@ -28,7 +26,6 @@ SOON = 64  # cache lines of the next panel that are asked for ahead (measured)
 
 
 @njit
-@no_type_check
 def factor_fronts(
     tree, lower, panels, pivots, updates, room, task_begin, begin, end, top, stage, blas
 ):
@@ -99,7 +96,6 @@ def factor_fronts(
 
 
 @njit
-@no_type_check
 def solve_lower(tree, tasks, panels, right, lanes, gathered, begin, end):
     """Fill rows of `lanes` with L⁻¹ times the right-hand sides, in the order of elimination.
 
@@ -139,7 +135,6 @@ def solve_lower(tree, tasks, panels, right, lanes, gathered, begin, end):
 
 
 @njit
-@no_type_check
 def solve_upper(tree, rows, fronts, panels, pivots, lanes, solution, gathered, begin, end):
     """Fill rows of `solution` with L⁻ᵀ D⁻¹ times the result of `solve_lower` in `lanes`.
 
@@ -190,7 +185,6 @@ def solve_upper(tree, rows, fronts, panels, pivots, lanes, solution, gathered, b
 
 
 @njit
-@no_type_check
 def add_sizes(first, begins, rows, places, panels, pivots, weights, sizes, terms):
     """Add the row sums of |L||D||L|ᵀ to `sizes`, and the number of entries per row of L to `terms`.
 

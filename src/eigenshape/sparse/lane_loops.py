@@ -4,6 +4,8 @@ The compiler would use eight scalars, so the vector instructions are written out
 the vectors into the sizes of the machine.
 """
 
+from typing import Any
+
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -18,7 +20,7 @@ VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 AHEAD = 32
 
 
-def _summation(n_targets: int, change: str, *, kept: bool = True, ahead: int = 0):
+def _summation(n_targets: int, change: str, *, kept: bool = True, ahead: int = 0) -> Any:
     """Return the intrinsic that changes `n_targets` rows at once by sums: "fadd" or "fsub".
 
     Rows that are not kept count as 0. More rows use the multipliers better, as long as all fit into

@@ -4,8 +4,6 @@ The caller allocates all arrays, also scratch, and sorts them: compiling an allo
 sort takes longer than compiling the loop that uses it.
 """
 
-from typing import no_type_check
-
 from eigenshape._compile import njit
 
 # Supernodes are merged if the merged one stores few zeros that the factor does not need. The
@@ -18,7 +16,6 @@ BEYOND_ZEROS = 0.05
 
 
 @njit
-@no_type_check
 def find_parents(indptr, indices, order, place, parent, ancestor):
     """Fill the elimination tree: the parent of each column, -1 at a root (Liu 1990).
 
@@ -38,7 +35,6 @@ def find_parents(indptr, indices, order, place, parent, ancestor):
 
 
 @njit
-@no_type_check
 def postorder(parent, first_child, sibling, stack, order):
     """Fill `order` with a postorder of the columns: children first, each subtree contiguous.
 
@@ -69,7 +65,6 @@ def postorder(parent, first_child, sibling, stack, order):
 
 
 @njit
-@no_type_check
 def count_entries(indptr, indices, order, place, parent, mark, counts):
     """Count the entries of each column of the factor, with the diagonal.
 
@@ -87,7 +82,6 @@ def count_entries(indptr, indices, order, place, parent, mark, counts):
 
 
 @njit
-@no_type_check
 def join_runs(parent, first, heights, widths, zeros, keep):
     """Merge supernodes with nearly the same entries; `keep` tells which ones remain.
 
@@ -117,7 +111,6 @@ def join_runs(parent, first, heights, widths, zeros, keep):
 
 
 @njit
-@no_type_check
 def find_front_rows(
     indptr, indices, order, place, first, begins, above, rows, first_child, sibling, mark
 ):

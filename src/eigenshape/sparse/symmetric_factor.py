@@ -1,11 +1,10 @@
 """Factors L D Lᵀ of symmetric matrices that share a pattern, with pivots on the diagonal."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape._threads import (
     SpareMemory,
     free_threads,
@@ -31,7 +30,7 @@ Room = tuple[Float[np.ndarray, " f"], Float[np.ndarray, " f"], Indices]
 Updates = tuple[Float[np.ndarray, " u"], Indices]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Scratch:
     """Memory for solves: the rows of all tasks, and for each thread those of a front."""
 
@@ -39,7 +38,7 @@ class Scratch:
     rooms: SpareMemory[Float[np.ndarray, "t 8"]]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SymmetricFactor:
     """A = L D Lᵀ in an order of elimination: L unit lower triangular in panels, D diagonal."""
 
@@ -135,7 +134,7 @@ class SymmetricFactor:
         return bounds
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FactorMemory:
     """Memory that is needed while a matrix is factored; factors of one pattern use it in turn.
 
@@ -187,7 +186,7 @@ def factorize_symmetric(
     return SymmetricFactor(e, making.panels, making.pivots)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Making:
     """A factor in the making: what is given, what is filled, and memory that its fronts share."""
 

@@ -1,9 +1,9 @@
 """Tasks of a factor, which several threads share: subtrees of fronts, then the fronts above them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
+
+from eigenshape._arrays import record
 
 Indices = Int[np.ndarray, " ..."]
 
@@ -13,7 +13,7 @@ FEWEST_ENTRIES = 2_000_000
 LARGEST_SHARE = 1 / 24
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Tasks:
     """Fronts in tasks: those of one round need nothing of each other.
 

@@ -29,7 +29,7 @@ ARCHIVE_ROUNDING = 1e-6
 
 def write_arrays(path: str | Path, head: Mapping[str, Any], fields: Mapping[str, Any]) -> None:
     """Write arrays and sparse matrices by name, and a head as JSON, all uncompressed."""
-    arrays: dict[str, np.ndarray] = {}
+    arrays: dict[str, Any] = {}
     for name, field in fields.items():
         if sp.issparse(field):
             arrays |= {f"{name}_{part}": getattr(field, part) for part in PARTS}

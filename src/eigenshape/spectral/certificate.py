@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 
 
 @dataclass(frozen=True)
-class Certificate:
+class Certificate(Shown):
     """The proof that a spectrum contains all eigenvalues, with none missing and none extra.
 
     By Sylvester's law of inertia, the number of negative pivots of a factor of W - σB is the number
@@ -88,9 +88,6 @@ class Certificate:
     n_deflated: int = 0
     estimate: float | None = None
     fallbacks: tuple[str, ...] = ()
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def complete(self) -> bool:

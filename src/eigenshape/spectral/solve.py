@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze, positive_values, whole_number
+from eigenshape._arguments import require_choice, require_type
+from eigenshape._arrays import freeze, positive_number, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._files import as_path
 from eigenshape._progress import Progress, silent
@@ -218,10 +218,7 @@ def _require_fitting_options(
     max_residual: float | None,
 ) -> None:
     """Raise an error if options are given that do not go together."""
-    if method not in get_args(Method):
-        raise InvalidParameterError(
-            f"method must be 'certified' or 'approximate'; it is {method!r}."
-        )
+    require_choice(method, Method, "method")
     if (k is None) == (below is None):
         raise InvalidParameterError(
             f"Exactly one of k and below must be given; k is {k} and below is {below}."
@@ -252,8 +249,8 @@ def _requested_pairs(
     """Return k, or 0 and the ends of an interval of the pencil's eigenvalues."""
     if k is not None:
         return whole_number(k, "k", 1, operator.n_points), np.zeros(2)
-    high = float(positive_values(np.array([below], dtype=float), "below")[0])
-    low = -np.inf if above is None or above == 0 else float(positive_values([above], "above")[0])
+    high = positive_number(np.array(below, dtype=float), "below")
+    low = -np.inf if above is None or above == 0 else positive_number(above, "above")
     if low >= high:
         raise InvalidParameterError(
             f"above must be less than below; above is {above} and below is {below}."

@@ -1,6 +1,5 @@
 """A spectrum, the proof that nothing is missing from it, and how fast its modes lose heat."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +7,8 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, positive_values
+from eigenshape._arrays import ReadOnly, positive_values, record
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.archive import read_spectrum, write_spectrum
 from eigenshape.spectral.certificate import Certificate
@@ -24,7 +22,7 @@ ZERO_RESIDUALS = 4
 APPROXIMATE_NULL = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Spectrum(ReadOnly):
     """Eigenvalues and eigenvectors of a Laplacian, with the certificate that none is missing.
 
@@ -67,8 +65,6 @@ class Spectrum(ReadOnly):
     mass: sp.csr_array
     residuals: Float[np.ndarray, " k"]
     certificate: Certificate
-
-    __repr__ = short_repr
 
     def save(self, path: str | Path, *, key: str | None = None) -> None:
         """Write the spectrum to a .npz file; `load` reads it back bit for bit.

@@ -9,7 +9,6 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, positive_values, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.distances.closest import squared_distances
 from eigenshape.geometry.distances.geodesic import farthest_first, geodesic_waves
@@ -55,8 +54,6 @@ class AnchorNodes(ReadOnly):
     points: Float[np.ndarray, "r d"]
     reached: float
     cover: float
-
-    __repr__ = short_repr
 
 
 def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes:

@@ -8,7 +8,6 @@ from jaxtyping import Bool, Float
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
@@ -68,8 +67,6 @@ class CheegerEstimate(ReadOnly):
     lower: float
     mode: int
     part: Bool[np.ndarray, " n"]
-
-    __repr__ = short_repr
 
 
 def cheeger_estimate(

@@ -8,7 +8,6 @@ from jaxtyping import Float
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly
-from eigenshape._text import short_repr
 from eigenshape.geometry.enclosing_ball import enclosing_ball
 from eigenshape.geometry.simplices import require_volumes, size_one, volumes
 from eigenshape.stability.perturbation import Perturbation, vertex_pairs
@@ -63,8 +62,6 @@ class Closeness(ReadOnly):
     size: float
     delta: float
     limited_by: Limit
-
-    __repr__ = short_repr
 
     def explain(self) -> str:
         """Describe in plain words how close the shapes are, and what limits δ."""

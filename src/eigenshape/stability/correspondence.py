@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, finite_rows, positive_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.features.bipartite_loops import match_rows
 from eigenshape.features.least_matching import least_perfect, near_pairs
@@ -51,8 +50,6 @@ class MaximumMatching(ReadOnly):
     partners: Int[np.ndarray, " n"]
     blocked: Int[np.ndarray, " b"]
 
-    __repr__ = short_repr
-
     @property
     def n_matched(self) -> int:
         """Number of rows with a partner."""
@@ -89,8 +86,6 @@ class BottleneckMatching(ReadOnly):
 
     partners: Int[np.ndarray, " n"]
     distance: float
-
-    __repr__ = short_repr
 
 
 def matching_reach(mu: float) -> float:

@@ -8,7 +8,6 @@ from jaxtyping import Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, face_labels
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
@@ -57,8 +56,6 @@ class Perturbation(ReadOnly):
     two: Mesh
     regions_one: Labels
     regions_two: Labels
-
-    __repr__ = short_repr
 
     @property
     def n_regions(self) -> int:

@@ -10,7 +10,6 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, positive_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
@@ -106,8 +105,6 @@ class StabilityReport(ReadOnly):
     angles: EigenspaceAngles
     n_samples: int
     distances: tuple[Float[np.ndarray, " n1"], Float[np.ndarray, " n2"]]
-
-    __repr__ = short_repr
 
     def explain(self) -> str:
         """Describe the results in plain words, in one paragraph each."""

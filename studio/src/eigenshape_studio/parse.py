@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 import eigenshape as es
+from eigenshape.io.formats.registry import HEMISPHERES, suffix_in
 from eigenshape_studio.wire import WireError, decode, encode
 
 LONGEST_NAME = 120  # characters that are kept of a file's name
@@ -45,7 +46,9 @@ def display_name(name: object) -> str:
 
 def shape_suffix(name: str) -> str:
     """Return the suffix of a file's name; raise FileFormatError if it is not one of a shape."""
-    suffix = Path(name).suffix.lower()
+    suffix = suffix_in(name)
+    if suffix not in es.io.SHAPE_FORMATS and name.startswith(HEMISPHERES):
+        return ".surf"  # as lh.pial; what is none is refused by its first bytes
     if suffix not in es.io.SHAPE_FORMATS:
         known = ", ".join(es.io.SHAPE_FORMATS)
         raise es.FileFormatError(

@@ -86,7 +86,7 @@ def _picture(source: str | None) -> tuple[bytes | None, dict[str, list[float]]]:
 def _draw_file(source: str, _changed: int) -> tuple[bytes, dict[str, list[float]]]:
     """Draw a mesh file; a file that changes is drawn again."""
     mesh = es.io.read_surface(source).mesh
-    camera = es.plot.three_quarter_view(mesh, size=THUMBNAIL)
+    camera = es.plot.aim_camera(mesh, size=THUMBNAIL)
     file = BytesIO()
     imsave(file, es.plot.draw(mesh, camera).image, format="png")
     return file.getvalue(), upright_view(mesh)

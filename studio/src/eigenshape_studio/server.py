@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import anyio.to_thread
+import numpy as np
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
@@ -199,9 +200,17 @@ def _first_workspace(
         return Workspace(creature, "quadruped", index=index, shared=True)
     if isinstance(mesh, str | Path):
         path, surface = Path(mesh), es.io.read_surface(mesh).mesh
-        first = Workspace(surface, path.name, index=index, shared=True)
+        attributes, values = None, {}
         with suppress(es.FileFormatError):  # points have no attributes
             attributes = es.read_mesh(path, attributes=True, drop_missing=True)[1]
-            first.attributes = es.io.carry_attributes(attributes, surface)
+            attributes = es.io.carry_attributes(attributes, surface)
+            # The page can choose from the functions in the file that it can draw.
+            values = {
+                title: field
+                for title, field in attributes.fields.items()
+                if field.shape == (surface.n_vertices,) and np.isfinite(field).all()
+            }
+        first = Workspace(surface, path.name, values=values, index=index, shared=True)
+        first.attributes = attributes
         return first
     return Workspace(mesh, index=index, shared=True)

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import eigenshape as es
-from eigenshape.operators.clouds.cells import (
+from eigenshape.operators.clouds.cell_grid import (
     cell_grid,
     count_partners,
     gaussian_differences,

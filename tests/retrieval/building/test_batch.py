@@ -23,8 +23,8 @@ from eigenshape.retrieval.building.batch import (
     content_digest,
     train_codebook_from_files,
 )
-from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.kinds import describe
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 
 

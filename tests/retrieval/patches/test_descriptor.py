@@ -8,8 +8,7 @@ from describers import keep
 
 import eigenshape as es
 from eigenshape.retrieval.building import batch
-from eigenshape.retrieval.description import describe_to_store
-from eigenshape.retrieval.kinds import recipe_from_text, recipe_to_text
+from eigenshape.retrieval.kinds import describe_to_store, recipe_from_text, recipe_to_text
 from eigenshape.retrieval.patches.codebook import CLIP, encode_patches, round_codes
 from eigenshape.retrieval.patches.patches import surface_patches
 

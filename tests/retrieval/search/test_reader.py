@@ -240,7 +240,7 @@ def test_a_snapshot_gives_what_search_needs(index):
         assert [each.label for each in facts] == ["class 0", "class 0", None]
         labels, codes = reader.state.labels
         assert [labels[code] for code in codes[[0, 3, 9]]] == ["class 0", "class 0", None]
-        assert np.flatnonzero(found.mask(np.array([facts[1].id]))).tolist() == [6, 7]
+        assert np.flatnonzero(found.shape_of == facts[1].id).tolist() == [6, 7]
         assert found.beside("coarse.bin").parent == index.folder
 
 

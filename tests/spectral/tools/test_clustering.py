@@ -78,7 +78,7 @@ def test_bad_input_is_named():
             es.spectral.spectral_clusters(spectrum, few)
     with pytest.raises(es.InvalidParameterError, match=r"n_clusters must lie in 1\.\.8; it is 9"):
         es.spectral.spectral_clusters(spectrum, 9)
-    with pytest.raises(es.InvalidParameterError, match='"k-means" or "normalized-cut"'):
+    with pytest.raises(es.InvalidParameterError, match="'k-means' or 'normalized-cut'"):
         unwrap(es.spectral.spectral_clusters)(spectrum, 3, method="ward")
     with pytest.raises(
         es.InvalidParameterError, match="at least 3 eigenvalues; the spectrum has 2"
@@ -157,7 +157,7 @@ def test_bad_parameters_of_estimators_are_named():
         es.spectral.SpectralClusterer(21).fit(points)
     with pytest.raises(es.InvalidParameterError, match=r"n_components must lie in 1\.\.19"):
         es.spectral.SpectralEmbedder(20).fit(points)
-    with pytest.raises(es.InvalidParameterError, match="method must be one of spectral, commute"):
+    with pytest.raises(es.InvalidParameterError, match="method must be 'spectral', 'commute"):
         es.spectral.SpectralEmbedder(2).set_params(method="tsne").fit(points)
     with pytest.raises(es.InvalidParameterError, match="n_neighbors must be at least 2"):
         es.spectral.SpectralEmbedder(2, n_neighbors=1).fit(points)

@@ -167,7 +167,7 @@ def test_bad_input_is_named():
     for t in (0.0, -1.0, np.nan):
         with pytest.raises(es.InvalidParameterError, match="t must be positive and finite"):
             es.spectral.spectral_distances(SPECTRUM, method="diffusion", t=t)
-    with pytest.raises(es.InvalidParameterError, match="t must be one diffusion time"):
+    with pytest.raises(es.InvalidParameterError, match="t must be one number; there are"):
         unwrap(es.spectral.spectral_embedding)(SPECTRUM, t=[0.1, 0.2])
     for options in ({"method": "diffusion"}, {"t": 0.1}):
         with pytest.raises(es.InvalidParameterError, match="and no others, take a time t"):

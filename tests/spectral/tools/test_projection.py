@@ -140,7 +140,7 @@ def test_bad_values_are_named(bad, match):
 
 
 def test_other_bad_input_is_named():
-    with pytest.raises(es.InvalidParameterError, match='inner_product must be "mass" or "plain"'):
+    with pytest.raises(es.InvalidParameterError, match="inner_product must be 'mass' or 'plain'"):
         unwrap(es.spectral.project)(np.zeros(288), SPECTRUM, "dot")
     with pytest.raises(es.InvalidParameterError, match="one row per eigenvector, from 1 to 40"):
         es.spectral.reconstruct(np.zeros(41), SPECTRUM)

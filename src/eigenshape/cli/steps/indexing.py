@@ -12,7 +12,7 @@ from eigenshape._threads import thread_count
 from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, err, progress_bar
 from eigenshape.cli.inputs import memory_bytes
-from eigenshape.io.surfaces import read_surface
+from eigenshape.io.surface_files import read_surface
 from eigenshape.retrieval.building.batch import (
     BatchReport,
     announce_learning,

@@ -22,7 +22,7 @@ from eigenshape.io.labeled_shapes import (
     read_labeled_shape,
     read_map,
 )
-from eigenshape.io.surfaces import read_surface
+from eigenshape.io.surface_files import read_surface
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 
 __all__ = ["read_map"]  # for the verbs, as it is, beside what is defined here

@@ -32,7 +32,21 @@ def index_recipe(
             f"a shape. Leave --frames out, or choose another index."
         )
     if codebook is not None:
-        asked = _read_recipe(codebook, kept.n_frames if kept else n_frames or 0)
+        wanted = kept.n_frames if kept else n_frames or 0
+        if codebook.is_dir():  # another index
+            found = _patch_recipe(ShapeIndex.open(codebook))
+            if found is None:
+                raise StoreError(
+                    f"--codebook takes an index that has a codebook; {codebook} has none."
+                )
+            asked = replace(found, n_frames=wanted)
+        else:
+            try:
+                asked = PatchRecipe(read_codebook(codebook.read_bytes()), n_frames=wanted)
+            except (ValueError, TypeError, BadZipFile, UnpicklingError) as error:
+                raise FileFormatError(
+                    f"--codebook takes a file of `eigenshape index learn`; {codebook} is none: {error}."
+                ) from error
         if kept not in (None, asked):
             raise InvalidParameterError(
                 f"An index has one codebook; {shelf.folder} has another one than {codebook}. "
@@ -46,21 +60,6 @@ def index_recipe(
         )
         return PatchRecipe(n_frames=n_frames or 0)
     return kept
-
-
-def _read_recipe(path: Path, n_frames: int) -> PatchRecipe:
-    """Return the recipe of a codebook file, or that of another index."""
-    if path.is_dir():
-        recipe = _patch_recipe(ShapeIndex.open(path))
-        if recipe is None:
-            raise StoreError(f"--codebook takes an index that has a codebook; {path} has none.")
-        return replace(recipe, n_frames=n_frames)
-    try:
-        return PatchRecipe(read_codebook(path.read_bytes()), n_frames=n_frames)
-    except (ValueError, TypeError, BadZipFile, UnpicklingError) as error:
-        raise FileFormatError(
-            f"--codebook takes a file of `eigenshape index learn`; {path} is none: {error}."
-        ) from error
 
 
 def query_recipe(shelf: ShapeIndex, name: str | None) -> AnyRecipe:

@@ -18,13 +18,12 @@ from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.simplices import size_one
-from eigenshape.io.surfaces import read_surface
-from eigenshape.plot.camera import Up, View, aim_camera
+from eigenshape.io.surface_files import read_surface
+from eigenshape.plot.camera import aim_camera
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
-from eigenshape.retrieval.description import describe
 from eigenshape.retrieval.heat.features import find_heat_features, find_view_features
 from eigenshape.retrieval.heat.recipe import HeatRecipe
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe
 from eigenshape.retrieval.search.matches import Match
 
 CAPTION = "corresponding parts have one color; a lower score is more similar"
@@ -81,10 +80,9 @@ def contact_sheet(
     title: str,
     matches: Sequence[Match],
     *,
-    repairs: tuple[str, ...] = (),
-    caption: str = "",
-    view: View = "auto",
-    up: Up = "auto",
+    repairs: tuple[str, ...],
+    caption: str,
+    side: Side,
 ) -> Figure:
     """Draw a query beside its matches, read from their files.
 
@@ -101,7 +99,7 @@ def contact_sheet(
         for done, match in enumerate(matches):
             progress(done / len(matches), match.name)
             panels.append(_panel(query, match, repairs))
-    return figure_contact_sheet(first, panels, caption=caption, **_side_of(query, view, up))
+    return figure_contact_sheet(first, panels, caption=caption, **_side_of(query, side))
 
 
 def explanation(
@@ -109,9 +107,8 @@ def explanation(
     title: str,
     match: Match,
     *,
-    repairs: tuple[str, ...] = (),
-    view: View = "auto",
-    up: Up = "auto",
+    repairs: tuple[str, ...],
+    side: Side,
 ) -> Figure:
     """Draw a query beside one match, with the points that correspond, surest first.
 
@@ -132,12 +129,12 @@ def explanation(
         f"The {len(ours)} surest of {len(match.correspondences)} pairs of corresponding points: "
         "their surroundings have one color"
     )
-    return figure_contact_sheet(panels[0], panels[1:], caption=caption, **_side_of(query, view, up))
+    return figure_contact_sheet(panels[0], panels[1:], caption=caption, **_side_of(query, side))
 
 
-def _side_of(query: ColoredQuery, view: View, up: Up) -> Side:
+def _side_of(query: ColoredQuery, side: Side) -> Side:
     """Return the side from which the query is drawn, as directions: matches are turned to it."""
-    _, down, towards = aim_camera(query.mesh, view=view, up=up).rotation
+    _, down, towards = aim_camera(query.mesh, **side).rotation
     return {"view": towards, "up": -down}
 
 
@@ -164,11 +161,18 @@ def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel
     ours, theirs = match.correspondences.T
     recipe = query.descriptor.recipe
     if isinstance(recipe, HeatRecipe):
-        colors = np.full(
-            len(match.vertices) + 1, -1
-        )  # the last one is for what no view of the match shows
+        # The last color is for what no view of the match shows, and for fragments, which come last
+        # among the parts and have no feature.
+        colors = np.full(len(match.vertices) + 1, -1)
         colors[theirs] = query.colors[ours]
-        labels = colors[_parts(mesh, recipe, match)]
+        if match.view == 0:
+            parts = find_heat_features(mesh, recipe).parts.labels
+            parts = np.where(parts < len(match.vertices), parts, -1)
+        else:
+            part, seen = find_view_features(mesh, recipe, match.view - 1)
+            parts = np.full(mesh.n_faces, -1)
+            parts[part.source_faces] = seen.parts.labels
+        labels = colors[parts]
     else:
         reach = REACH * np.sqrt(surface_area(mesh) / len(match.vertices))
         labels = _cells(mesh, match.vertices[theirs], query.colors[ours], reach)
@@ -189,19 +193,6 @@ def _read_match(match: Match, repairs: tuple[str, ...]) -> TriangleMesh:
             f"{mesh.n_vertices} vertices. Give the same --repair as to `eigenshape index add`, or index the file again."
         )
     return mesh
-
-
-def _parts(mesh: TriangleMesh, recipe: HeatRecipe, match: Match) -> Int[np.ndarray, " f"]:
-    """Find the parts of a match again, -1 on fragments and where the view that matched does not see its surface."""
-    if match.view == 0:
-        labels = find_heat_features(mesh, recipe).parts.labels
-        return np.where(
-            labels < len(match.vertices), labels, -1
-        )  # fragments, which come last, have no feature
-    part, seen = find_view_features(mesh, recipe, match.view - 1)
-    labels = np.full(mesh.n_faces, -1)
-    labels[part.source_faces] = seen.parts.labels
-    return labels
 
 
 def _cells(

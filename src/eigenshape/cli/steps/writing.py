@@ -14,7 +14,7 @@ from eigenshape._files import replace_file
 from eigenshape.cli.console import err, escape_text, print_written
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.formats.registry import WITH_COLORS, WITH_MORE, WRITTEN
+from eigenshape.io.formats.registry import HEMISPHERES, WITH_COLORS, WITH_MORE, WRITTEN
 from eigenshape.io.labeled_shapes import write_labels
 from eigenshape.io.mesh_files import read_mesh, save_mesh, write_mesh
 from eigenshape.matching.shape_match import ShapeMatch
@@ -76,7 +76,8 @@ def require_output(path: Path | None, suffixes: Sequence[str], what: str) -> Non
     """Raise an error if the path ends in none of the suffixes, or its folder does not exist."""
     if path is None:
         return
-    if path.suffix.lower() not in suffixes:
+    is_freesurfer = ".surf" in suffixes and path.name.startswith(HEMISPHERES)  # as lh.pial
+    if path.suffix.lower() not in suffixes and not is_freesurfer:
         raise InvalidParameterError(
             f"{what} must be written to a file that ends in {', '.join(suffixes)}; {path} ends in "
             f"{path.suffix!r}."

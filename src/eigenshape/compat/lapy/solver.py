@@ -11,6 +11,7 @@ from scipy.sparse.linalg import eigsh
 
 from eigenshape._arrays import point_functions
 from eigenshape._errors import InvalidParameterError
+from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.linear_solver import factor_equations
 from eigenshape.geometry.mesh import TriangleMesh
@@ -90,6 +91,8 @@ class Solver:
     [0.0, 2.0, 2.0, 2.0]
     """
 
+    _repr_html_ = html_repr
+
     def __init__(
         self,
         geometry: Any,
@@ -113,6 +116,12 @@ class Solver:
             )
         self.geotype = type(geometry)
         self.use_cholmod = use_cholmod
+
+    def __repr__(self) -> str:
+        # neuromodes' solver, which inherits, makes its matrix when it is asked for.
+        matrix = vars(self).get("stiffness")
+        size = "" if matrix is None else f"{matrix.shape[0]} points"
+        return f"{type(self).__name__}({size})"
 
     # The static functions keep LaPy's names, also the private ones, since neuromodes calls them.
 

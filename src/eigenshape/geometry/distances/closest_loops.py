@@ -3,8 +3,6 @@
 The corners of face i are `corners[i]`. Faces are in the order of the leaves of a `box_tree`.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -15,7 +13,6 @@ SMALL, LARGE = 1e-100, 1e100
 
 
 @njit
-@no_type_check
 def nearest_faces(points, corners, levels, nodes):
     """Return, for each point, its nearest face, the weights of the corners there, and distance².
 
@@ -55,7 +52,6 @@ def nearest_faces(points, corners, levels, nodes):
 
 
 @njit
-@no_type_check
 def nearest_around(points, middles, starts, reach, corners, neighbors):
     """Return, for three points each, the nearest of the faces around a start, and weights there.
 
@@ -91,7 +87,6 @@ def nearest_around(points, middles, starts, reach, corners, neighbors):
 
 
 @njit
-@no_type_check
 def _to_box(boxes, i, x, y, z):
     """Return the squared distance to a box."""
     along = max(boxes[i, 0] - x, 0.0, x - boxes[i, 3])
@@ -101,7 +96,6 @@ def _to_box(boxes, i, x, y, z):
 
 
 @njit
-@no_type_check
 def to_face(corners, face, x, y, z):
     """Return the squared distance to a face, and the weights of corners 1 and 2 there.
 
@@ -133,7 +127,6 @@ def to_face(corners, face, x, y, z):
 
 
 @njit
-@no_type_check
 def _to_segment(ux, uy, uz, wx, wy, wz):
     """Return the squared distance of w to the segment from 0 to u, and the share of u there."""
     square = ux * ux + uy * uy + uz * uz
@@ -144,7 +137,6 @@ def _to_segment(ux, uy, uz, wx, wy, wz):
 
 
 @njit
-@no_type_check
 def windings(points, corners):
     """Return how often faces wind around each point: the sum of their solid angles over 4π.
 

@@ -3,8 +3,6 @@
 The corners of face i are `points[3 i : 3 i + 3]`. Faces are in the order of the tree's leaves.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -14,7 +12,6 @@ LEAF = 4  # most faces of a leaf; more means fewer nodes but more pairs of faces
 
 
 @njit
-@no_type_check
 def face_boxes(points):
     """Return the least and the largest coordinates of each face, (f, 6)."""
     boxes = np.empty((len(points) // 3, 6))
@@ -26,7 +23,6 @@ def face_boxes(points):
 
 
 @njit
-@no_type_check
 def curve_places(boxes):
     """Return the place of each box center on Morton's curve through 2^20 cells per side."""
     places = np.zeros(len(boxes), dtype=np.int64)
@@ -43,7 +39,6 @@ def curve_places(boxes):
 
 
 @njit
-@no_type_check
 def box_tree(boxes):
     """Return the boxes of a complete binary tree of 2^levels leaves.
 
@@ -66,20 +61,17 @@ def box_tree(boxes):
 
 
 @njit
-@no_type_check
 def _widen(box, other):
     for axis in range(3):
         box[axis], box[3 + axis] = min(box[axis], other[axis]), max(box[3 + axis], other[3 + axis])
 
 
 @njit
-@no_type_check
 def _box(boxes, i):
     return boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], boxes[i, 4], boxes[i, 5]
 
 
 @njit
-@no_type_check
 def _meet(one, other):
     return (
         one[0] <= other[3]
@@ -92,7 +84,6 @@ def _meet(one, other):
 
 
 @njit
-@no_type_check
 def crossing_pairs(points, boxes):
     """Return the pairs of faces that cross, (p, 2), in no particular order.
 
@@ -129,7 +120,6 @@ def crossing_pairs(points, boxes):
 
 
 @njit
-@no_type_check
 def _axes(points):
     """Return, for each face, an axis along which its projection has area; -1 if the face has none."""
     axes = np.empty(len(points) // 3, dtype=np.int64)
@@ -143,7 +133,6 @@ def _axes(points):
 
 
 @njit
-@no_type_check
 def _cross(points, axes, i, j):
     """Return whether the interior of one of two faces meets the other; at least one has area.
 
@@ -180,7 +169,6 @@ def _cross(points, axes, i, j):
 
 
 @njit
-@no_type_check
 def _beyond_shared_side(points, a, b):
     """Return the corner of face b opposite to a side that it shares with face a, or -1."""
     shared, apex = 0, -1
@@ -193,7 +181,6 @@ def _beyond_shared_side(points, a, b):
 
 
 @njit
-@no_type_check
 def _sides(points, a, b):
     """Return on which sides of face a's plane b has corners, and the corner alone on its side.
 
@@ -214,7 +201,6 @@ def _sides(points, a, b):
 
 
 @njit
-@no_type_check
 def _is_apart(points, u, v, a, p, q, r):
     """Return whether a side of face a separates it from p, q, r, projected to axes u and v.
 
@@ -233,7 +219,6 @@ def _is_apart(points, u, v, a, p, q, r):
 
 
 @njit
-@no_type_check
 def _enters(points, axis, a, b):
     """Return whether face a, a segment or a point, has a point inside face b.
 
@@ -258,7 +243,6 @@ def _enters(points, axis, a, b):
 
 
 @njit
-@no_type_check
 def _ends(points, a):
     """Return the first and the last of three corners on a line, by x, then y, then z."""
     first, last = a, a
@@ -271,7 +255,6 @@ def _ends(points, a):
 
 
 @njit
-@no_type_check
 def _is_before(points, p, q):
     for axis in range(3):
         if points[p, axis] != points[q, axis]:

@@ -3,8 +3,6 @@
 The caller allocates all arrays: compiling an allocation takes longer than compiling a small loop.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -13,7 +11,6 @@ FRONT = -1  # stands for the source of a vertex that a straight front of several
 
 
 @njit
-@no_type_check
 def through_edge(near, far, length, corner_x, corner_y):
     """Return the distance of a triangle's third corner from a source beyond the opposite edge.
 
@@ -35,7 +32,6 @@ def through_edge(near, far, length, corner_x, corner_y):
 
 
 @njit
-@no_type_check
 def across_edge(near, far, length, corner_x, corner_y):
     """Return the distance of the third corner from a straight front (Kimmel and Sethian 1998).
 
@@ -55,7 +51,6 @@ def across_edge(near, far, length, corner_x, corner_y):
 
 
 @njit
-@no_type_check
 def spread_wave(fans, radius, sources, scratch, reached, distances):
     """Fill the vertices within `radius` of some sources and their distances; return their number.
 
@@ -134,7 +129,6 @@ def spread_wave(fans, radius, sources, scratch, reached, distances):
 
 
 @njit
-@no_type_check
 def spread_waves(fans, radius, sources, scratch, counts, reached, distances):
     """Spread one wave from each source, and return for how many sources there was room.
 
@@ -153,7 +147,6 @@ def spread_waves(fans, radius, sources, scratch, counts, reached, distances):
 
 
 @njit
-@no_type_check
 def _rise(keys, ids, height, key, vertex):
     place = height
     while place:
@@ -166,7 +159,6 @@ def _rise(keys, ids, height, key, vertex):
 
 
 @njit
-@no_type_check
 def _sink(keys, ids, height):
     key, vertex = keys[height], ids[height]
     place = 0

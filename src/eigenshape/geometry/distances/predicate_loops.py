@@ -7,8 +7,6 @@ size (section 2 there). Coordinates must be at most 2 in size and whole multiple
 no product of three underflows.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -25,7 +23,6 @@ MOST_TERMS = 192
 
 
 @njit
-@no_type_check
 def _two_sum(a, b):
     """Return the rounded sum a + b and its rounding error (Knuth)."""
     total = a + b
@@ -34,7 +31,6 @@ def _two_sum(a, b):
 
 
 @njit
-@no_type_check
 def _two_product(a, b):
     """Return the rounded product a b and its rounding error (Dekker, Veltkamp)."""
     product = a * b
@@ -47,7 +43,6 @@ def _two_product(a, b):
 
 
 @njit
-@no_type_check
 def _add(expansion, length, value):
     """Add a float to an expansion in place, without zeros; return its length.
 
@@ -66,13 +61,11 @@ def _add(expansion, length, value):
 
 
 @njit
-@no_type_check
 def _sign(value):
     return (value > 0.0) - (value < 0.0)
 
 
 @njit
-@no_type_check
 def side_of_line(points, u, v, a, b, c):
     """Return the sign of the area of a, b, c projected to axes u and v: 1 if they turn left."""
     left = (points[a, u] - points[c, u]) * (points[b, v] - points[c, v])
@@ -84,7 +77,6 @@ def side_of_line(points, u, v, a, b, c):
 
 
 @njit
-@no_type_check
 def _exact_side_of_line(points, u, v, a, b, c):
     expansion, length = np.empty(MOST_TERMS), 0
     for turn in (1.0, -1.0):
@@ -97,7 +89,6 @@ def _exact_side_of_line(points, u, v, a, b, c):
 
 
 @njit
-@no_type_check
 def side_of_plane(points, a, b, c, d):
     """Return the sign of det[a - d, b - d, c - d].
 
@@ -132,7 +123,6 @@ def side_of_plane(points, a, b, c, d):
 
 
 @njit
-@no_type_check
 def _exact_side_of_plane(points, a, b, c, d):
     if same_place(points, a, b) or same_place(points, a, c) or same_place(points, b, c):
         return 0
@@ -158,7 +148,6 @@ def _exact_side_of_plane(points, a, b, c, d):
 
 
 @njit
-@no_type_check
 def same_place(points, a, b):
     return (
         points[a, 0] == points[b, 0]

@@ -1,7 +1,5 @@
 """Compiled loop of `holes`: the cheapest triangulation of a closed chain of points."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -15,7 +13,6 @@ FLAT = 1e-7
 
 
 @njit
-@no_type_check
 def triangulate(points, taken, triangles):
     """Fill the cheapest triangulation of the polygon 0..n-1; return whether there is one.
 
@@ -52,7 +49,6 @@ def triangulate(points, taken, triangles):
 
 
 @njit
-@no_type_check
 def _cost(a, b, c):
     u, v = b - a, c - a
     x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]

@@ -9,7 +9,7 @@ import numpy as np
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_shape
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.holes import fill_holes
 from eigenshape.geometry.repairs.one_sided import cut_one_sided
@@ -267,7 +267,7 @@ def _combine(done: RepairedMesh[MeshT], step: RepairedMesh[MeshT]) -> RepairedMe
 def has_specks(mesh: TriangleMesh) -> bool:
     """Tell whether all components but the largest have little area, each and together."""
     _, labels = vertex_components(mesh)
-    areas = np.linalg.norm(area_vectors(scaled_corners(mesh)[0]), axis=1)
+    areas = triangle_areas(scaled_corners(mesh)[0])
     shares = np.sort(np.bincount(labels[mesh.faces[:, 0]], weights=areas / areas.sum()))
     return bool(shares[:-1].max(initial=0.0) <= LARGEST_SPECK and shares[:-1].sum() <= ALL_SPECKS)
 
@@ -277,7 +277,7 @@ def has_small_holes(mesh: TriangleMesh) -> bool:
     points, _ = size_one(mesh.vertices)
     rims = [points[loop] for loop in boundary_loops(mesh)]
     lengths = [np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1).sum() for rim in rims]
-    area = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1).sum()
+    area = triangle_areas(points[mesh.faces]).sum()
     return bool(max(lengths, default=0.0) ** 2 / (4 * np.pi) <= LARGEST_HOLE * area)
 
 

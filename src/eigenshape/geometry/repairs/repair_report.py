@@ -1,13 +1,11 @@
 """What a repair returns: the repaired shape, a report in sentences, and where its points come from."""
 
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import ReadOnly
-from eigenshape._text import short_repr
+from eigenshape._arrays import ReadOnly, record
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.simplices import MEASURES
 from eigenshape.geometry.simplicial import Mesh
@@ -18,7 +16,7 @@ MeshT = TypeVar("MeshT", bound=Mesh)
 PLURALS = {"vertex": "vertices", "tetrahedron": "tetrahedra", "simplex": "simplices"}
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class RepairedMesh(ReadOnly, Generic[MeshT]):
     """A mesh after one or more repairs, and a report of what they changed.
 
@@ -46,10 +44,8 @@ class RepairedMesh(ReadOnly, Generic[MeshT]):
     report: tuple[str, ...]
     source_vertices: Int[np.ndarray, " n"]
 
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@record
 class RepairedCloud(ReadOnly):
     """A point cloud after one or more repairs, and a report of what they changed.
 
@@ -75,8 +71,6 @@ class RepairedCloud(ReadOnly):
     cloud: PointCloud
     report: tuple[str, ...]
     source_points: Int[np.ndarray, " n"]
-
-    __repr__ = short_repr
 
 
 def count_nouns(number: int, noun: str) -> str:

@@ -10,7 +10,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.face_turns import turn_faces
 from eigenshape.geometry.facet_lists import label_components
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import faces_to_turn
 from eigenshape.geometry.repairs.repair_report import (
@@ -265,7 +265,7 @@ def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
     """Mark the faces of the component that `largest_component` keeps."""
     _, labels = vertex_components(mesh)
     of_face = np.unique(labels[mesh.faces[:, 0]], return_inverse=True)[1]
-    areas = np.linalg.norm(area_vectors(scaled_corners(mesh)[0]), axis=1)
+    areas = triangle_areas(scaled_corners(mesh)[0])
     return np.asarray(of_face == np.argmax(np.bincount(of_face, weights=areas)))
 
 
@@ -309,7 +309,7 @@ def fragment_vertices(mesh: TriangleMesh, n_shares: int = N_SHARES) -> Int[np.nd
     """
     count, labels = vertex_components(mesh)
     require_simplices_everywhere(mesh)
-    face_areas = np.linalg.norm(area_vectors(scaled_corners(mesh)[0]), axis=1)
+    face_areas = triangle_areas(scaled_corners(mesh)[0])
     areas = np.bincount(labels[mesh.faces[:, 0]], weights=face_areas, minlength=count)
     if count == 1 or not areas.any():
         return np.empty(0, dtype=np.int64)

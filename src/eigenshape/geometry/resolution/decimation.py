@@ -1,13 +1,10 @@
 """Decimation: the same surface by fewer faces, and what lay on the many carried over to the few."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, as_array, whole_number
+from eigenshape._arrays import ReadOnly, as_array, record, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, MissingExtraError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
@@ -24,7 +21,7 @@ from eigenshape.geometry.topology import edge_table, non_manifold_vertices
 FEWEST_FACES = 4  # of a closed surface
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class DecimatedMesh(ReadOnly):
     """A mesh after `decimate`, and where it lies on the original.
 
@@ -58,8 +55,6 @@ class DecimatedMesh(ReadOnly):
     places: SurfacePoints
     source_faces: Int[np.ndarray, " f"]
     original: TriangleMesh
-
-    __repr__ = short_repr
 
     def carry_values(self, values: ArrayLike) -> Float[np.ndarray, "n ..."]:
         """Interpolate values on the vertices of the original, linearly in the face of each place.

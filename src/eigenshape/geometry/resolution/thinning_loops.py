@@ -5,8 +5,6 @@ A corner is a number 3f + i, for corner i of face f. The corners at a vertex v f
 the lists until these are joined.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -16,7 +14,6 @@ FREE, RIM, FIXED = 0, 1, 2  # kinds of vertices: FIXED ones never move
 
 
 @njit
-@no_type_check
 def collapse_short_edges(points, faces, alive, heads, links, kinds, marks, limits):
     """Collapse edges shorter than a limit, vertex by vertex, and return how many did.
 
@@ -66,7 +63,6 @@ def collapse_short_edges(points, faces, alive, heads, links, kinds, marks, limit
 
 
 @njit
-@no_type_check
 def _square(points, one, two):
     x = points[one, 0] - points[two, 0]
     y = points[one, 1] - points[two, 1]
@@ -75,7 +71,6 @@ def _square(points, one, two):
 
 
 @njit
-@no_type_check
 def _may_collapse(
     points, faces, alive, heads, links, kinds, marks, gone, kept, most_neighbors, least_cosine
 ):
@@ -124,7 +119,6 @@ def _may_collapse(
 
 
 @njit
-@no_type_check
 def _keeps_normal(points, gone, kept, one, two, least_cosine):
     """Tell whether a face is no sliver and faces nearly the same way when its corner has moved."""
     before = _normal(points, gone, one, two)
@@ -138,7 +132,6 @@ def _keeps_normal(points, gone, kept, one, two, least_cosine):
 
 
 @njit
-@no_type_check
 def _normal(points, a, b, c):
     ux, uy, uz = (
         points[b, 0] - points[a, 0],
@@ -154,13 +147,11 @@ def _normal(points, a, b, c):
 
 
 @njit
-@no_type_check
 def _dot(one, two):
     return one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
 
 
 @njit
-@no_type_check
 def _join(faces, alive, heads, links, gone, kept):
     """Give the corners of one vertex to another, and remove the faces that have both."""
     corner = heads[gone]
@@ -186,7 +177,6 @@ def _join(faces, alive, heads, links, gone, kept):
 
 
 @njit
-@no_type_check
 def link_corners(faces, heads, links):
     """Fill the lists of corners; `heads` is -1 on entry."""
     for corner in range(3 * len(faces) - 1, -1, -1):

@@ -1,14 +1,11 @@
 """Compiled loops of `cloud_measure`: Voronoi cells in the plane."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
 
 
 @njit
-@no_type_check
 def cell_areas(places):
     """Return the area of the origin's Voronoi cell within the convex hull, for each point set.
 

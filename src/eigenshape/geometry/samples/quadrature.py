@@ -1,12 +1,10 @@
 """Quadrature: points with weights, so that ∫ f over a shape is about Σ w_i f(x_i), and how shapes get them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, positive_values, whole_number
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, positive_values, record, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.cloud import PointCloud
@@ -16,7 +14,7 @@ from eigenshape.geometry.samples.cell_loops import cell_areas
 from eigenshape.geometry.simplices import dual_volumes, in_length, size_one
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@record
 class Quadrature(ReadOnly):
     """Points of an m-dimensional shape in R^d with positive weights.
 
@@ -67,9 +65,11 @@ class Quadrature(ReadOnly):
                 "weights must hold one number per point; "
                 f"there are {len(measure)} for {len(coordinates)} points."
             )
-        object.__setattr__(self, "dim", whole_number(dim, "dim", 1, coordinates.shape[1]))
-        object.__setattr__(self, "points", freeze(coordinates))
-        object.__setattr__(self, "weights", freeze(measure))
+        vars(self).update(
+            dim=whole_number(dim, "dim", 1, coordinates.shape[1]),
+            points=freeze(coordinates),
+            weights=freeze(measure),
+        )
 
     @property
     def n_points(self) -> int:

@@ -1,13 +1,10 @@
 """Points anywhere on a mesh, given by a simplex and barycentric coordinates."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, whole_number
-from eigenshape._text import short_repr
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
@@ -18,7 +15,7 @@ from eigenshape.geometry.simplicial import Mesh
 MOST_POINTS = 10**8
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SurfacePoints(ReadOnly):
     """Points on a mesh of dimension m, as drawn by `sample_surface`.
 
@@ -47,8 +44,6 @@ class SurfacePoints(ReadOnly):
     points: Float[np.ndarray, "p d"]
     simplices: Int[np.ndarray, " p"]
     weights: Float[np.ndarray, "p corners"]
-
-    __repr__ = short_repr
 
     @property
     def n_points(self) -> int:

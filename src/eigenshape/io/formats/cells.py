@@ -67,7 +67,16 @@ def select_cells(
     if FOUR_CORNERED in blocks:
         blocks = dict(blocks)
         four = blocks.pop(FOUR_CORNERED)
-        blocks[_kind_of(points, four, cells)] = four
+        kind: str | None = "tetrahedra" if cells == "tetrahedra" else "quads"
+        if cells is None:
+            kind = four_cornered(points, four)
+        if kind is None:
+            raise FileFormatError(
+                f"Polygons of four corners must be known to be quads or tetrahedra; these {len(four)} could be either; "
+                f'the first is {four[0].tolist()}. cells="quads" or cells="tetrahedra" says which in read_shape and '
+                "read_mesh, and --cells in the commands info, spectrum and repair."
+            )
+        blocks[kind] = four
     quads = fans(blocks["quads"]) if "quads" in blocks else NO_TRIANGLES
     triangles = blocks.get("triangles", NO_TRIANGLES)
     surface = np.concatenate([triangles, quads])
@@ -97,22 +106,6 @@ def split_sentence(blocks: Cells) -> str:
     return f"{' and '.join(counts)} were split into {n_made:,} tetrahedra"
 
 
-def _kind_of(
-    points: Float[np.ndarray, "n d"], four: Int[np.ndarray, "c 4"], cells: CellKind | None
-) -> CellKind:
-    """Return the kind of polygons of four corners: as requested, or as they join."""
-    if cells is not None:
-        return "tetrahedra" if cells == "tetrahedra" else "quads"
-    kind = four_cornered(points, four)
-    if kind is None:
-        raise FileFormatError(
-            f"Polygons of four corners must be known to be quads or tetrahedra; these {len(four)} could be either; "
-            f'the first is {four[0].tolist()}. cells="quads" or cells="tetrahedra" says which in read_shape and '
-            "read_mesh, and --cells in the commands info, spectrum and repair."
-        )
-    return kind
-
-
 def four_cornered(
     points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "c 4"]
 ) -> Literal["quads", "tetrahedra"] | None:
@@ -124,7 +117,10 @@ def four_cornered(
     """
     if not len(cells) or cells.min() < 0 or cells.max() >= len(points):
         return "quads"  # the mesh that is built from them raises an error with the index
-    if _are_flat(points, cells):
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    size = np.abs(edges).max(axis=(1, 2))
+    unit = edges / np.where(size > 0, size, 1.0)[:, None, None]
+    if points.shape[1] < 3 or (np.abs(np.linalg.det(unit)) <= FLAT).all():
         return "quads"
     distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)[1]
     cells = cells[np.sort(distinct)]
@@ -138,13 +134,6 @@ def four_cornered(
         return "tetrahedra" if shares_triple > 0.5 else None
     shares_side = (of_sides == 2).any(axis=1).mean()
     return "quads" if shares_triple < 0.5 < shares_side else None
-
-
-def _are_flat(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "c 4"]) -> bool:
-    edges = points[cells[:, 1:]] - points[cells[:, :1]]
-    size = np.abs(edges).max(axis=(1, 2))
-    unit = edges / np.where(size > 0, size, 1.0)[:, None, None]
-    return points.shape[1] < 3 or bool((np.abs(np.linalg.det(unit)) <= FLAT).all())
 
 
 def _multiplicities(rows: Int[np.ndarray, "c p corners"]) -> Int[np.ndarray, "c p"]:

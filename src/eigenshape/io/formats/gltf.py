@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
 from eigenshape.io.formats.cells import NO_TRIANGLES
-from eigenshape.io.formats.text import quote_line
+from eigenshape.io.formats.numbers import quote_line
 
 JSON_CHUNK = b"JSON"
 BINARY_CHUNK = b"BIN\0"

@@ -11,8 +11,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.cells import N_CORNERS, SEGMENTS, Cells, require_splittable
-from eigenshape.io.formats.cursor import Cursor
-from eigenshape.io.formats.text import quote_line, wholes
+from eigenshape.io.formats.numbers import Cursor, quote_line, wholes
 
 VERSIONS = {b"2": 2, b"2.1": 2, b"2.2": 2, b"4": 4, b"4.1": 4}
 POINT = 15  # elements of one node, which are ignored

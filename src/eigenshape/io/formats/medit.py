@@ -11,8 +11,7 @@ from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.cells import N_CORNERS, SEGMENTS, Cells, require_splittable
-from eigenshape.io.formats.cursor import Cursor
-from eigenshape.io.formats.text import numbers_of, quote_line, wholes
+from eigenshape.io.formats.numbers import Cursor, numbers_of, quote_line, wholes
 
 CELLS = {
     "Edges": SEGMENTS, "Triangles": "triangles", "Quadrilaterals": "quads", "Tetrahedra": "tetrahedra",

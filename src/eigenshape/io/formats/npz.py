@@ -6,7 +6,7 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cursor import require_reasonable
+from eigenshape.io.formats.numbers import require_reasonable
 
 VERTEX_FIELD, FACE_FIELD = "vertex_", "face_"  # how the names of functions begin
 Arrays = dict[str, np.ndarray]

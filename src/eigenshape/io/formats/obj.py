@@ -2,15 +2,15 @@
 
 import codecs
 import re
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arrays import record
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.cells import fans
-from eigenshape.io.formats.text import (
+from eigenshape.io.formats.numbers import (
     Line,
     coordinates,
     lines_of,
@@ -88,7 +88,7 @@ def corner_index(word: bytes, line: Line, n_so_far: int) -> int:
     return index - 1 if index > 0 else n_so_far + index
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ObjSheet:
     """The content of an OBJ file that a triangle mesh does not store.
 

@@ -23,8 +23,8 @@ from eigenshape.io.attributes import (
     unit_rows,
 )
 from eigenshape.io.formats.cells import fans
+from eigenshape.io.formats.numbers import rows_text
 from eigenshape.io.formats.obj import Corner, ObjSheet, read_sheet
-from eigenshape.io.formats.text import rows_text
 
 MAP = re.compile(r"(?im)^([ \t]*(?:map_\w+|bump|disp|decal|norm|refl)[ \t]+)(.+?)[ \t\r]*$")
 PLAIN_MATERIAL = {"newmtl", "kd", "d", "tr", "map_kd", "ka", "ke", "ks", "ns", "ni", "illum"}

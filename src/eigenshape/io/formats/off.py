@@ -8,7 +8,7 @@ import numpy as np
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import fans
-from eigenshape.io.formats.text import (
+from eigenshape.io.formats.numbers import (
     Line,
     coordinates,
     lines_of,

@@ -8,8 +8,15 @@ from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.cells import NO_TRIANGLES
-from eigenshape.io.formats.cursor import require_reasonable
-from eigenshape.io.formats.text import Line, coordinates, lines_of, number_table, quote_line, whole
+from eigenshape.io.formats.numbers import (
+    Line,
+    coordinates,
+    lines_of,
+    number_table,
+    quote_line,
+    require_reasonable,
+    whole,
+)
 
 AXES = (b"x", b"y", b"z")
 KINDS = {(b"F", 4): "<f4", (b"F", 8): "<f8"}

@@ -12,7 +12,7 @@ from jaxtyping import Int
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import NO_TRIANGLES, fans, strip_triangles
-from eigenshape.io.formats.text import (
+from eigenshape.io.formats.numbers import (
     Line,
     lines_of,
     number,

@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.cells import NO_TRIANGLES
-from eigenshape.io.formats.text import coordinates, lines_of, quote_line, rows_text, whole
+from eigenshape.io.formats.numbers import coordinates, lines_of, quote_line, rows_text, whole
 
 EXPE = b"[Expe/PointSet/Binary/"
 

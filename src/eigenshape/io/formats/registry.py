@@ -25,6 +25,8 @@ Trait = Literal[
     "labels",
     "attributes",
     "fields",
+    "maps",
+    "parcels",
     "beside",
 ]
 
@@ -50,6 +52,10 @@ class Format:
           files to write.
         - "fields": `parse_fields(data)` returns the functions on points and those on cells;
           `format_fields(mesh, of_points, of_cells)` writes them with the mesh.
+        - "maps": the file holds functions on vertices and no mesh. `parse_fields(data)` returns them and
+          an empty dictionary; `format_maps(mesh, of_points, suffix)` writes those of a mesh.
+        - "parcels": the file holds a parcellation and no mesh. `parse_parcels(data, n_points)` returns
+          it; `format_parcels(mesh, parcellation)` writes that of a mesh.
         - "colors": colors of vertices can be written.
         - "labels": labels of faces can be written. Other formats with colors get a material for each.
         - "beside": parts of the file lie in its folder, which `parse` takes as well.
@@ -74,13 +80,29 @@ FORMATS = (
     Format(".vtu", "vtu", ("cells", "binary", "fields")),
     Format(".vtk", "vtk", ("cells", "binary", "fields")),
     Format(".npz", "npz", ("cells", "binary", "fields")),
+    Format(".gii", "neuro.gifti", ("cells", "binary", "fields")),
+    Format(".surf", "neuro.freesurfer", ("cells", "binary")),
     Format(".mesh", "medit", ("cells",)),
     Format(".meshb", "medit", ("cells",)),
     Format(".msh", "gmsh", ("cells",)),
+    Format(".swc", "neuro.swc", ("cells",)),
     Format(".xyz", "points", ("points", "cloud")),
     Format(".pts", "points", ("points", "cloud")),
     Format(".pcd", "pcd", ("points",)),
+    Format(".func.gii", "neuro.gifti", ("maps",)),
+    Format(".shape.gii", "neuro.gifti", ("maps",)),
+    Format(".label.gii", "neuro.gifti", ("maps", "parcels")),
+    Format(".dscalar.nii", "neuro.cifti", ("maps",)),
+    Format(".curv", "neuro.freesurfer", ("maps",)),
+    Format(".mgh", "neuro.freesurfer", ("maps",)),
+    Format(".mgz", "neuro.freesurfer", ("maps",)),
+    Format(".annot", "neuro.annotations", ("parcels",)),
+    Format(".label", "neuro.annotations", ("parcels",)),
 )
+# FreeSurfer names a surface by what it is, such as lh.pial and lh.thickness. Such files are
+# recognized by their first bytes, and named by the hemisphere if they are yet to be written.
+SIGNATURES = {b"\xff\xff\xfe": ".surf", b"\xff\xff\xff": ".curv"}
+HEMISPHERES = ("lh.", "rh.")
 
 
 def suffixes_with(*traits: Trait) -> tuple[str, ...]:
@@ -91,7 +113,9 @@ def suffixes_with(*traits: Trait) -> tuple[str, ...]:
 MESH_FORMATS = suffixes_with("cells")  # suffixes of the files that `read_mesh` reads
 SHAPE_FORMATS = suffixes_with("cells", "points")  # and those that `read_shape` reads
 POINT_FORMATS = suffixes_with("points")
-FIELD_FORMATS = suffixes_with("fields")
+FIELD_FORMATS = suffixes_with("fields", "maps")
+MAP_FORMATS = suffixes_with("maps")
+PARCEL_FORMATS = suffixes_with("parcels")
 WRITTEN = suffixes_with("text", "binary")
 WRITTEN_CLOUDS = suffixes_with("cloud")
 WITH_MORE = suffixes_with("attributes", "fields")  # than positions and faces
@@ -103,16 +127,36 @@ def format_of(suffix: str) -> Format:
     return next(known for known in FORMATS if known.suffix == suffix)
 
 
+def suffix_in(name: str) -> str:
+    """Return the longest known suffix of the name of a file, otherwise what follows its last dot."""
+    name = name.lower()
+    fitting = [known.suffix for known in FORMATS if name.endswith(known.suffix) and name[0] != "."]
+    return max(fitting, key=len, default=Path(name).suffix)
+
+
 def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> str:
     """Return the suffix that names the format, in lower case.
 
     Raise FileFormatError if the suffix is not one of the known ones, or the path is a folder.
     """
-    suffix = path.suffix if file_format is None else f".{file_format.removeprefix('.')}"
-    suffix = suffix.lower()
+    suffix = suffix_in(path.name if file_format is None else f"a.{file_format.removeprefix('.')}")
+    if suffix not in [each.suffix for each in FORMATS]:
+        if path.is_file():
+            with path.open("rb") as file:
+                suffix = SIGNATURES.get(file.read(3), suffix)
+        elif path.name.startswith(HEMISPHERES):
+            written = [each for each in SIGNATURES.values() if each in known]
+            suffix = written[0] if written else suffix
     if suffix not in known:
         if path.is_dir():
             require_regular(path)
         found = f"is {suffix!r}" if suffix else "has no suffix"
-        raise FileFormatError(f"{path} must be of a known format, {', '.join(known)}; it {found}.")
+        remedies = {
+            MAP_FORMATS: " es.io.read_fields reads the functions in it.",
+            PARCEL_FORMATS: " es.io.read_parcellation reads the parcels in it.",
+        }
+        remedy = next((text for kind, text in remedies.items() if suffix in kind), "")
+        raise FileFormatError(
+            f"{path} must be of a known format, {', '.join(known)}; it {found}.{remedy}"
+        )
     return suffix

@@ -5,7 +5,7 @@ import numpy as np
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import weld
-from eigenshape.io.formats.text import coordinates, lines_of, quote_line
+from eigenshape.io.formats.numbers import coordinates, lines_of, quote_line
 
 HEADER = 84  # bytes before the triangles of a binary file: 80 of text, 4 of their number
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

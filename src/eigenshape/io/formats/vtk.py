@@ -17,8 +17,7 @@ from eigenshape.io.formats.cells import (
     fans,
     strip_triangles,
 )
-from eigenshape.io.formats.cursor import Cursor
-from eigenshape.io.formats.text import quote_line
+from eigenshape.io.formats.numbers import Cursor, quote_line
 
 KINDS = {
     b"float": ">f4", b"double": ">f8", b"char": ">i1", b"unsigned_char": ">u1", b"int": ">i4",

@@ -21,8 +21,13 @@ from eigenshape.io.formats.cells import (
     Cells,
     cells_of_types,
 )
-from eigenshape.io.formats.cursor import COMPRESSORS, require_reasonable, unpack_block
-from eigenshape.io.formats.text import numbers_of, wholes
+from eigenshape.io.formats.numbers import (
+    COMPRESSORS,
+    numbers_of,
+    require_reasonable,
+    unpack_block,
+    wholes,
+)
 
 HEADER_TYPES = {"UInt32": "u4", "UInt64": "u8"}
 ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
@@ -171,7 +176,24 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Cells]:
         )
     numbers = packing.numbers(array, n_points * int(width))
     points = numbers.reshape(n_points, int(width)).astype(np.float64)
-    return points, _cells(piece, packing, n_cells)
+    if not n_cells:
+        return points, {}
+    arrays = {array.get("Name"): array for array in piece.findall("./Cells/DataArray")}
+    if not {"connectivity", "offsets", "types"} <= arrays.keys():
+        raise FileFormatError(
+            f"Cells of a VTU file must have connectivity, offsets and types; it has {', '.join(map(str, arrays))}."
+        )
+    types = wholes(packing.numbers(arrays["types"], n_cells), "types of a VTU file")
+    ends = wholes(packing.numbers(arrays["offsets"], n_cells), "offsets of a VTU file")
+    starts = np.concatenate([[0], ends])
+    if (np.diff(starts) < 0).any():
+        raise FileFormatError(
+            f"Offsets of a VTU file must rise from 0; they begin with {ends[:9].tolist()}."
+        )
+    corners = wholes(
+        packing.numbers(arrays["connectivity"], int(starts[-1])), "connectivity of a VTU file"
+    )
+    return points, cells_of_types(CellLists(starts, corners), types)
 
 
 def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
@@ -254,27 +276,6 @@ def _parse_tags(data: bytes) -> tuple[ElementTree.Element, _Packing]:
     compressor = root.get("compressor") or None
     size = np.dtype(ORDERS[order] + HEADER_TYPES[header_type])
     return root, _Packing(size, ORDERS[order], compressor, appended, raw is not None, len(data))
-
-
-def _cells(piece: ElementTree.Element, packing: _Packing, n_cells: int) -> Cells:
-    arrays = {array.get("Name"): array for array in piece.findall("./Cells/DataArray")}
-    if not n_cells:
-        return {}
-    if not {"connectivity", "offsets", "types"} <= arrays.keys():
-        raise FileFormatError(
-            f"Cells of a VTU file must have connectivity, offsets and types; it has {', '.join(map(str, arrays))}."
-        )
-    types = wholes(packing.numbers(arrays["types"], n_cells), "types of a VTU file")
-    ends = wholes(packing.numbers(arrays["offsets"], n_cells), "offsets of a VTU file")
-    starts = np.concatenate([[0], ends])
-    if (np.diff(starts) < 0).any():
-        raise FileFormatError(
-            f"Offsets of a VTU file must rise from 0; they begin with {ends[:9].tolist()}."
-        )
-    corners = wholes(
-        packing.numbers(arrays["connectivity"], int(starts[-1])), "connectivity of a VTU file"
-    )
-    return cells_of_types(CellLists(starts, corners), types)
 
 
 def format_fields(mesh: Mesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import require_choice, require_type
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
@@ -16,8 +16,8 @@ from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components
-from eigenshape.operators.choices import Correction, Distance, Form, require_choice
-from eigenshape.operators.clouds.cells import cell_grid, gaussian_differences
+from eigenshape.operators.choices import Correction, Distance, Form
+from eigenshape.operators.clouds.cell_grid import cell_grid, gaussian_differences
 from eigenshape.operators.clouds.kernel import (
     KernelOptions,
     choose_kernel,

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
+from eigenshape._arguments import require_choice
 from eigenshape._arrays import positive_values
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._memory import require_memory
@@ -20,8 +21,8 @@ from eigenshape.geometry.distances.geodesic import geodesic_balls
 from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.operators.choices import Correction, Form, require_choice
-from eigenshape.operators.clouds.cells import cell_grid, count_partners, gaussian_rows
+from eigenshape.operators.choices import Correction, Form
+from eigenshape.operators.clouds.cell_grid import cell_grid, count_partners, gaussian_rows
 from eigenshape.operators.clouds.pair_loops import component_labels
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
 

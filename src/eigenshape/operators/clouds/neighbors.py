@@ -5,7 +5,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import finite_rows, positive_values, whole_number
+from eigenshape._arrays import finite_rows, positive_number, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.simplices import size_one
@@ -59,7 +59,7 @@ def neighbor_graph(
     edges = unique_edges(np.repeat(np.arange(len(rows)), wanted), near.ravel(), len(rows))
     weights = np.ones(len(edges))
     if t is not None:
-        time = float(positive_values([t], "t")[0])
+        time = positive_number(t, "t")
         squares = ((scaled[edges[:, 0]] - scaled[edges[:, 1]]) ** 2).sum(axis=1)
         with np.errstate(over="ignore"):  # what overflows here is a weight of 0, refused below
             weights = np.exp(-squares / 4 * scale / time * scale)

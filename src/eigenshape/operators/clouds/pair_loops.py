@@ -4,15 +4,12 @@ A loop over pairs visits the cells from `first` to `last` and, for each point of
 that may lie within reach. `farthest` is the square of the reach. Points are in the order of cells.
 """
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
 
 
 @njit
-@no_type_check
 def sort_part(values, start, stop):
     """Sort a part of an array in place, by Shell sort with Knuth's gaps (1973)."""
     gap = 1
@@ -30,7 +27,6 @@ def sort_part(values, start, stop):
 
 
 @njit
-@no_type_check
 def _square(one, i, two, j):
     total = 0.0
     for axis in range(one.shape[1]):
@@ -40,7 +36,6 @@ def _square(one, i, two, j):
 
 
 @njit
-@no_type_check
 def count(points, order, cells, runs, farthest, wanted, counts, first, last):
     for cell in range(first, last):
         for i in range(cells[cell], cells[cell + 1]):
@@ -54,7 +49,6 @@ def count(points, order, cells, runs, farthest, wanted, counts, first, last):
 
 
 @njit
-@no_type_check
 def fill(
     points,
     order,
@@ -101,7 +95,6 @@ def fill(
 
 
 @njit
-@no_type_check
 def difference(points, cells, runs, farthest, weights, rate, values, sums, first, last):
     for cell in range(first, last):
         for i in range(cells[cell], cells[cell + 1]):
@@ -116,7 +109,6 @@ def difference(points, cells, runs, farthest, weights, rate, values, sums, first
 
 
 @njit
-@no_type_check
 def component_labels(starts, columns):
     """Return the connected component of each row; components are numbered by their first rows."""
     n = len(starts) - 1
@@ -143,7 +135,6 @@ def component_labels(starts, columns):
 
 
 @njit(error_model="numpy")
-@no_type_check
 def local_rings(coordinates, rings):
     """Find the neighbors of the origin in the Delaunay triangulation of it and points around it.
 

@@ -10,13 +10,14 @@ from hashlib import file_digest, sha256
 from itertools import chain
 from pathlib import Path
 from time import monotonic, time
+from typing import Any
 
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Callback
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 from eigenshape._typing import Integer
 from eigenshape._workers import Item as Item  # noqa: PLC0414 - the room lists it from here
 from eigenshape._workers import Outcome, run_in_workers
@@ -26,22 +27,22 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_names import require_repairs
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
-from eigenshape.retrieval.description import describe_to_store
 from eigenshape.retrieval.index import ShapeIndex
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_store
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descriptor
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
-from eigenshape.retrieval.patches.patches import Patches, extract_patches
+from eigenshape.retrieval.patches.patches import extract_patches
 from eigenshape.retrieval.patches.training import train_codebook
 from eigenshape.retrieval.store.upkeep import find_damaged
-from eigenshape.retrieval.store.writing import DescribedShape, Record
+from eigenshape.retrieval.store.writing import DescribedShape
 from eigenshape.retrieval.thumbnails import draw_thumbnail
 from eigenshape.scans.partial import view_number
 
 Recipes = TypeAliasType("Recipes", Sequence[AnyRecipe])
 Read = TypeAliasType("Read", Callable[[Path], MeshLike | RepairedMesh[TriangleMesh]])
 ReadRepaired = Callable[[Path], tuple[TriangleMesh, tuple[str, ...]]]
+Describe = Callable[[TriangleMesh], list[Any]]
 # Shapes that a codebook is learned from. A hundred closed ones have 45,000 patches for its 32
 # Gaussians, and take some minutes; fewer than 40 leave it to the codebook of the library.
 FEWEST_TO_TRAIN, MOST_TO_TRAIN = 40, 100
@@ -54,7 +55,7 @@ MOST_AT_ONCE, LONGEST_KEPT = 64, 1.0
 
 
 @dataclass(frozen=True)
-class BatchReport:
+class BatchReport(Shown):
     """What `build_index` did.
 
     Attributes
@@ -90,9 +91,6 @@ class BatchReport:
     failed: tuple[tuple[str, str], ...]
     repaired: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
-    __repr__ = short_repr
-    _repr_html_ = html_repr
-
 
 @dataclass(frozen=True)
 class _ReadFile:
@@ -101,8 +99,7 @@ class _ReadFile:
     digest: str
     repairs: tuple[str, ...]
     thumbnail: bytes
-    descriptors: tuple[Descriptor, ...] = ()
-    patches: tuple[Patches, ...] = ()
+    found: list[Any]
 
 
 def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
@@ -189,7 +186,14 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
         )
     views = None if n_views is None else view_number(n_views, "n_views")
     read_item = partial(_read_repaired, read, require_repairs(repairs))
-    _require_different_names(items)
+    paths: dict[str, Path] = {}
+    for item in items:
+        if item.name in paths:
+            raise InvalidParameterError(
+                f"Items must have different names; {item.name!r} is the name of both "
+                f"{paths[item.name]} and {item.path}."
+            )
+        paths[item.name] = item.path
     callback = callback or _ignore
 
     taught: dict[str, Outcome[_ReadFile]] = {}
@@ -200,7 +204,11 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
             index.keep_recipe(PatchRecipe(_learn_from(taught.values())))
         # Of several processes that fill a new index, all take the codebook of the first.
         patch_recipe = next(kept for kept in index.recipes() if isinstance(kept, PatchRecipe))
-        taught = {name: _encoded(outcome, patch_recipe, count) for name, outcome in taught.items()}
+        for name, outcome in taught.items():
+            if outcome.value is not None:
+                patches = outcome.value.found[: 1 + count]
+                found: list[Any] = [patch_descriptor(patches, patch_recipe)]
+                taught[name] = Outcome(replace(outcome.value, found=found))
     recipes = (index.default_recipe(),) if recipes is None else tuple(recipes)
 
     todo = _update_known(index, [item for item in items if item.name not in taught], recipes)
@@ -211,7 +219,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
     failed: dict[str, str] = {}
     repaired: dict[str, tuple[str, ...]] = {}
     ready = [(item, taught[item.name]) for item in items if item.name in taught]
-    work = partial(_describe_file, read_item, recipes, views)
+    work = partial(_read_file, read_item, partial(_describe, recipes, views))
     # Closing stops the workers at once, also after Ctrl-C; what is described by then is kept.
     with writer, closing(run_in_workers(work, todo, workers)) as described:
         for item, outcome in chain(ready, described):
@@ -294,7 +302,8 @@ def _read_teachers(
     if len(items) < FEWEST_TO_TRAIN:
         return {}
     chosen = sorted(items, key=lambda item: sha256(item.name.encode()).digest())[:MOST_TO_TRAIN]
-    work = partial(_extract_file, read, max(n_views, N_TRAINING_VIEWS))
+    extract = partial(extract_patches, n_views=max(n_views, N_TRAINING_VIEWS))
+    work = partial(_read_file, read, extract)
     found = {}
     with closing(run_in_workers(work, chosen, workers)) as outcomes:
         for number, (item, outcome) in enumerate(outcomes):
@@ -345,34 +354,14 @@ def _learn_from(outcomes: Iterable[Outcome[_ReadFile]]) -> PatchCodebook:
     if len(files) < FEWEST_TO_TRAIN:
         return default_codebook()
     return train_codebook(
-        [patches for file in files for patches in file.patches[: 1 + N_TRAINING_VIEWS]]
+        [patches for file in files for patches in file.found[: 1 + N_TRAINING_VIEWS]]
     )
-
-
-def _encoded(outcome: Outcome[_ReadFile], recipe: PatchRecipe, n_views: int) -> Outcome[_ReadFile]:
-    """Turn the patches of a shape into its descriptor."""
-    if outcome.value is None:
-        return outcome
-    file = outcome.value
-    descriptor = patch_descriptor(file.patches[: 1 + n_views], recipe)
-    return Outcome(replace(file, descriptors=(descriptor,), patches=()))
 
 
 def content_digest(path: Path) -> str:
     """Return the SHA-256 of a file."""
     with path.open("rb") as file:
         return file_digest(file, "sha256").hexdigest()
-
-
-def _require_different_names(items: Sequence[Item]) -> None:
-    paths: dict[str, Path] = {}
-    for item in items:
-        if item.name in paths:
-            raise InvalidParameterError(
-                f"Items must have different names; {item.name!r} is the name of both "
-                f"{paths[item.name]} and {item.path}."
-            )
-        paths[item.name] = item.path
 
 
 def _read_repaired(
@@ -385,25 +374,18 @@ def _read_repaired(
     return done.mesh, (() if made is None else made.report) + done.report
 
 
-def _describe_file(
-    read: ReadRepaired, recipes: tuple[AnyRecipe, ...], n_views: int | None, path: Path
-) -> _ReadFile:
+def _read_file(read: ReadRepaired, describe: Describe, path: Path) -> _ReadFile:
     """Describe a file, in a worker."""
     # Before it is read: a file that changes meanwhile is described again next time.
     digest = content_digest(path)
     mesh, repairs = read(path)
-    descriptors = [
-        descriptor for recipe in recipes for descriptor in describe_to_store(mesh, recipe, n_views)
-    ]
-    return _ReadFile(digest, repairs, draw_thumbnail(mesh), descriptors=tuple(descriptors))
+    return _ReadFile(digest, repairs, draw_thumbnail(mesh), describe(mesh))
 
 
-def _extract_file(read: ReadRepaired, n_views: int, path: Path) -> _ReadFile:
-    """Extract the patches of a file, in a worker."""
-    digest = content_digest(path)
-    mesh, repairs = read(path)
-    patches = tuple(extract_patches(mesh, n_views=n_views))
-    return _ReadFile(digest, repairs, draw_thumbnail(mesh), patches=patches)
+def _describe(
+    recipes: tuple[AnyRecipe, ...], n_views: int | None, mesh: TriangleMesh
+) -> list[Descriptor]:
+    return [each for recipe in recipes for each in describe_to_store(mesh, recipe, n_views)]
 
 
 def _shape(item: Item, file: _ReadFile) -> DescribedShape:
@@ -412,7 +394,7 @@ def _shape(item: Item, file: _ReadFile) -> DescribedShape:
         attributes[REPAIRS] = "; ".join(file.repairs)
     return DescribedShape(
         item.name,
-        file.descriptors,
+        file.found,
         label=item.label,
         source=str(item.path.absolute()),
         digest=file.digest,
@@ -458,25 +440,17 @@ class _Writer:
             self.added.update(shape.name for shape in shapes)
 
 
-def _is_known(item: Item, record: Record, recipes: Sequence[AnyRecipe]) -> bool:
-    if not set(recipes) <= set(record.recipes):
-        return False
-    try:
-        return content_digest(item.path) == record.digest
-    except OSError:  # the worker that opens the file reports it
-        return False
-
-
 def _update_known(
     index: ShapeIndex, items: Sequence[Item], recipes: Sequence[AnyRecipe]
 ) -> list[Item]:
     """Return the items that must be described; bring up to date what is known of the others."""
     known = {record.name: record for record in index.records()}
-    same = [
-        item.name
-        for item in items
-        if item.name in known and _is_known(item, known[item.name], recipes)
-    ]
+    same = []
+    for item in items:
+        if item.name in known and set(recipes) <= set(known[item.name].recipes):
+            with suppress(OSError):  # the worker that opens the file reports it
+                if content_digest(item.path) == known[item.name].digest:
+                    same.append(item.name)
     whole = set(same) - find_damaged(index.folder, same)
     todo, changed = [], []
     for item in items:

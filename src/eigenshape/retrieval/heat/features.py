@@ -9,7 +9,6 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, vertex_values
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape._threads import map_in_threads
 from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_tree import merge_tree
@@ -83,8 +82,6 @@ class HeatFeatures(ReadOnly):
     parts: Segmentation
     descriptor: HeatDescriptor
     fragments: Int[np.ndarray, " c"]
-
-    __repr__ = short_repr
 
 
 def heat_descriptor(
@@ -218,7 +215,13 @@ def find_heat_features(
     unit, times = _unit_and_times(area, recipe)
     spectrum, error = None, None
     if accuracy is None:
-        heat, spectrum = _certified_heat(laplacian, fixed, n_modes, times, progress)
+        spectra = []
+        for ends in fixed:
+            k = min(n_modes, mesh.n_vertices - len(ends))
+            spectra.append(solve_spectrum(laplacian, k, fixed=ends, progress=progress))
+        spectrum, dirichlet = spectra[0], spectra[1] if len(spectra) > 1 else None
+        columns = [_heat(spectrum, dirichlet, each) for each in (times[:1], times[1:])]
+        heat = np.concatenate(columns, axis=1)
     else:
         heat, error = _approximate_heat(laplacian, fixed, n_modes, times, accuracy, progress)
     if height is None:
@@ -233,10 +236,8 @@ def find_heat_features(
     on_fragment = np.isin(parts.features.vertices, fragments)
     order = np.argsort(on_fragment, kind="stable")
     found = parts.features
-    columns = (found.vertices, found.values, found.persistence)
-    parts = Segmentation(
-        np.argsort(order)[parts.labels], FeaturePoints(*(column[order] for column in columns))
-    )
+    points = FeaturePoints(found.vertices[order], found.values[order], found.persistence[order])
+    parts = Segmentation(np.argsort(order)[parts.labels], points)
 
     n_described = min(max(recipe.n_features, n_components), int((~on_fragment).sum()))
     descriptor = _descriptor(heat[:, 1:], parts.features.vertices[:n_described], recipe, unit)
@@ -271,22 +272,6 @@ def find_view_features(
     """Return what one of the viewpoints of `describe_views` sees, and its features."""
     part = view_of(mesh, view)
     return part, find_heat_features(part.mesh, recipe)
-
-
-def _certified_heat(
-    laplacian: Laplacian,
-    fixed: list[Int[np.ndarray, " _"]],
-    n_modes: int,
-    times: Float[np.ndarray, " t"],
-    progress: Progress | None,
-) -> tuple[Float[np.ndarray, "n t"], Spectrum]:
-    spectra = []
-    for points in fixed:
-        k = min(n_modes, laplacian.n_points - len(points))
-        spectra.append(solve_spectrum(laplacian, k, fixed=points, progress=progress))
-    dirichlet = spectra[1] if len(spectra) > 1 else None
-    columns = [_heat(spectra[0], dirichlet, each) for each in (times[:1], times[1:])]
-    return np.concatenate(columns, axis=1), spectra[0]
 
 
 def _approximate_heat(

@@ -9,7 +9,6 @@ from scipy.spatial.distance import cdist
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 
 
@@ -40,8 +39,6 @@ class HeatDescriptor(ReadOnly):
     vectors: Float[np.ndarray, "m q"]
     vertices: Int[np.ndarray, " m"]
     recipe: HeatRecipe
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vectors", freeze(self.vectors))

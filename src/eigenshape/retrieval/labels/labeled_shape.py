@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly, face_labels, freeze
-from eigenshape._text import short_repr
 from eigenshape.geometry.conversion import as_mesh
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -62,12 +61,12 @@ class LabelPoints:
     distances: Float[np.ndarray, "m m"]
 
 
-def label_points(mesh: TriangleMesh, *, n_points: int = N_LABEL_POINTS) -> LabelPoints:
+def label_points(mesh: TriangleMesh) -> LabelPoints:
     """Describe points of a mesh, oriented outward and denoised first, as `describe` does."""
     require_describable(mesh)
     clean = denoise(orient_outward(mesh))
 
-    found = surface_patches(clean, n_samples=n_points)
+    found = surface_patches(clean, n_samples=N_LABEL_POINTS)
     cells = found.weights.max(axis=1).astype(np.float64)
     shares = cells / cells.sum()
     # Components are farther from each other than any points within one.
@@ -86,27 +85,11 @@ def label_points(mesh: TriangleMesh, *, n_points: int = N_LABEL_POINTS) -> Label
         )
         for size in range(N_SIZES)
     ]
-    return LabelPoints(
-        vertices=found.vertices,
-        shares=shares,
-        patches=patch_points(found, codebook),
-        numbers=np.stack(numbers),
-        radii=_ball_radii(clean, found.vertices),
-        distances=distances / np.sqrt(shares @ distances**2 @ shares),
-    )
-
-
-def _ball_radii(mesh: TriangleMesh, vertices: Int[np.ndarray, " m"]) -> Float[np.ndarray, "m 2"]:
-    """Return log radii of the largest balls that touch the surface at a vertex from either side.
-
-    A ball of radius R through p, with its center at p - R n, holds no vertex q if
-    R <= |p - q|² / (2 (p - q) · n). This is a thickness that needs no rays, and open surfaces have
-    it too.
-    """
-    unit = normalize_mesh(mesh, "box")
+    # Radii of the largest balls that touch the surface at a point from either side
+    unit = normalize_mesh(clean, "box")
     normals = mean_normals(unit)
-    radii = np.full((len(vertices), 2), LARGEST_RADIUS)
-    for row, vertex in enumerate(vertices):
+    radii = np.full((len(found.vertices), 2), LARGEST_RADIUS)
+    for row, vertex in enumerate(found.vertices):
         chords = unit.vertices[vertex] - unit.vertices
         squares = np.einsum("ni,ni->n", chords, chords)
         heights = chords @ normals[vertex]
@@ -115,7 +98,14 @@ def _ball_radii(mesh: TriangleMesh, vertices: Int[np.ndarray, " m"]) -> Float[np
             facing = far & (side > LEAST_COSINE * np.sqrt(squares))
             least = (squares[facing] / side[facing]).min(initial=2 * LARGEST_RADIUS) / 2
             radii[row, column] = max(least, SMALLEST_RADIUS)
-    return np.log(radii)
+    return LabelPoints(
+        vertices=found.vertices,
+        shares=shares,
+        patches=patch_points(found, codebook),
+        numbers=np.stack(numbers),
+        radii=np.log(radii),
+        distances=distances / np.sqrt(shares @ distances**2 @ shares),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +148,6 @@ class LabeledShape(ReadOnly):
         labels = face_labels(self.labels, "labels", mesh.n_faces)
         object.__setattr__(self, "mesh", mesh)
         object.__setattr__(self, "labels", freeze(labels.astype(np.int64)))
-
-    __repr__ = short_repr
 
     @cached_property
     def points(self) -> LabelPoints:

@@ -12,7 +12,6 @@ from eigenshape._arguments import require_each
 from eigenshape._arrays import ReadOnly, point_functions
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.linear_solver import factor_definite
@@ -91,8 +90,6 @@ class LabelTransfer(ReadOnly):
     part_vertices: Int[np.ndarray, " m"]
     weights: Float[np.ndarray, " s"]
 
-    __repr__ = short_repr
-
 
 @one_blas_thread()
 def transfer_labels(
@@ -160,9 +157,16 @@ def transfer_labels(
     for number, source in enumerate(sources):
         if progress:
             progress((1 + number) / n_steps, f"matching labeled shape {number + 1}")
-        transport = transport_points(points, source.points)
-        votes.append(transport.shares @ _label_shares(source, vocabulary))
-        costs.append(transport.cost)
+        shares, cost = transport_points(points, source.points)
+        # The share of each label in the area of the faces around each point of the source
+        columns = np.searchsorted(vocabulary, source.labels)
+        around = np.zeros((source.mesh.n_vertices, len(vocabulary)))
+        areas = face_areas(source.mesh)
+        for corner in source.mesh.faces.T:
+            np.add.at(around, (corner, columns), areas / areas.max())
+        chosen = around[source.points.vertices]
+        votes.append(shares @ (chosen / chosen.sum(axis=1, keepdims=True)))
+        costs.append(cost)
     weights = np.exp((min(costs) - np.array(costs)) / COST_SCALE)
     weights /= weights.sum()
 
@@ -173,19 +177,6 @@ def transfer_labels(
     if progress:
         progress((n_steps - 1) / n_steps, "spreading votes")
     return _settle(target, at_vertices, vocabulary, weights)
-
-
-def _label_shares(
-    source: LabeledShape, vocabulary: Int[np.ndarray, " l"]
-) -> Float[np.ndarray, "m l"]:
-    """Return the share of each label in the area of the faces around each point."""
-    columns = np.searchsorted(vocabulary, source.labels)
-    around = np.zeros((source.mesh.n_vertices, len(vocabulary)))
-    areas = face_areas(source.mesh)
-    for corner in source.mesh.faces.T:
-        np.add.at(around, (corner, columns), areas / areas.max())
-    chosen = around[source.points.vertices]
-    return np.asarray(chosen / chosen.sum(axis=1, keepdims=True))
 
 
 @lru_cache(maxsize=1)

@@ -1,7 +1,5 @@
 """Match points of two shapes softly, by what they look like and how far they are from each other."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 
@@ -25,30 +23,23 @@ N_BALANCES = 20  # of rows and columns
 LEAST_KERNEL = 1e-30  # below all costs that matter; keeps sums of a column above 0
 
 
-@dataclass(frozen=True, eq=False)
-class Transport:
-    """A soft matching of points of a target with those of a source.
-
-    Attributes
-    ----------
-    shares : (m, n) float
-        For each point of the target, its partners in shares that sum to 1.
-    cost : float
-        Mean cost of a point, without unit: lower for shapes that are more alike.
-    """
-
-    shares: Float[np.ndarray, "m n"]
-    cost: float
-
-
 @one_blas_thread()
-def transport_points(target: LabelPoints, source: LabelPoints) -> Transport:
+def transport_points(
+    target: LabelPoints, source: LabelPoints
+) -> tuple[Float[np.ndarray, "m n"], float]:
     """Match points softly, by a fused Gromov-Wasserstein plan (Vayer and others 2019).
 
     The cost of a pair is the squared difference of patches, of thicknesses, and of the distances to
     the surest matched points (`match_patches`), plus the mean squared difference of distances to
     all points, each matched as in the round before. Rows keep their area, columns in part, by
     Sinkhorn's balancing (Cuturi 2013, Chizat and others 2018).
+
+    Returns
+    -------
+    shares : (m, n) float
+        For each point of the target, its partners in shares that sum to 1.
+    cost : float
+        Mean cost of a point, without unit: lower for shapes that are more alike.
     """
     step, strain = anchor_strain(target.patches, source.patches)
     ours, theirs = target.numbers[max(-step, 0)], source.numbers[max(step, 0)]
@@ -68,7 +59,7 @@ def transport_points(target: LabelPoints, source: LabelPoints) -> Transport:
         costs = alike + DISTANCE_WEIGHT * distortion
         plan = _balance(costs, target.shares, source.shares)
     shares = plan / plan.sum(axis=1, keepdims=True)
-    return Transport(shares, float(target.shares @ (shares * costs).sum(axis=1)))
+    return shares, float(target.shares @ (shares * costs).sum(axis=1))
 
 
 def _balance(

@@ -1,14 +1,11 @@
 """Compiled loops of `distance` and `coarse`: codes of four bits, and distances of two descriptions or of short rows."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
 
 
 @njit
-@no_type_check
 def unpack(rows, codes):
     """Write the codes of packed rows: the first half of a code lies in the low half bytes."""
     half = rows.shape[1]
@@ -23,7 +20,6 @@ def unpack(rows, codes):
 
 
 @njit
-@no_type_check
 def dot(one, two):
     """Return the product of two codes.
 
@@ -36,7 +32,6 @@ def dot(one, two):
 
 
 @njit
-@no_type_check
 def lengths(codes, found):
     """Write the length of each code; 1 for a code of zeros, whose cosines are 0."""
     for row in range(len(codes)):
@@ -45,7 +40,6 @@ def lengths(codes, found):
 
 
 @njit
-@no_type_check
 def distance(one, one_lengths, two, two_lengths, n_sizes, price):
     """Return 1 - the mean cosine of two descriptions at the best relative size."""
     n_bases = len(one) // n_sizes
@@ -61,7 +55,6 @@ def distance(one, one_lengths, two, two_lengths, n_sizes, price):
 
 
 @njit
-@no_type_check
 def distances_to(query, query_lengths, others, other_lengths, n_sizes, price, found):
     """Write the distance from one description to each of many, whose rows lie one after another."""
     m = len(query)
@@ -73,7 +66,6 @@ def distances_to(query, query_lengths, others, other_lengths, n_sizes, price, fo
 
 
 @njit
-@no_type_check
 def packed_view_distance(query, query_lengths, packed, codes, code_lengths, m, n_sizes, price):
     """Return the mean of two distances: to a whole, and to the nearest of it and its views.
 
@@ -101,7 +93,6 @@ def packed_view_distance(query, query_lengths, packed, codes, code_lengths, m, n
 
 
 @njit
-@no_type_check
 def scan(query, rows, unit, price, found):
     """Write 1 - the best mean cosine over relative sizes, of one query with each shape.
 

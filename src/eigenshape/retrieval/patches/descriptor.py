@@ -10,7 +10,7 @@ from jaxtyping import Int, Int8
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import (
     CLIP,
@@ -25,7 +25,7 @@ from eigenshape.scans.partial import view_number
 
 
 @dataclass(frozen=True)
-class PatchRecipe:
+class PatchRecipe(Shown):
     """Describe a shape by patches, encoded in a codebook.
 
     Two descriptors compare only if their recipes are equal.
@@ -69,9 +69,6 @@ class PatchRecipe:
                 f"clip must be positive and finite; it is {self.clip}. The default is {CLIP}."
             )
 
-    __repr__ = short_repr
-    _repr_html_ = html_repr
-
     @property
     def name(self) -> str:
         """Return a short name for messages and tables."""
@@ -112,8 +109,6 @@ class PatchDescriptor(ReadOnly):
     codes: Int8[np.ndarray, "w b s v"]
     points: tuple[PatchPoints, ...]
     recipe: PatchRecipe
-
-    __repr__ = short_repr
 
     @property
     def vertices(self) -> Int[np.ndarray, " m"]:

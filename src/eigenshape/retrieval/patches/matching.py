@@ -8,7 +8,6 @@ from jaxtyping import Float, Float32, Int, UInt8
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whiten_numbers
 from eigenshape.retrieval.patches.matching_loops import (
@@ -76,8 +75,6 @@ class PatchPoints(ReadOnly):
     distances: Float32[np.ndarray, "m m"]
     vertices: Int[np.ndarray, " m"]
 
-    __repr__ = short_repr
-
 
 @dataclass(frozen=True, eq=False)
 class PatchMatch(ReadOnly):
@@ -120,8 +117,6 @@ class PatchMatch(ReadOnly):
     vertices: Int[np.ndarray, "p 2"]
     agreement: float
     step: int
-
-    __repr__ = short_repr
 
 
 def patch_points(shape: Patches, codebook: PatchCodebook) -> PatchPoints:

@@ -1,7 +1,5 @@
 """Compiled loops of `matching`: mutual nearest neighbors, consistent sets of matches."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -10,7 +8,6 @@ ROUNDS = 20  # of the power method
 
 
 @njit
-@no_type_check
 def nearest_of_each_other(apart):
     """Return the rows and columns of entries that are least in both, each row and column once.
 
@@ -37,7 +34,6 @@ def nearest_of_each_other(apart):
 
 
 @njit
-@no_type_check
 def leading(ours, theirs, shares, ratio, slack, least):
     """Return the largest eigenvalue of the agreement of matches, and the support of each match.
 
@@ -69,7 +65,6 @@ def leading(ours, theirs, shares, ratio, slack, least):
 
 
 @njit
-@no_type_check
 def between_landmarks(lengths, found):
     """Write the mean of the bounds of each distance that distances to landmarks give."""
     n_points, n_landmarks = lengths.shape

@@ -1,7 +1,5 @@
 """Compiled loops of `patches`: descriptors of the geodesic discs around a point, by rings."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -18,7 +16,6 @@ LEAST_AREA = 1e-3  # share of a flat disc's area, added before the logarithm
 
 
 @njit
-@no_type_check
 def describe_discs_of(distances, center, surface, radii, scratch, found):
     """Write the NUMBERS of the discs around one point, a row for each of the ascending radii.
 
@@ -34,7 +31,6 @@ def describe_discs_of(distances, center, surface, radii, scratch, found):
 
 
 @njit
-@no_type_check
 def sort_by_distance(distances, reach, order, starts):
     """Write the vertices within reach by distance, equals by index, and return their number.
 
@@ -64,13 +60,11 @@ def sort_by_distance(distances, reach, order, starts):
 
 
 @njit
-@no_type_check
 def _bucket(distance, reach):
     return min(int(distance / reach * BUCKETS), BUCKETS - 1)
 
 
 @njit
-@no_type_check
 def describe_disc(distances, center, order, surface, radius, kept, straight, found):
     """Write the NUMBERS that describe the disc of a radius around one point.
 
@@ -123,7 +117,6 @@ def describe_disc(distances, center, order, surface, radius, kept, straight, fou
 
 
 @njit
-@no_type_check
 def _add(found, first, n_bins, share, weight):
     """Split a weight at `share`, 0 to 1, between the two bins with the nearest centers.
 

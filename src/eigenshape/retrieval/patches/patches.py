@@ -9,7 +9,6 @@ from scipy.sparse.csgraph import shortest_path
 
 from eigenshape._arrays import ReadOnly, whole_number
 from eigenshape._errors import InvalidShapeError
-from eigenshape._text import short_repr
 from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -79,8 +78,6 @@ class Patches(ReadOnly):
     weights: Float32[np.ndarray, "m r"]
     vertices: Int[np.ndarray, " m"]
     distances: Float32[np.ndarray, "m m"]
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()

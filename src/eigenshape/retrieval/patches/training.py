@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.linalg as sl
-from jaxtyping import Float, Float32
+from jaxtyping import Float
 from scipy.cluster.vq import kmeans2
 from scipy.special import logsumexp
 
@@ -70,26 +70,22 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
         raise InvalidParameterError(
             f"A codebook takes at least {2 * N_ENTRIES} patches; {len(shapes)} shapes have {count}."
         )
+    books = []
     with one_blas_thread():
-        books = [
-            _train_at_radius(np.concatenate([shape.numbers[:, base] for shape in shapes]), seed)
-            for base in BASES
-        ]
+        for base in BASES:
+            rows = np.concatenate([shape.numbers[:, base] for shape in shapes])
+            numbers = rows.astype(np.float64)
+            mean = numbers.mean(axis=0)
+            spread = np.maximum(numbers.std(axis=0), LEAST_SPREAD)
+            scaled = standardize(numbers, mean, spread)
+            # Whitened along the axes of largest variance
+            values, vectors = sl.eigh(scaled.T @ scaled / len(scaled))
+            lengths = np.sqrt(np.maximum(values[::-1][:N_AXES], LEAST_EIGENVALUE))
+            axes = vectors[:, ::-1][:, :N_AXES] / lengths
+            books.append((mean, spread, axes, *_fit_mixture(scaled @ axes, seed)))
     return PatchCodebook(
         *(np.stack(parts).astype(np.float32) for parts in zip(*books, strict=True))
     )
-
-
-def _train_at_radius(rows: Float32[np.ndarray, "p c"], seed: int) -> tuple[np.ndarray, ...]:
-    """Return means, spreads, axes, shares, centers and variances of p patches at one radius."""
-    numbers = rows.astype(np.float64)
-    mean = numbers.mean(axis=0)
-    spread = np.maximum(numbers.std(axis=0), LEAST_SPREAD)
-    scaled = standardize(numbers, mean, spread)
-    values, vectors = sl.eigh(scaled.T @ scaled / len(scaled))
-    lengths = np.sqrt(np.maximum(values[::-1][:N_AXES], LEAST_EIGENVALUE))
-    axes = vectors[:, ::-1][:, :N_AXES] / lengths
-    return mean, spread, axes, *_fit_mixture(scaled @ axes, seed)
 
 
 def _fit_mixture(

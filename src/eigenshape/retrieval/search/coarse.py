@@ -1,22 +1,19 @@
 """What search keeps in files beside an index: short rows of all shapes, and how isolated each is."""
 
-import os
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 from zipfile import BadZipFile
 from zlib import crc32
 
 import numpy as np
 from jaxtyping import Float, Float32, Int, Int8, Int64
-from numpy.lib.format import read_array, read_array_header_1_0, read_magic
+from numpy.lib.format import open_memmap, read_array
 
 from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import FileFormatError
 from eigenshape._files import replacing
-from eigenshape._text import short_repr
 from eigenshape.retrieval.patches.code_loops import scan
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.distance import N_REFERENCES, SIZE_PRICE, measure_isolations
@@ -32,7 +29,6 @@ GROWTH = 4
 # Rows that the file may lack, or hold of shapes that were removed, as a share of all. They are made
 # at each opening, 0.2 ms a shape; writing the file anew takes as long as making a tenth of it.
 MOST_CHANGED = 0.05
-FORMAT = "eigenshape coarse rows 1"
 FEWEST_TO_KEEP = 100  # shapes of an index that has such a file; fewer are measured in 10 ms
 
 
@@ -82,8 +78,6 @@ class CoarseRows(ReadOnly):
     rows: Int64[np.ndarray, " n"]
     n_fitted: int
 
-    __repr__ = short_repr
-
     def scores(self, codes: Int8[np.ndarray, "b s v"]) -> Float32[np.ndarray, " n"]:
         """Return distances of a query to all whole shapes, as far as the axes show them."""
         query, unit = self.axes.coarse_query(codes)
@@ -129,8 +123,10 @@ def coarse_rows(source: Rows, recipe: PatchRecipe, before: CoarseRows | None = N
     wanted = np.asarray(source.row_checksums, dtype=np.int64)
     kept = before or _read(path)
     if kept is None or len(wanted) > GROWTH * kept.n_fitted:
-        axes = fit_axes(_codes(source, recipe, _spread(len(wanted), N_TO_FIT)))
-        nothing = _no_rows(recipe, axes)
+        spread = np.linspace(0, len(wanted) - 1, min(N_TO_FIT, len(wanted)))
+        axes = fit_axes(_codes(source, recipe, np.unique(spread.astype(np.int64))))
+        n_bases, n_sizes, _ = recipe.codebook.code_shape
+        nothing = np.empty((0, n_sizes, n_bases * axes.axes.shape[2]), dtype=np.int8)
         kept = _in_order(axes, np.empty(0, np.int64), nothing, len(wanted))
     found = _completed(source, recipe, kept, wanted)
     few = MOST_CHANGED * len(wanted)
@@ -142,7 +138,11 @@ def coarse_rows(source: Rows, recipe: PatchRecipe, before: CoarseRows | None = N
     made = _in_order(found.axes, freeze(wanted), numbers, found.n_fitted)
     # A folder that cannot be written to, as on a read-only disk, is searched all the same.
     with suppress(OSError, FileFormatError):
-        _write(path, made)
+        with replacing(path) as file:
+            # The rows first, which are mapped into memory when they are read
+            for part in (numbers, made.axes.axes, made.axes.steps, made.checksums):
+                np.save(file, part)
+            np.save(file, np.array([_checksum(made), made.n_fitted]))
         return _read(path) or made
     return made
 
@@ -194,71 +194,30 @@ def _codes(
     return unpack_codes(np.concatenate(packed)).reshape(len(places), *shape)
 
 
-def _spread(n_shapes: int, count: int) -> Int[np.ndarray, " k"]:
-    """Return at most `count` places, evenly spread."""
-    return np.unique(np.linspace(0, n_shapes - 1, min(count, n_shapes)).astype(np.int64))
-
-
-def _no_rows(recipe: PatchRecipe, axes: PatchAxes) -> Int8[np.ndarray, "0 s q"]:
-    n_bases, n_sizes, _ = recipe.codebook.code_shape
-    return np.empty((0, n_sizes, n_bases * axes.axes.shape[2]), dtype=np.int8)
-
-
-def _write(path: Path, rows: CoarseRows) -> None:
-    parts = _parts(rows)
-    with replacing(path) as file:
-        np.save(file, np.array([FORMAT]))
-        np.save(file, np.array([_checksum(parts), rows.n_fitted], dtype=np.int64))
-        for part in parts:
-            np.save(file, part)
-
-
 def _read(path: Path) -> CoarseRows | None:
-    """Return what a file holds, or None if it is missing, damaged, or of another format."""
+    """Return what a file holds, or None if it is missing, damaged, or of an older format."""
     # Whatever is wrong with the file, it can be made again.
     with suppress(OSError, ValueError, EOFError), path.open("rb") as file:
-        if read_array(file).tolist() != [FORMAT]:
+        mapped = open_memmap(path, mode="r")
+        if mapped.dtype != np.int8:
             return None
-        checksum, n_fitted = read_array(file).tolist()
-        axes, steps, checksums = (freeze(read_array(file)) for _ in range(3))
-        numbers = _mapped(file)
-        if numbers is None:
-            return None
-        rows = _in_order(PatchAxes(axes, steps), checksums, numbers, n_fitted)
-        if _checksum(_parts(rows)) == checksum:
+        file.seek(mapped.offset + mapped.nbytes)
+        axes, steps, checksums, facts = (freeze(read_array(file)) for _ in range(4))
+        checksum, n_fitted = facts.tolist()
+        rows = _in_order(PatchAxes(axes, steps), checksums, np.asarray(mapped), n_fitted)
+        if _checksum(rows) == checksum:
             return rows
     return None
 
 
-def _parts(rows: CoarseRows) -> tuple[np.ndarray, ...]:
-    return rows.axes.axes, rows.axes.steps, rows.checksums, rows.numbers
-
-
-def _checksum(parts: tuple[np.ndarray, ...]) -> int:
+def _checksum(rows: CoarseRows) -> int:
     found = 0
-    for part in parts:
-        for piece in _pieces(part):
-            found = crc32(piece, found)
+    for part in (rows.axes.axes, rows.axes.steps, rows.checksums, rows.numbers):
+        # In pieces, so that a mapped file need not be in memory as a whole
+        for first in range(0, len(part), SHAPES_AT_ONCE):
+            piece = np.ascontiguousarray(part[first : first + SHAPES_AT_ONCE])
+            found = crc32(piece.data, found)
     return found
-
-
-def _pieces(array: np.ndarray) -> Iterator[memoryview]:
-    """Return an array in pieces, so that a mapped file need not be in memory as a whole."""
-    for first in range(0, len(array), SHAPES_AT_ONCE):
-        yield np.ascontiguousarray(array[first : first + SHAPES_AT_ONCE]).data
-
-
-def _mapped(file: BinaryIO) -> np.ndarray | None:
-    """Map the array that comes next in a file into memory; return None if it is not whole."""
-    read_magic(file)
-    shape, fortran, dtype = read_array_header_1_0(file)
-    size = int(np.prod(shape)) * dtype.itemsize
-    if fortran or dtype != np.int8 or os.fstat(file.fileno()).st_size != file.tell() + size:
-        return None
-    if not size:
-        return np.empty(shape, dtype=np.int8)
-    mapped: np.ndarray[Any, Any] = np.memmap(file, dtype, "r", file.tell(), shape)
-    return np.asarray(mapped)
 
 
 def stored_isolations(

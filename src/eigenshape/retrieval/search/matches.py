@@ -10,9 +10,9 @@ from jaxtyping import Int
 
 from eigenshape._arrays import ReadOnly, freeze
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown, html_repr
 from eigenshape._threads import one_blas_thread
-from eigenshape.retrieval.kinds import Descriptor, kind_of
+from eigenshape.retrieval.kinds import Descriptor, pair_points
 from eigenshape.retrieval.search.candidates import Method
 from eigenshape.retrieval.search.chances import class_chances
 
@@ -70,7 +70,6 @@ class Match(ReadOnly):
     chance: float | None = None
     distance: float | None = None
 
-    __repr__ = short_repr
     _repr_html_ = html_repr
 
     @property
@@ -86,12 +85,11 @@ class Match(ReadOnly):
         Each row is the number of one of the query, and of one of this shape. They are computed when
         they are first asked for, which takes 2 ms, and kept.
         """
-        kind = kind_of(self.query.recipe)
-        return freeze(kind.correspondences(self.query, self.descriptor))
+        return freeze(pair_points(self.query, self.descriptor))
 
 
 @dataclass(frozen=True, eq=False)
-class Matches(Sequence[Match]):
+class Matches(Shown, Sequence[Match]):
     """What `ShapeIndex.query` found: a sequence of matches, best first, and how they were found.
 
     Attributes
@@ -126,9 +124,6 @@ class Matches(Sequence[Match]):
     n_compared: int
     n_shapes: int
     nothing_alike: bool = False
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def __len__(self) -> int:
         return len(self.found)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from threading import RLock
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._text import html_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe
 from eigenshape.retrieval.patches.distance import USUAL_ISOLATION
 from eigenshape.retrieval.search.candidates import (
@@ -73,12 +72,7 @@ class IndexReader:
     def __enter__(self) -> "IndexReader":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __len__(self) -> int:
@@ -195,8 +189,8 @@ class IndexReader:
         if isinstance(shape, Descriptor):
             descriptor = shape
         else:
-            mesh, recipe = as_mesh(shape, "shape"), choose_recipe(list(state.recipes.values()))
-            descriptor = kind_of(recipe).describe_query(mesh, recipe)
+            recipe = choose_recipe(list(state.recipes.values()))
+            descriptor = describe(as_mesh(shape, "shape"), recipe)
         return self._search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
 
     def _search(  # noqa: PLR0913 - the choices of a query, each of which has a default
@@ -231,7 +225,9 @@ class IndexReader:
             try:
                 scan = self._scan(state, descriptor.recipe)
                 snapshot = scan.snapshot
-                allowed = snapshot.mask(chosen)
+                allowed = np.ones(snapshot.n_shapes, dtype=bool)
+                if chosen is not None:
+                    allowed = np.isin(snapshot.shape_of, chosen)
                 if left_out >= 0:
                     allowed &= snapshot.shape_of != left_out
                 isolations = (

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape._threads import one_blas_thread
-from eigenshape.retrieval.kinds import Descriptor, kind_of
+from eigenshape.retrieval.kinds import Descriptor, as_stored, row_type, score_rows, verify_scores
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search.candidates import Candidates
 from eigenshape.retrieval.search.chances import chances, nothing_alike
@@ -46,22 +46,28 @@ def search_candidates(
     Matches
         Lowest score first, each shape once; equal scores are sorted by name.
     """
-    kind, columns = kind_of(descriptor.recipe), snapshot.columns
+    columns = snapshot.columns
     (rows,) = rows_of_each("the query", [descriptor])
-    query = kind.as_stored(descriptor)
+    query = as_stored(descriptor)
     require_columns(descriptor.recipe, rows.shape[1], int(columns["n_columns"][0]))
     places = candidates.places
     if not len(places):
         return Matches((), candidates.method, 0, candidates.n_shapes)
     # An exact search reads the whole index, which need not fit into memory.
-    sizes = columns["n_rows"][places] * columns["n_columns"][places] * kind.row_type.itemsize
+    sizes = (
+        columns["n_rows"][places]
+        * columns["n_columns"][places]
+        * row_type(descriptor.recipe).itemsize
+    )
     parts = np.split(places, np.flatnonzero(np.diff(np.cumsum(sizes) // BYTES_AT_ONCE)) + 1)
-    found = [kind.scores(query, snapshot.rows_of(some), isolations[some]) for some in parts]
+    found = [score_rows(query, snapshot.rows_of(some), isolations[some]) for some in parts]
     distances = np.concatenate(found)
     # Only damaged rows have no finite distance; reading such a descriptor raises the error.
     for bad in places[~np.isfinite(distances)].tolist():
         snapshot.descriptor(bad)
-    scores = kind.verify(query, lambda number: snapshot.descriptor(int(places[number])), distances)
+    scores = verify_scores(
+        query, lambda number: snapshot.descriptor(int(places[number])), distances
+    )
     # Of the views of each shape, keep the one with the lowest score.
     order = np.argsort(scores, kind="stable")
     firsts = np.unique(snapshot.shape_of[places[order]], return_index=True)[1]

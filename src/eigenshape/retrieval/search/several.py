@@ -15,10 +15,10 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.retrieval.kinds import Descriptor, kind_of
+from eigenshape.retrieval.kinds import Descriptor, describe
 from eigenshape.retrieval.patches.verification import N_VERIFIED
 from eigenshape.retrieval.search.chances import chances
-from eigenshape.retrieval.search.matches import Match, Matches
+from eigenshape.retrieval.search.matches import Matches
 from eigenshape.retrieval.search.reader import IndexReader
 from eigenshape.retrieval.store.database import DATABASE
 from eigenshape.retrieval.store.filters import choose_shapes
@@ -101,26 +101,25 @@ def query_indexes(
         descriptor = shape
     else:
         recipe = _open_reader(paths[0]).default_recipe()
-        descriptor = kind_of(recipe).describe_query(as_mesh(shape, "shape"), recipe)
+        descriptor = describe(as_mesh(shape, "shape"), recipe)
     ask = partial(
         _ask, descriptor=descriptor, n_matches=wanted + N_VERIFIED, where=where, exact=exact
     )
-    answers = map(ask, paths) if executor is None else executor.map(ask, paths)
-    return _merged(list(answers), wanted)
-
-
-def _merged(answers: list[Matches], n_matches: int) -> Matches:
-    """Merge what several indexes answered to one query into the answer of one index of them all.
-
-    Each index has matched the points of its own thirty nearest shapes. Here those count that are
-    among the thirty nearest of all, as they would in one index; the others keep the distance of
-    their codes.
-    """
-    found = sorted((match for answer in answers for match in answer), key=_distance)
-    found = [*found[:N_VERIFIED], *map(_not_verified, found[N_VERIFIED:])]
+    answers = list(map(ask, paths) if executor is None else executor.map(ask, paths))
+    # Each index has matched the points of its own thirty nearest shapes. Here those count that are
+    # among the thirty nearest of all, as they would in one index; the others keep the distance of
+    # their codes.
+    found = sorted(
+        (match for answer in answers for match in answer),
+        key=lambda match: match.score if match.distance is None else match.distance,
+    )
+    for place, match in enumerate(found[N_VERIFIED:], N_VERIFIED):
+        if match.distance is not None:
+            chance = float(chances(np.array([match.distance]))[0])
+            found[place] = replace(match, score=match.distance, chance=chance)
     found.sort(key=lambda match: (match.score, match.name))
     return Matches(
-        tuple(found[:n_matches]),
+        tuple(found[:wanted]),
         next((each.method for each in answers if each.method != "exact"), "exact"),
         sum(answer.n_compared for answer in answers),
         sum(answer.n_shapes for answer in answers),
@@ -153,15 +152,3 @@ def _open_reader(folder: Path) -> IndexReader:
 @lru_cache(maxsize=MOST_OPEN)
 def _reader(folder: Path, inode: int) -> IndexReader:
     return IndexReader(folder)
-
-
-def _distance(match: Match) -> float:
-    return match.score if match.distance is None else match.distance
-
-
-def _not_verified(match: Match) -> Match:
-    """Return a match by the distance of codes alone."""
-    if match.distance is None:
-        return match
-    chance = float(chances(np.array([match.distance]))[0])
-    return replace(match, score=match.distance, chance=chance)

@@ -12,7 +12,7 @@ from zlib import crc32
 import numpy as np
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.kinds import AnyRecipe, kind_of, recipe_from_text
+from eigenshape.retrieval.kinds import AnyRecipe, recipe_from_text, row_type
 from eigenshape.retrieval.patches.codebook import PatchCodebook, write_codebook
 from eigenshape.retrieval.store.damage import Damage, warn_of_damage
 from eigenshape.retrieval.store.database import (
@@ -82,8 +82,13 @@ def _shapes(
     """Yield the shapes that agree with their checksums."""
     recipes: dict[int, AnyRecipe] = {}
     query = "SELECT recipe.id, fields, data FROM recipe JOIN codebook ON recipe.id = codebook.id"
-    for number, text, codebook in database.execute(query).fetchall():
-        recipes[number] = recipe_from_text(text, _codebook(codebook))
+    for number, text, data in database.execute(query).fetchall():
+        codebook = None
+        if data:  # written anew, as this version writes it
+            with np.load(BytesIO(data)) as arrays:
+                known = {name: arrays[name] for name in FIELDS}
+            codebook = write_codebook(PatchCodebook(**known))
+        recipes[number] = recipe_from_text(text, codebook)
     paths: dict[int, Path] = {0: folder}
     for number, away, content, generation in database.execute(
         "SELECT id, folder, content, generation FROM file"
@@ -106,21 +111,12 @@ def _shapes(
             descriptors = []
             for row in database.execute(DESCRIPTORS, (number,)):
                 recipe, view, n_rows, n_columns, *where = row
-                size = n_rows * n_columns * kind_of(recipes[recipe]).row_type.itemsize
+                size = n_rows * n_columns * row_type(recipes[recipe]).itemsize
                 rows = piece(where[0], where[1], size, where[2])
                 details = piece(*where[3:])
                 found: Any = (recipes[recipe], view, n_rows, n_columns, rows, details)
                 descriptors.append(StoredDescriptor(*found))
-            name, label, source, digest, tags, attributes = facts[:6]
-            told = (name, label, source, digest, tags, attributes)
-            yield StoredShape(*told, picture, descriptors)
+            whole: Any = (*facts[:6], picture, descriptors)
+            yield StoredShape(*whole)
         except (OSError, ValueError, KeyError) as err:
             damages.append(Damage(DATABASE, str(err), facts[0]))
-
-
-def _codebook(data: bytes) -> bytes | None:
-    """Return a codebook as this version writes it."""
-    if not data:
-        return None
-    with np.load(BytesIO(data)) as arrays:
-        return write_codebook(PatchCodebook(**{name: arrays[name] for name in FIELDS}))

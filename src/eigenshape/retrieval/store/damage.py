@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eigenshape._text import html_repr, printable, short_repr
+from eigenshape._text import Shown, printable
 
 MOST_NAMED = 3  # damages that a warning names; `ShapeIndex.verify` lists all
 
@@ -25,7 +25,7 @@ class StoreWarning(UserWarning):
 
 
 @dataclass(frozen=True)
-class Damage:
+class Damage(Shown):
     """A place of an index that does not hold what was written.
 
     Attributes
@@ -51,9 +51,6 @@ class Damage:
     file: str
     what: str
     shape: str | None = None
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def __str__(self) -> str:
         place = printable(self.file)

@@ -127,12 +127,11 @@ def choose_shapes(
 
 def _condition(key: str, value: Any) -> Callable[[Any], bool]:
     """Return the test of one condition: a value, a list of values, or a range of numbers."""
-    if isinstance(value, tuple) and len(value) == 2 and all(map(_is_bound, value)):
-        low, high = (
-            (-np.inf if value[0] is None else value[0]),
-            (np.inf if value[1] is None else value[1]),
-        )
-        return lambda found: _is_number(found) and low <= found <= high
+    if isinstance(value, tuple) and len(value) == 2:
+        low = -np.inf if value[0] is None else value[0]
+        high = np.inf if value[1] is None else value[1]
+        if _is_number(low) and _is_number(high):
+            return lambda found: _is_number(found) and low <= found <= high
     several = isinstance(value, Sequence) and not isinstance(value, str)
     allowed = list(value) if several else [value]
     for each in allowed:
@@ -147,7 +146,3 @@ def _condition(key: str, value: Any) -> Callable[[Any], bool]:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _is_bound(value: Any) -> bool:
-    return value is None or _is_number(value)

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 from zlib import crc32
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Int
 
 from eigenshape._errors import StoreError
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, restore, row_type
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
     DAMAGE,
@@ -52,10 +52,8 @@ class StoredDescriptor(NamedTuple):
 
     def restored(self) -> Descriptor:
         """Return the descriptor."""
-        kind = kind_of(self.recipe)
-        rows = np.frombuffer(self.rows, kind.row_type).reshape(self.n_rows, self.n_columns)
-        found: Descriptor = kind.restore(rows, self.details, self.recipe)
-        return found
+        numbers = np.frombuffer(self.rows, row_type(self.recipe))
+        return restore(numbers.reshape(self.n_rows, self.n_columns), self.details, self.recipe)
 
 
 class StoredShape(NamedTuple):
@@ -213,6 +211,13 @@ class IndexState:
                     return facts
         return None
 
+    def require(self, name: str, purpose: str) -> Facts:
+        """Return what is known of a shape by its name; raise StoreError if there is none."""
+        facts = self.find(name)
+        if facts is None:
+            raise StoreError(f"A shape must be in the index to {purpose}; {name!r} is not.")
+        return facts
+
     def shape(self, facts: Facts) -> StoredShape:
         """Return all that the index holds of a shape, checked.
 
@@ -220,6 +225,15 @@ class IndexState:
         """
         descriptors = self.stored(self.descriptor_ids(facts))
         return StoredShape(*facts[1:7], self.picture(facts), descriptors)
+
+    def is_whole(self, facts: Facts) -> bool:
+        """Return whether a shape, its numbers and its picture agree with their checksums."""
+        try:
+            self.facts([facts.id])
+            self.shape(facts)
+        except DamagedEntryError:
+            return False
+        return True
 
     def descriptor_ids(self, facts: Facts) -> list[int]:
         """Return the numbers of the descriptors of a shape.
@@ -248,13 +262,24 @@ class IndexState:
         found = []
         for number in ids:
             row = rows.get(number)
-            what = "its row cannot be read" if row is None else _difference(row)
-            if row is None or what:
-                raise self.damaged([number], what)
-            if row[2] not in self.recipes:
+            if row is None:
+                raise self.damaged([number], "its row cannot be read")
+            # id, shape, recipe, view, n_rows, n_columns, two checksums; that of these; the bytes
+            integers, expected, rows_bytes, details = row[:8], row[8], row[9], row[10]
+            if (
+                not all(isinstance(value, int) for value in integers)
+                or integer_checksums(np.array([integers], dtype=np.int64))[0] != expected
+            ):
+                raise self.damaged([number], "its row differs from its checksum")
+            if not isinstance(rows_bytes, bytes) or crc32(rows_bytes) != integers[6]:
+                raise self.damaged([number], "its rows differ from their checksum")
+            if not isinstance(details, bytes) or crc32(details) != integers[7]:
+                raise self.damaged([number], "its details differ from their checksum")
+            if integers[2] not in self.recipes:
                 raise self.damaged([number], "its recipe is lost")
-            # id, shape, recipe, view, n_rows, n_columns, three checksums, rows, details
-            found.append(StoredDescriptor(self.recipes[row[2]], *row[3:6], *row[9:]))
+            recipe = self.recipes[integers[2]]
+            view, n_rows, n_columns = integers[3:6]
+            found.append(StoredDescriptor(recipe, view, n_rows, n_columns, rows_bytes, details))
         return found
 
     def damaged(self, ids: Sequence[int], what: str) -> DamagedEntryError:
@@ -292,20 +317,6 @@ class IndexState:
                 f"{', '.join(names) or 'no shape'}, and {recipe} was requested."
             )
         return Snapshot(self, recipe, rows if mask.all() else rows[mask])
-
-
-def _difference(row: tuple[Any, ...]) -> str:
-    """Return how a row of the table of descriptors differs from its checksums; nothing if it does not."""
-    integers, expected, rows, details = row[:8], row[8], row[9], row[10]
-    if not all(isinstance(value, int) for value in integers):
-        return "its row differs from its checksum"
-    if integer_checksums(np.array([integers], dtype=np.int64))[0] != expected:
-        return "its row differs from its checksum"
-    if not isinstance(rows, bytes) or crc32(rows) != integers[6]:
-        return "its rows differ from their checksum"
-    if not isinstance(details, bytes) or crc32(details) != integers[7]:
-        return "its details differ from their checksum"
-    return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,7 +361,7 @@ class Snapshot:
 
         Raise DamagedEntryError if some cannot be read, or are damaged, with all of these.
         """
-        kind, columns = kind_of(self.recipe), self.columns[places]
+        kind, columns = row_type(self.recipe), self.columns[places]
         ids = columns["id"].tolist()
         blobs = self.state.read("descriptor", "rows", ids)
         found, lost = [], []
@@ -358,8 +369,8 @@ class Snapshot:
         for number, n_rows, n_columns, expected in columns[list(names)].tolist():
             blob = blobs[number][1] if number in blobs else b""
             is_whole = isinstance(blob, bytes) and (not checked or crc32(blob) == expected)
-            if is_whole and len(blob) == n_rows * n_columns * kind.row_type.itemsize:
-                found.append(np.frombuffer(blob, kind.row_type).reshape(n_rows, n_columns))
+            if is_whole and len(blob) == n_rows * n_columns * kind.itemsize:
+                found.append(np.frombuffer(blob, kind).reshape(n_rows, n_columns))
             else:
                 lost.append(number)
         if lost:
@@ -376,12 +387,6 @@ class Snapshot:
         shapes = self.columns["shape"][places]
         found = self.state.facts(np.unique(shapes))
         return [found[shape] for shape in shapes.tolist()]
-
-    def mask(self, shapes: Int[np.ndarray, " n"] | None) -> Bool[np.ndarray, " k"]:
-        """Return which places describe one of some shapes; without them, all do."""
-        if shapes is None:
-            return np.ones(self.n_shapes, dtype=bool)
-        return np.isin(self.columns["shape"], shapes)
 
     def beside(self, name: str) -> Path:
         """Return the path of a file of search that can be made again from the rows."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from eigenshape._errors import StoreError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 from eigenshape.retrieval.store.damage import Damage, warn_of_damage
 from eigenshape.retrieval.store.database import DAMAGE, DATABASE, TABLES, writing
 from eigenshape.retrieval.store.state import DamagedEntryError, IndexState, read_state
@@ -19,7 +19,7 @@ from eigenshape.retrieval.store.writing import Record, Writer
 
 
 @dataclass(frozen=True)
-class IndexReport:
+class IndexReport(Shown):
     """What `ShapeIndex.verify` found.
 
     Attributes
@@ -48,9 +48,6 @@ class IndexReport:
     n_shapes: int
     n_bytes: int
     damages: tuple[Damage, ...]
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
 
 def verify_index(folder: Path) -> IndexReport:

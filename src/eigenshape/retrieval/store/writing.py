@@ -13,8 +13,8 @@ import numpy as np
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError, StoreError
-from eigenshape._text import html_repr, short_repr
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, kind_of, recipe_to_text
+from eigenshape._text import Shown
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, details_of, recipe_to_text, rows_of
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
     DATABASE,
@@ -26,7 +26,6 @@ from eigenshape.retrieval.store.database import (
 )
 from eigenshape.retrieval.store.filters import RESERVED
 from eigenshape.retrieval.store.state import (
-    DamagedEntryError,
     IndexState,
     StoredDescriptor,
     StoredShape,
@@ -34,7 +33,7 @@ from eigenshape.retrieval.store.state import (
 
 
 @dataclass(frozen=True)
-class Record:
+class Record(Shown):
     """What an index holds of a shape beside its descriptors.
 
     Attributes
@@ -76,15 +75,12 @@ class Record:
     attributes: dict[str, Any]
     recipes: tuple[AnyRecipe, ...]
 
-    __repr__ = short_repr
-    _repr_html_ = html_repr
-
 
 LARGEST_THUMBNAIL = 8192  # bytes, so that a shape takes less than 60 KB
 
 
 @dataclass(frozen=True, eq=False)
-class DescribedShape:
+class DescribedShape(Shown):
     """A shape that is described already, to be added to an index.
 
     Descriptors of one recipe are views of the shape: the whole first, then what is seen of it from
@@ -131,9 +127,6 @@ class DescribedShape:
     attributes: Mapping[str, Any] = field(default_factory=dict)
     thumbnail: bytes | None = None
 
-    __repr__ = short_repr
-    _repr_html_ = html_repr
-
 
 def require_name(name: str) -> None:
     """Raise an error if a shape cannot have a name: in a path or an address it must say something."""
@@ -168,10 +161,9 @@ def facts_text(tags: Sequence[str], attributes: Mapping[str, Any]) -> tuple[str,
         require_text(tag)
     for key, value in attributes.items():
         require_text(key)
-        number = isinstance(value, int | float | np.integer | np.floating)
-        if isinstance(value, bool) or not (
-            isinstance(value, str) or (number and _is_finite(value))
-        ):
+        is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        is_finite = isinstance(value, float | np.floating) and bool(np.isfinite(value))
+        if not (isinstance(value, str) or is_whole or is_finite):
             raise InvalidParameterError(
                 f"An attribute must be a text or a finite number; {key!r} is {value!r}. Use a tag "
                 "for what is true or false."
@@ -187,17 +179,13 @@ def facts_text(tags: Sequence[str], attributes: Mapping[str, Any]) -> tuple[str,
     return json.dumps(sorted(set(tags))), numbers
 
 
-def _is_finite(value: Any) -> bool:
-    return isinstance(value, int | np.integer) or bool(np.isfinite(value))
-
-
 def rows_of_each(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarray]:
     """Return the rows of descriptors as they are stored; refuse numbers that cannot be."""
     if not descriptors:
         raise InvalidParameterError(
             f"A shape must have a descriptor to be found; {name!r} has none."
         )
-    return [kind_of(descriptor.recipe).rows(descriptor, name) for descriptor in descriptors]
+    return [rows_of(descriptor, name) for descriptor in descriptors]
 
 
 def require_columns(recipe: AnyRecipe, n_columns: int, known: int) -> None:
@@ -225,7 +213,7 @@ def described(shape: DescribedShape) -> StoredShape:
     pairs = zip(shape.descriptors, rows_of_each(shape.name, shape.descriptors), strict=True)
     for descriptor, rows in pairs:
         recipe = descriptor.recipe
-        details = kind_of(recipe).details(descriptor)
+        details = details_of(descriptor)
         n_rows, n_columns = rows.shape
         view, data = views[recipe], rows.tobytes()
         stored.append(StoredDescriptor(recipe, view, n_rows, n_columns, data, details))
@@ -278,19 +266,29 @@ class Writer:
                 f"{old.digest}, not {shape.digest}. Remove it first, or add it with replace=True "
                 "(--replace)."
             )
-        if old is not None and not (same and self._is_whole(old)):
+        if old is not None and not (same and self.state.is_whole(old)):
             self.delete(old)
             old = None
         known = set()
         if old is None:
-            number = self._insert_shape(shape)
+            number = self._next("shape")
+            n_pictures = int(shape.picture is not None)
+            facts = Facts(number, *shape[:6], len(shape.descriptors), n_pictures)
+            self._insert("shape", *facts, checksum(*facts))
+            if shape.picture is not None:
+                self._insert("picture", number, shape.picture, checksum(number, shape.picture))
         else:
             number = old.id
             query = "SELECT DISTINCT recipe FROM descriptor WHERE shape = ?"
             known = {self.state.recipes[row[0]] for row in self.database.execute(query, (number,))}
         new = [each for each in shape.descriptors if each.recipe not in known]
         for each in new:
-            self._insert_descriptor(number, each)
+            recipe = self.keep_recipe(each.recipe, each.n_columns)
+            sizes = (each.view, each.n_rows, each.n_columns)
+            checksums = (crc32(each.rows), crc32(each.details))
+            integers = (self._next("descriptor"), number, recipe, *sizes, *checksums)
+            row = integer_checksums(np.array([integers], dtype=np.int64))
+            self._insert("descriptor", *integers, int(row[0]), each.rows, each.details)
         if old is not None and new:
             self._update(old._replace(n_descriptors=old.n_descriptors + len(new)))
         return not same
@@ -309,15 +307,6 @@ class Writer:
                 "into a new one to keep what is whole."
             )
         return Facts(*row)
-
-    def _is_whole(self, facts: Facts) -> bool:
-        """Return whether a shape, its numbers and its picture agree with their checksums."""
-        try:
-            self.state.facts([facts.id])
-            self.state.shape(facts)
-        except DamagedEntryError:
-            return False
-        return True
 
     def delete(self, facts: Facts) -> None:
         """Delete a shape, its descriptors and its picture."""
@@ -348,23 +337,6 @@ class Writer:
         fields = ", ".join(f"{name} = ?" for name in Facts._fields[1:])
         query = f"UPDATE shape SET {fields}, checksum = ? WHERE id = ?"
         self.database.execute(query, (*facts[1:], checksum(*facts), facts.id))
-
-    def _insert_shape(self, shape: StoredShape) -> int:
-        number = self._next("shape")
-        n_pictures = int(shape.picture is not None)
-        facts = Facts(number, *shape[:6], len(shape.descriptors), n_pictures)
-        self._insert("shape", *facts, checksum(*facts))
-        if shape.picture is not None:
-            self._insert("picture", number, shape.picture, checksum(number, shape.picture))
-        return number
-
-    def _insert_descriptor(self, shape: int, each: StoredDescriptor) -> None:
-        recipe = self.keep_recipe(each.recipe, each.n_columns)
-        number = self._next("descriptor")
-        sizes = (each.view, each.n_rows, each.n_columns)
-        integers = (number, shape, recipe, *sizes, crc32(each.rows), crc32(each.details))
-        row = integer_checksums(np.array([integers], dtype=np.int64))
-        self._insert("descriptor", *integers, int(row[0]), each.rows, each.details)
 
     def _insert(self, table: str, *values: Any) -> None:
         marks = ", ".join("?" * len(values))

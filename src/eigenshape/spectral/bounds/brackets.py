@@ -1,21 +1,19 @@
 """Lower and upper bounds for the eigenvalues of a mesh itself, rather than of a matrix."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, freeze, whole_number
+from eigenshape._arguments import require_choice
+from eigenshape._arrays import ReadOnly, freeze, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_components, facet_table, without_pinches
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import in_length, size_one
-from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.choices import Condition
 from eigenshape.operators.cotangent import cotangent_laplacian
@@ -33,7 +31,7 @@ LINEAR_FLOOR = 0.5
 NO_POINTS = np.empty(0, dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Brackets(ReadOnly):
     """Guaranteed lower and upper bounds for the k lowest eigenvalues of a mesh.
 
@@ -76,8 +74,6 @@ class Brackets(ReadOnly):
     longest_edge: float
     constant: float
     rounding: float
-
-    __repr__ = short_repr
 
     def explain(self) -> str:
         """Return a text that says what is bounded, and how tightly."""
@@ -173,16 +169,26 @@ def bracket_eigenvalues(
     True
     """
     mesh = as_simplicial(mesh)
-    if boundary not in ("neumann", "dirichlet"):
-        raise InvalidParameterError(
-            f"boundary must be 'neumann' or 'dirichlet'; it is {boundary!r}."
-        )
+    require_choice(boundary, Condition, "boundary")
     require_sound(mesh)
     points, scale = size_one(mesh.points)
     unit = SimplicialMesh(points, mesh.simplices)
     table = facet_table(unit)
     fixed = table.boundary if boundary == "dirichlet" else NO_POINTS
-    upper, rounding = _upper_bounds(unit, k, boundary, progress)
+    # Functions of linear elements are functions on the shape, so their eigenvalues are upper ends.
+    conforming = without_pinches(unit)
+    held = boundary_vertices(conforming) if boundary == "dirichlet" else NO_POINTS
+    n_free = conforming.n_points - len(held)
+    if boundary == "dirichlet" and not (len(held) and n_free):
+        fact = f"{unit!r} has {len(held)} points on its boundary and {n_free} inside"
+        raise InvalidParameterError(
+            f"boundary='dirichlet' needs a boundary and points inside; {fact}."
+        )
+    count = whole_number(k, "k", 1, n_free)
+    laplacian = cotangent_laplacian(conforming, "consistent")
+    found = solve_spectrum(laplacian, count, fixed=held, progress=partly(progress, 0.0, 0.3))
+    upper = enclose(found, laplacian, LINEAR_FLOOR, relative_rounding(unit))[1]
+    rounding = float(1 - found.eigenvalues[-1] / upper[-1]) if upper[-1] else 0.0
     lower = lower_bounds(unit, table, len(upper), fixed, progress)
 
     # A part without fixed facets has the constants of eigenvalue 0.
@@ -201,22 +207,3 @@ def bracket_eigenvalues(
         constant=scale * float(interpolation_constants(unit).max()),
         rounding=rounding,
     )
-
-
-def _upper_bounds(
-    mesh: Mesh, k: Integer, boundary: Condition, progress: Progress | None
-) -> tuple[Float[np.ndarray, " k"], float]:
-    """Return the upper ends, and the share of the last that is rounding."""
-    conforming = without_pinches(mesh)
-    fixed = boundary_vertices(conforming) if boundary == "dirichlet" else NO_POINTS
-    n_free = conforming.n_points - len(fixed)
-    if boundary == "dirichlet" and not (len(fixed) and n_free):
-        fact = f"{mesh!r} has {len(fixed)} points on its boundary and {n_free} inside"
-        raise InvalidParameterError(
-            f"boundary='dirichlet' needs a boundary and points inside; {fact}."
-        )
-    count = whole_number(k, "k", 1, n_free)
-    laplacian = cotangent_laplacian(conforming, "consistent")
-    found = solve_spectrum(laplacian, count, fixed=fixed, progress=partly(progress, 0.0, 0.3))
-    ends = enclose(found, laplacian, LINEAR_FLOOR, relative_rounding(mesh))[1]
-    return ends, float(1 - found.eigenvalues[-1] / ends[-1]) if ends[-1] else 0.0

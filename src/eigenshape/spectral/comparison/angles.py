@@ -1,14 +1,11 @@
 """Angles between the eigenspaces of two shapes, measured, and bounded by gaps (thesis 3.5)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, whole_numbers
+from eigenshape._arrays import ReadOnly, record, whole_numbers
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
@@ -27,7 +24,7 @@ from eigenshape.spectral.spectrum import Spectrum, require_lowest
 Vectors = Float[np.ndarray, "n p"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class EigenspaceAngles(ReadOnly):
     """How far the eigenspaces of a shape rotate when it is deformed into another.
 
@@ -68,8 +65,6 @@ class EigenspaceAngles(ReadOnly):
     angles: Float[np.ndarray, " g"]
     gaps: Float[np.ndarray, " g"]
     bounds: Float[np.ndarray, " g"] | None
-
-    __repr__ = short_repr
 
     def explain(self) -> str:
         """Return a text that says how far the spaces rotate, and how many angles are bounded."""

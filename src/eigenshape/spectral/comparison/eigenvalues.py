@@ -1,14 +1,11 @@
 """Comparison of the spectra of two shapes: what changes, by how much, and which changes are proved."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, finite_values, whole_number
+from eigenshape._arrays import ReadOnly, finite_values, record, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_describable
@@ -18,7 +15,7 @@ from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import NULL, Spectrum, require_lowest
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SpectrumComparison(ReadOnly):
     """The k lowest eigenvalues of two shapes, compared by number.
 
@@ -59,8 +56,6 @@ class SpectrumComparison(ReadOnly):
     relative: Float[np.ndarray, " k"]
     zero: Bool[np.ndarray, " k"]
     bracketed: bool
-
-    __repr__ = short_repr
 
     @property
     def proved_changes(self) -> Bool[np.ndarray, " k"]:

@@ -1,13 +1,10 @@
 """The heat kernel and the heat trace of a spectrum (thesis 2.3)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, freeze, whole_numbers
+from eigenshape._arrays import ReadOnly, freeze, record, whole_numbers
 from eigenshape._memory import require_memory
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.spectrum import Spectrum, decay_factors
@@ -87,7 +84,7 @@ def _points(value: ArrayLike, name: str, n: int) -> Int[np.ndarray, " a"]:
     return whole_numbers(value, f"a point of {name}", 0, n - 1)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HeatTrace(ReadOnly):
     """The heat trace of an operator at some times, with a bound of what is missing.
 
@@ -117,8 +114,6 @@ class HeatTrace(ReadOnly):
     times: Float[np.ndarray, " q"]
     values: Float[np.ndarray, " q"]
     remainders: Float[np.ndarray, " q"]
-
-    __repr__ = short_repr
 
 
 def heat_trace(spectrum: Spectrum, times: ArrayLike) -> HeatTrace:

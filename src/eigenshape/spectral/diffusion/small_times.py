@@ -1,14 +1,14 @@
 """What the heat trace of a surface says at short times: area, boundary length, Euler characteristic."""
 
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arguments import require_choice
 from eigenshape._arrays import finite_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.choices import Condition
 from eigenshape.spectral.spectrum import (
@@ -42,7 +42,7 @@ N_NODES = 60
 
 
 @dataclass(frozen=True)
-class RecoveredGeometry:
+class RecoveredGeometry(Shown):
     """Area, boundary length and Euler characteristic of a surface, from its eigenvalues.
 
     Attributes
@@ -82,9 +82,6 @@ class RecoveredGeometry:
     euler_characteristic_error: float
     times: tuple[float, float]
     n_eigenvalues: int
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
     def whole_characteristic(self, *, even: bool = False) -> int | None:
         """Return the Euler characteristic as a whole number, or None if the error leaves a choice.
@@ -184,10 +181,8 @@ def recover_geometry(
     >>> print(found.explain()[-32:])
     which leaves the whole number 2.
     """
-    if boundary not in (None, *get_args(Condition)):
-        raise InvalidParameterError(
-            f"boundary must be None, 'neumann' or 'dirichlet'; it is {boundary!r}."
-        )
+    if boundary is not None:
+        require_choice(boundary, Condition, "boundary")
     values = _require_eigenvalues(eigenvalues, boundary)
     top = values[-1]
     base = _fit(values / top, boundary)

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any, TypeAlias, get_args
 
 import numpy as np
 import scipy.sparse as sp
 
 from eigenshape._arguments import require_type
+from eigenshape._arrays import record
 from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike
@@ -56,7 +56,7 @@ JIGGLES = 3
 HEADROOM = 32
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Trial:
     """An operator under trial: how it is made, of what, and how much rounding alone may change it.
 

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias, get_args
 from typing_extensions import TypeAliasType
 
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, short_repr
+from eigenshape._text import Shown, html_repr
 
 Promise = TypeAliasType(
     "Promise",
@@ -91,7 +91,7 @@ class SkippedLaw:
 
 
 @dataclass(frozen=True)
-class OperatorReport:
+class OperatorReport(Shown):
     """The result of checking an operator: the laws that were checked, and those that were skipped.
 
     Attributes
@@ -112,9 +112,6 @@ class OperatorReport:
 
     laws: tuple[Law, ...]
     skipped: tuple[SkippedLaw, ...]
-
-    __repr__ = short_repr
-    _repr_html_ = html_repr
 
     @property
     def passed(self) -> bool:

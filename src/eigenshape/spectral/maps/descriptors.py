@@ -37,7 +37,18 @@ def descriptor_functions(
             raise InvalidParameterError(
                 f'descriptors must be "waves", "heat" or a pair of arrays; the value is {descriptors!r}.'
             )
-        both = _signatures(source, target, descriptors, ends)
+        # Signatures, and the kernels from the points of each pair, in the same bands of λ × area
+        areas = [point_areas(shape).sum() for shape in shapes]
+        both = []
+        for shape, area, points in zip(shapes, areas, ends.T, strict=True):
+            if descriptors == "waves":
+                energies, sigma = default_energies(source, N_FUNCTIONS * WAVE_STEP)
+                bands = wave_bands(shape, energies[::WAVE_STEP] + np.log(areas[0] / area), sigma)
+            else:
+                bands = decay_factors(shape, default_times(source, N_FUNCTIONS) * (area / areas[0]))
+            modes = unit_modes(shape, len(shape.eigenvalues))[:, -len(bands) :]
+            kernels = [(modes * modes[point]) @ bands for point in points]
+            both.append(np.concatenate([modes**2 @ bands, *kernels], axis=1))
     elif isinstance(descriptors, tuple | list) and len(descriptors) == 2:
         both = [
             point_functions(values, f"descriptors[{number}]", len(shape.eigenvectors))
@@ -70,24 +81,6 @@ def descriptor_functions(
         functions[:, varied] / norm[varied] for functions, norm in zip(both, norms, strict=True)
     )
     return ours, theirs
-
-
-def _signatures(
-    source: Spectrum, target: Spectrum, kind: str, ends: Int[np.ndarray, "p 2"]
-) -> list[Float[np.ndarray, "n q"]]:
-    """Return signatures, and the kernels from the points of each pair, in the same bands of λ × area."""
-    areas = [point_areas(shape).sum() for shape in (source, target)]
-    found = []
-    for shape, area, points in zip((source, target), areas, ends.T, strict=True):
-        if kind == "waves":
-            energies, sigma = default_energies(source, N_FUNCTIONS * WAVE_STEP)
-            bands = wave_bands(shape, energies[::WAVE_STEP] + np.log(areas[0] / area), sigma)
-        else:
-            bands = decay_factors(shape, default_times(source, N_FUNCTIONS) * (area / areas[0]))
-        modes = unit_modes(shape, len(shape.eigenvalues))[:, -len(bands) :]
-        kernels = [(modes * modes[point]) @ bands for point in points]
-        found.append(np.concatenate([modes**2 @ bands, *kernels], axis=1))
-    return found
 
 
 def product_operators(

@@ -1,14 +1,11 @@
 """Functional maps: maps between shapes as small matrices that act on functions in low modes."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, point_functions, whole_number
+from eigenshape._arrays import ReadOnly, freeze, point_functions, record, whole_number
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
@@ -18,7 +15,7 @@ from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
 LOST = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FunctionalMap(ReadOnly):
     """A map between shapes, given by its action on functions (Ovsjanikov and others 2012).
 
@@ -60,8 +57,6 @@ class FunctionalMap(ReadOnly):
     source: Spectrum
     target: Spectrum
 
-    __repr__ = short_repr
-
     def __post_init__(self) -> None:
         require_one_constant(self.source, "source")
         require_one_constant(self.target, "target")
@@ -78,7 +73,7 @@ class FunctionalMap(ReadOnly):
             raise InvalidParameterError(
                 f"The matrix of a map must be finite; entry {bad[0].tolist()} is not."
             )
-        object.__setattr__(self, "matrix", freeze(self.matrix))
+        vars(self).update(matrix=freeze(self.matrix))
 
 
 def require_one_constant(spectrum: Spectrum, name: str) -> None:

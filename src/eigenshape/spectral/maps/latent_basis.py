@@ -13,7 +13,6 @@ from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.maps.functional_map import LOST, FunctionalMap, point_areas, unit_modes
@@ -52,8 +51,7 @@ class LatentBasis(ReadOnly):
     spectra: tuple[Spectrum, ...]
     misfits: dict[tuple[int, int], float]
 
-    __repr__ = short_repr
-
+    @one_blas_thread()
     def map_between(self, source: Integer, target: Integer) -> FunctionalMap:
         """Return the consistent map Y_j Y_i⁺ from one shape to another, by way of the limit shape.
 

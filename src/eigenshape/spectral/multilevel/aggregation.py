@@ -1,11 +1,10 @@
 """A hierarchy of coarser operators by smoothed aggregation (Vaněk, Mandel, Brezina 1996)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from eigenshape._arrays import record
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, smooth_columns
 from eigenshape.spectral.solver.chebyshev import largest_ritz_value
 
@@ -26,7 +25,7 @@ SMOOTHED = 0.6
 LEAST_SPREADS = (6.0, 20.0)  # smallest spread of operators with long rows, and of a triangle mesh
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Level:
     """An operator of the hierarchy, and the prolongation from the next coarser one.
 

@@ -1,13 +1,13 @@
 """Approximate lowest eigenpairs of a pencil, without a factor of the operator or a proof."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from eigenshape._arrays import record
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._memory import require_memory
 from eigenshape._progress import Progress, silent
@@ -48,7 +48,7 @@ INNER_ACCURACY = 0.03
 INNER_ROUNDS = 3
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Start:
     """Where the refinement of an operator's eigenvectors starts.
 

@@ -1,7 +1,5 @@
 """Compiled loops of `aggregation` and `vcycle`: aggregates, smoothing, and sparse products."""
 
-from typing import no_type_check
-
 import numpy as np
 
 from eigenshape._compile import njit
@@ -11,7 +9,6 @@ FRAGMENT = 0.25  # share of the target size below which an aggregate is split am
 
 
 @njit
-@no_type_check
 def grow_aggregates(starts, columns, values, size):
     """Label points by aggregates of about `size` points; return the labels and their number.
 
@@ -49,7 +46,6 @@ def grow_aggregates(starts, columns, values, size):
 
 
 @njit
-@no_type_check
 def _join_fragments(starts, columns, values, labels, counts, least):
     """Move each point of a fragment to its most strongly coupled aggregate; renumber the others."""
     for i in range(len(labels)):
@@ -73,7 +69,6 @@ def _join_fragments(starts, columns, values, labels, counts, least):
 
 
 @njit
-@no_type_check
 def smooth_columns(matrix, factors, sparse, n_columns):
     """Return P - diag(factors) A P for matrices by rows; rows of the result are not sorted."""
     (starts, columns, values), (old_starts, old_columns, old_values) = matrix, sparse
@@ -109,7 +104,6 @@ def smooth_columns(matrix, factors, sparse, n_columns):
 
 
 @njit
-@no_type_check
 def _row_bound(starts, columns, old_starts, i):
     bound = old_starts[i + 1] - old_starts[i]
     for entry in range(starts[i], starts[i + 1]):
@@ -118,7 +112,6 @@ def _row_bound(starts, columns, old_starts, i):
 
 
 @njit
-@no_type_check
 def _double_array(array, more):
     longer = np.empty(2 * len(array) + more, dtype=array.dtype)
     longer[: len(array)] = array
@@ -126,7 +119,6 @@ def _double_array(array, more):
 
 
 @njit
-@no_type_check
 def multiply_rows(starts, columns, values, block, product, begin, end, first):
     """Write rows begin to end - 1 of a sparse matrix times columns to `product`, from row `first` on."""
     sums = np.empty(block.shape[1], dtype=product.dtype)
@@ -137,7 +129,6 @@ def multiply_rows(starts, columns, values, block, product, begin, end, first):
 
 
 @njit
-@no_type_check
 def _row_product(starts, columns, values, block, i, sums):
     """Write row i of the product to `sums`, in the order of the entries.
 
@@ -165,7 +156,6 @@ def _row_product(starts, columns, values, block, i, sums):
 
 
 @njit
-@no_type_check
 def smoothing_step(matrix, scales, terms, block, step, moved, old, new, begin, end):
     """Compute rows begin to end - 1 of one Chebyshev step in place, and of the block after it.
 

@@ -1,13 +1,13 @@
 """Images and residuals of tall blocks of columns, computed in chunks of rows."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arrays import record
 from eigenshape._threads import map_in_threads
 from eigenshape.spectral.multilevel.vcycle import Tower, multiply
 
@@ -98,7 +98,7 @@ def pick_columns(tower: Tower, columns: np.ndarray, some: np.ndarray) -> np.ndar
     return picked
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Stored:
     """Orthonormal columns on the finest level, all in memory.
 
@@ -134,7 +134,7 @@ class Stored:
         change_rows(self.tower, subtract_inside)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Interpolated:
     """Orthonormal columns PV of the finest level, of which only the columns V are in memory.
 

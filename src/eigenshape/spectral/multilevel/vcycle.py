@@ -1,12 +1,12 @@
 """Corrections of approximate eigenvectors by a V-cycle through all levels."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from eigenshape._arrays import record
 from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.spectral.multilevel.aggregation import Level
 from eigenshape.spectral.multilevel.multilevel_loops import multiply_rows, smoothing_step
@@ -18,7 +18,7 @@ ROWS_A_THREAD = 4096
 INNER_STEPS = 8  # smoothing steps on the levels between the finest and the coarsest
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Coarsest:
     """The coarsest level: its lowest eigenvectors, and factors at several shifts.
 
@@ -31,7 +31,7 @@ class Coarsest:
     factors: tuple[Factor, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Tower:
     """The levels from the finest to the coarsest."""
 

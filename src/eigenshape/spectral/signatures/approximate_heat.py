@@ -1,14 +1,11 @@
 """Heat kernel signatures of large shapes, by approximate eigenvectors, with an estimated error."""
 
-from dataclasses import dataclass
-
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, positive_values, whole_number
+from eigenshape._arrays import ReadOnly, positive_values, record, whole_number
 from eigenshape._progress import Progress, silent
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.operators.laplacian import Laplacian
@@ -46,7 +43,7 @@ CORRECTION_STEPS = (
 SINGLE_ROUNDING = 1e-6  # relative error of single precision sums, added to every estimate
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ApproximateSignature(ReadOnly):
     """Heat kernel signatures with an estimate of their error.
 
@@ -84,8 +81,6 @@ class ApproximateSignature(ReadOnly):
     errors: Float[np.ndarray, " q"]
     eigenvalues: Float[np.ndarray, " k"]
     complete: bool
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()
@@ -204,7 +199,7 @@ def approximate_heat_signature(
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Estimate:
     """What is known of the heat of approximate eigenvectors before it is summed up.
 
@@ -247,26 +242,14 @@ def _estimate(
     decay = exponential_decay(values, times)
     k, root = len(ritz), np.sqrt(columns.tower.levels[0].weights.sum())
     sample = np.unique(np.linspace(0, k - 1, min(k, SAMPLED_PAIRS)).round().astype(np.int64))
-    squares, falls = (
-        np.interp(np.arange(k), sample, found) for found in _changes(columns, ritz, sample)
-    )
-    errors = squares @ decay + np.ldexp(times, pencil.value_exponent) * (falls @ decay) / root
-    return _Estimate(values, decay, errors, decay.sum(axis=0) / root, float(falls.max()))
-
-
-def _changes(
-    columns: Interpolated | Stored, ritz: Float[np.ndarray, " k"], sample: Int[np.ndarray, " s"]
-) -> tuple[Float[np.ndarray, " s"], Float[np.ndarray, " s"]]:
-    """Return what some Ritz vectors become with their corrections: the norms of φ'² - φ² in M, and their values' fall.
-
-    Only what lies outside the span of all columns counts: within it Ritz vectors are what they can
-    be.
-    """
+    # What these Ritz vectors become with their corrections: the norms of φ'² - φ² in M, and the fall
+    # of their values. Only what lies outside the span of all columns counts: within it Ritz vectors
+    # are what they can be.
     tower = columns.tower
-    vectors, values, mass = columns.pick(sample), ritz[sample], tower.levels[0].weights
+    vectors, own, mass = columns.pick(sample), ritz[sample], tower.levels[0].weights
     residual = np.empty(vectors.shape, dtype=np.float32)
-    norms_of_residuals(tower, vectors, values, residual)
-    step = correct(tower, residual, values.astype(np.float32), CORRECTION_STEPS)
+    norms_of_residuals(tower, vectors, own, residual)
+    step = correct(tower, residual, own.astype(np.float32), CORRECTION_STEPS)
     columns.keep_outside(step)
     before, step = vectors.astype(np.float64), step.astype(np.float64)
     step /= np.sqrt((mass * step**2).sum(axis=0)) + np.finfo(np.float32).tiny
@@ -279,7 +262,10 @@ def _changes(
         return np.sum(found, axis=0)
 
     beside, above = np.sum(map_groups(tower, sum_rows), axis=0)
-    turn = np.arctan2(2 * beside, above - values) / 2  # of the lowest Ritz vector of the two
+    turn = np.arctan2(2 * beside, above - own) / 2  # of the lowest Ritz vector of the two
     better = np.cos(turn) * before - np.sin(turn) * step
-    fall = np.hypot((above - values) / 2, beside) - (above - values) / 2
-    return np.sqrt((mass * (better**2 - before**2) ** 2).sum(axis=0)), fall
+    fall = np.hypot((above - own) / 2, beside) - (above - own) / 2
+    change = np.sqrt((mass * (better**2 - before**2) ** 2).sum(axis=0))
+    squares, falls = (np.interp(np.arange(k), sample, found) for found in (change, fall))
+    errors = squares @ decay + np.ldexp(times, pencil.value_exponent) * (falls @ decay) / root
+    return _Estimate(values, decay, errors, decay.sum(axis=0) / root, float(falls.max()))

@@ -4,13 +4,13 @@ They begin with the largest eigenvalue of the operator, which takes products wit
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape._errors import ConvergenceError
 from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.sparse.basis import Block
@@ -59,7 +59,7 @@ RAISED = 1.01
 ROWS_A_THREAD = 1024
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ChebyshevFilter:
     """T_m(z(A)) for A = B^-½ W B^-½ with B diagonal, on u = B^½ φ, in the plain inner product.
 

@@ -1,13 +1,13 @@
 """Disconnected operators: each part is solved separately, small parts of equal size together."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape._progress import Progress, silent
 from eigenshape.spectral.solver.eigenpairs import Pairs
 from eigenshape.spectral.solver.pencil import Pencil, part_pencil, residual_norms
@@ -26,7 +26,7 @@ EXTRA_PAIRS = 2
 SolvePart = Callable[[Pencil, int, Progress], Pairs]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Parts:
     """The connected parts of a pencil, small ones first; parts of one size in the order of their first points.
 
@@ -88,7 +88,17 @@ def solve_parts(
     report(0.02, f"solving {n_parts} parts")
     found = dict(enumerate(solve_small(parts, largest_small, k)))
     large = {number: parts.only(number) for number in range(len(found), n_parts)}
-    wanted = _expected_counts(parts, large, found, k)
+    # How many of the k lowest pairs each large part is expected to have, with a margin
+    expected = {}
+    for number, part in large.items():
+        values = expected_values(part, np.arange(min(k, part.n), dtype=float))
+        expected[number] = np.ldexp(values, parts.exponent(part))
+    known = np.concatenate([*expected.values(), *(pairs.values for pairs in found.values())])
+    last = np.partition(known, k - 1)[k - 1]
+    wanted = {}
+    for number, values in expected.items():
+        count = int(MORE_THAN_EXPECTED * int(np.count_nonzero(values <= last))) + EXTRA_PAIRS
+        wanted[number] = min(count, k, large[number].n)
     while wanted:
         for number, count in wanted.items():
             part = large[number]
@@ -131,23 +141,6 @@ def solve_small(parts: Parts, largest: int, k: int) -> list[Pairs]:
                     Pairs(values[i, :n].copy(), vectors[i, :, :n].copy(), residuals[i, :n].copy())
                 )
     return found
-
-
-def _expected_counts(
-    parts: Parts, large: dict[int, Pencil], found: dict[int, Pairs], k: int
-) -> dict[int, int]:
-    """Return how many of the k lowest pairs each large part is expected to have, with a margin."""
-    expected = {}
-    for number, pencil in large.items():
-        values = expected_values(pencil, np.arange(min(k, pencil.n), dtype=float))
-        expected[number] = np.ldexp(values, parts.exponent(pencil))
-    known = np.concatenate([*expected.values(), *(pairs.values for pairs in found.values())])
-    last = np.partition(known, k - 1)[k - 1]
-    counts = {number: int(np.count_nonzero(values <= last)) for number, values in expected.items()}
-    return {
-        number: min(int(MORE_THAN_EXPECTED * count) + EXTRA_PAIRS, k, large[number].n)
-        for number, count in counts.items()
-    }
 
 
 def _missing_counts(

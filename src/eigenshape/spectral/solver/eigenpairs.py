@@ -1,11 +1,10 @@
 """Eigenpairs inside the solver: orthonormalized, sorted, refined."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Bool, Float, Float32, Int
 
+from eigenshape._arrays import record
 from eigenshape._errors import ConvergenceError
 from eigenshape._threads import map_in_threads, share_units
 from eigenshape.spectral.solver.factor import Factor
@@ -30,7 +29,7 @@ CORRECTED_ROWS = 512
 POLISHED = 2e-10
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Pairs:
     """Eigenpairs in a pencil's units, ascending, with residual bounds."""
 

@@ -1,15 +1,14 @@
 """Symmetric factors of W - σB, and what their pivots count."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arrays import record
 from eigenshape.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
 from eigenshape.spectral.solver.pencil import Pencil
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Factor:
     """W - σB - S = L D Lᵀ up to rounding, with S diagonal and small.
 

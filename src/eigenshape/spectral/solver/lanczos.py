@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape._errors import ConvergenceError
 from eigenshape.sparse.basis import Block, Slots, combine_columns, pack_columns, products, subtract
 from eigenshape.sparse.lane_loops import LANES
@@ -42,7 +43,7 @@ DEPENDENT_PIVOT = 1e-4
 INDEPENDENT_PIVOT = 0.1
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ShiftedInverse:
     """(W - σB)⁻¹B in an inner product in which it is symmetric.
 
@@ -113,7 +114,7 @@ class Wanted:
     ceiling: float = np.inf
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class RitzSpace:
     """A Krylov space V of an operator A, and the eigenpairs of A projected on it.
 

@@ -1,6 +1,6 @@
 """The operator scaled to its own units, so that solvers are independent of the user's."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._arrays import record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import map_in_threads
 from eigenshape.operators.laplacian import GaussianKernel, Laplacian
@@ -25,7 +26,7 @@ WIDEST_RANGE = 1e140
 LARGEST_LEVEL_RATIO = 1e11
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ShiftPattern:
     """W and B in the union of their patterns, ready to factor W - σB for any σ.
 
@@ -48,7 +49,7 @@ class ShiftPattern:
     memory: FactorMemory
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Pencil:
     """The problem W φ = λ B φ, scaled by powers of two, which change no digit.
 

@@ -1,14 +1,11 @@
 """Compiled loop of `pencil`: the sums in Rayleigh quotients and residuals, in one pass."""
 
-from typing import no_type_check
-
 from eigenshape._compile import njit
 
 SUMMED_ROWS = 256  # rows whose sums are added up separately first, for accuracy
 
 
 @njit
-@no_type_check
 def add_sums(stiffness, mass, vectors, values, weights, with_residuals, images, part, sums):
     """Add φᵀWφ, φᵀBφ and Σ (Wφ - λBφ)² / weights of each column to the rows of `sums`; W and B are symmetric.
 
@@ -35,7 +32,6 @@ def add_sums(stiffness, mass, vectors, values, weights, with_residuals, images, 
 
 
 @njit
-@no_type_check
 def _fill_image(matrix, vectors, i, image):
     """Fill `image` with row i of the matrix times the vectors."""
     starts, columns, entries = matrix

@@ -4,19 +4,18 @@ import hashlib
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arguments import describe_value, require_each, require_type
-from eigenshape._arrays import ReadOnly, whole_number
+from eigenshape._arguments import describe_value, require_choice, require_each, require_type
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import (
     FileFormatError,
     InvalidParameterError,
@@ -25,7 +24,6 @@ from eigenshape._errors import (
 )
 from eigenshape._files import as_path
 from eigenshape._progress import Callback, Progress
-from eigenshape._text import short_repr
 from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers, run_in_workers
 from eigenshape.geometry.cloud import PointCloud
@@ -59,7 +57,7 @@ DENSE = ("frames", "mass", "eigenvalues", "eigenvectors")
 SPARSE = ("stiffness", "gradient_x", "gradient_y")
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class OperatorBundle(ReadOnly):
     """The operators of one shape that networks on surfaces take, such as DiffusionNet.
 
@@ -107,8 +105,6 @@ class OperatorBundle(ReadOnly):
     eigenvectors: Float[np.ndarray, "n k"]
     gradient_x: sp.csr_array
     gradient_y: sp.csr_array
-
-    __repr__ = short_repr
 
 
 def operator_bundle(
@@ -262,10 +258,8 @@ def export_bundle(
     ((42, 42), 'float32', (42, 6))
     """
     require_type(bundle, OperatorBundle, "bundle")
-    if form not in get_args(Form):
-        raise InvalidParameterError(f"form must be 'scipy', 'numpy' or 'torch'; it is {form!r}.")
-    if precision not in get_args(Precision):
-        raise InvalidParameterError(f"precision must be 'single' or 'double'; it is {precision!r}.")
+    require_choice(form, Form, "form")
+    require_choice(precision, Precision, "precision")
     dtype = np.float32 if precision == "single" else np.float64
     # The attributes of a bundle stand in the order of DiffusionNet.
     return tuple(_convert(part.astype(dtype), form) for part in vars(bundle).values())

@@ -4,10 +4,10 @@ from typing import Literal
 
 import numpy as np
 import scipy.linalg as sl
-from jaxtyping import Float, Int
+from jaxtyping import Int
 from scipy.cluster.vq import vq
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import require_choice, require_type
 from eigenshape._arrays import as_array, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
@@ -86,10 +86,7 @@ def spectral_clusters(
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
-    if method not in ("k-means", "normalized-cut"):
-        raise InvalidParameterError(
-            f'method must be "k-means" or "normalized-cut"; it is {method!r}.'
-        )
+    require_choice(method, ClusterMethod, "method")
     k = len(spectrum.eigenvalues)
     if n_clusters is None:
         n_clusters = count_clusters(spectrum)
@@ -108,18 +105,8 @@ def spectral_clusters(
     # Start from rows that are long and nearly orthogonal to each other.
     weighted = modes * np.sqrt(spectrum.mass.diagonal())[:, None]
     _, pivots = sl.qr(weighted.T, mode="r", pivoting=True)
-    # Label 0 is that of point 0, 1 that of the next point with another one, and so on.
-    found = _move_centers(rows, rows[pivots[:n_clusters]], method)
-    names, first, inverse = np.unique(found, return_index=True, return_inverse=True)
-    numbers = np.empty(len(names), dtype=np.int64)
-    numbers[np.argsort(first)] = np.arange(len(names))
-    return numbers[inverse]
-
-
-def _move_centers(
-    rows: Float[np.ndarray, "n c"], centers: Float[np.ndarray, "c c"], method: ClusterMethod
-) -> Int[np.ndarray, " n"]:
-    """Alternate between the closest center of each row and the best centers, until none changes."""
+    centers = rows[pivots[:n_clusters]]
+    # Alternate between the closest center of each row and the best centers, until none changes.
     labels = np.full(len(rows), -1)
     for _ in range(MAX_ROUNDS + 1):
         before = labels
@@ -138,7 +125,11 @@ def _move_centers(
             # The rotation of the axes that is closest to the sums of their rows (Procrustes).
             left, _, right = sl.svd(sums)
             centers = left @ right
-    return labels.astype(np.int64)
+    # Label 0 is that of point 0, 1 that of the next point with another one, and so on.
+    names, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    numbers = np.empty(len(names), dtype=np.int64)
+    numbers[np.argsort(first)] = np.arange(len(names))
+    return numbers[inverse]
 
 
 def count_clusters(spectrum: Spectrum, most: int | None = None) -> int:

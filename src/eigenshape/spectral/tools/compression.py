@@ -2,7 +2,6 @@
 
 import lzma
 import struct
-from dataclasses import dataclass
 from hashlib import sha256
 from itertools import pairwise
 
@@ -10,11 +9,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import describe_value
-from eigenshape._arrays import ReadOnly, whole_number
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import FileFormatError
 from eigenshape._memory import available_memory
 from eigenshape._progress import Progress, silent
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -50,7 +48,7 @@ BYTES_PER_ELEMENT, SHARE_OF_READING = 1200, 0.5
 SYMBOLS_PER_FACE = 6
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CompressedMesh(ReadOnly):
     """A mesh as a short string of bytes, and what it cost.
 
@@ -95,8 +93,6 @@ class CompressedMesh(ReadOnly):
     step: float
     rms_error: float
     max_error: float
-
-    __repr__ = short_repr
 
 
 @one_blas_thread()

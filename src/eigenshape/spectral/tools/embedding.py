@@ -9,7 +9,7 @@ from scipy.spatial.distance import cdist
 from eigenshape._arguments import require_type
 from eigenshape._arrays import (
     SHARE_OF_ARRAYS,
-    positive_values,
+    positive_number,
     real_numbers,
     whole_number,
     whole_numbers,
@@ -111,7 +111,11 @@ def spectral_embedding(
     chosen = slice(first, first + n_wanted)
     values = spectrum.eigenvalues[chosen]
     embedded = spectrum.eigenvectors[:, chosen] * values ** float(exponent)
-    return embedded if t is None else embedded * exponential_decay(values, _one_time(t))[:, 0]
+    return (
+        embedded
+        if t is None
+        else embedded * exponential_decay(values, positive_number(t, "t"))[:, 0]
+    )
 
 
 @one_blas_thread()
@@ -195,7 +199,7 @@ def spectral_distances(
         )
     if t is not None:
         require_lowest(spectrum, "spectrum")
-        decay = exponential_decay(spectrum.eigenvalues, _one_time(t))[:, 0]
+        decay = exponential_decay(spectrum.eigenvalues, positive_number(t, "t"))[:, 0]
         return _distances(spectrum.eigenvectors * decay, points)
     if method not in POWERS:
         raise InvalidParameterError(
@@ -274,10 +278,3 @@ def _target_points(points: ArrayLike | None, n: int) -> Int[np.ndarray, " q"]:
     if points is None:
         return np.arange(n)
     return whole_numbers(points, "A point", 0, n - 1)
-
-
-def _one_time(t: ArrayLike) -> float:
-    times = positive_values(t, "t")
-    if len(times) != 1:
-        raise InvalidParameterError(f"t must be one diffusion time; there are {len(times)}.")
-    return float(times[0])

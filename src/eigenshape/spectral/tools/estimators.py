@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arguments import describe_value
+from eigenshape._arguments import describe_value, require_choice
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, MissingExtraError
 from eigenshape.geometry.cloud import PointCloud
@@ -108,11 +108,7 @@ class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
         """Compute the embedding of (n, d) points; `y` is ignored."""
         del y
         points = _data_points(self, X)
-        methods = get_args(EmbeddingMethod)
-        if self.method not in methods:
-            raise InvalidParameterError(
-                f"method must be one of {', '.join(methods)}; it is {self.method!r}."
-            )
+        require_choice(self.method, EmbeddingMethod, "method")
         whole_number(self.n_components, "n_components", 1, len(points) - 1)
         n_pairs = self.n_components + 1
         self.spectrum_, self.n_neighbors_ = _graph_spectrum(points, self.n_neighbors, n_pairs, 1)

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float
 
-from eigenshape._arguments import describe_value, require_type
+from eigenshape._arguments import describe_value, require_choice, require_type
 from eigenshape._arrays import point_functions, real_numbers, require_finite_rows
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
@@ -78,12 +78,9 @@ def project(
     require_type(spectrum, Spectrum, "spectrum")
     modes = spectrum.eigenvectors
     functions = point_functions(values, "values", len(modes))
+    require_choice(inner_product, InnerProduct, "inner_product")
     if inner_product == "mass":
         return np.asarray(modes.T @ (spectrum.mass @ functions))
-    if inner_product != "plain":
-        raise InvalidParameterError(
-            f'inner_product must be "mass" or "plain"; it is {inner_product!r}.'
-        )
     orthonormal, triangle = sl.qr(modes, mode="economic")
     return np.asarray(sl.solve_triangular(triangle, orthonormal.T @ functions))
 

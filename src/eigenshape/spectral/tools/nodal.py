@@ -1,14 +1,11 @@
 """Nodal domains: the regions of a mesh in which a function has one sign."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, vertex_values
+from eigenshape._arrays import ReadOnly, record, vertex_values
 from eigenshape._errors import InvalidParameterError
-from eigenshape._text import short_repr
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.level_sets import LevelSet, level_set
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -21,7 +18,7 @@ from eigenshape.spectral.spectrum import Spectrum
 ZERO_SHARE = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class NodalDomains(ReadOnly):
     """The nodal domains of a function on the vertices of a mesh.
 
@@ -51,8 +48,6 @@ class NodalDomains(ReadOnly):
     labels: Int[np.ndarray, " n"]
     signs: Int[np.ndarray, " c"]
     sizes: Int[np.ndarray, " c"]
-
-    __repr__ = short_repr
 
     @property
     def n_domains(self) -> int:

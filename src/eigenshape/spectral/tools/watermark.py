@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from scipy.special import betainc, ndtri
 
 from eigenshape._arguments import describe_value
-from eigenshape._arrays import positive_values, whole_number
+from eigenshape._arrays import positive_number, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import Integer
@@ -132,7 +132,7 @@ def embed_watermark(
     """
     mesh = as_mesh(mesh)
     secret = _require_key(key)
-    share = float(positive_values(strength, "strength")[0])
+    share = positive_number(strength, "strength")
     if share > MOST_STRENGTH:
         raise InvalidParameterError(
             f"strength must be at most {MOST_STRENGTH} of the diagonal; it is {share}."
@@ -232,7 +232,20 @@ def detect_watermark(
         )
     points, _ = size_one(mesh.vertices)
     basis, mass, groups = _low_modes((points, mesh.faces), k, cache)
-    aligned = _align(size_one(other.vertices)[0], points, mass)
+    # Move, turn and scale the suspect onto the original in the weighted least squares (Umeyama 1991).
+    moved, _ = size_one(other.vertices)
+    shares = mass[:, None] / mass.sum()
+    middle, goal = (shares * moved).sum(axis=0), (shares * points).sum(axis=0)
+    centered, wanted = moved - middle, points - goal
+    spread = float((shares * centered**2).sum())
+    if not np.ptp(moved, axis=0).any():
+        raise InvalidShapeError(
+            f"The suspect must have an extent; all of its vertices are at {middle.tolist()}."
+        )
+    left, stretches, right = np.linalg.svd(wanted.T @ (shares * centered))
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])
+    rotation = (left * signs) @ right
+    aligned = goal + (stretches @ signs) / spread * centered @ rotation.T
     own = basis.T @ (mass[:, None] * points)
     difference = basis.T @ (mass[:, None] * (aligned - points))
     found, dimension = _across(difference, own, groups)
@@ -306,26 +319,6 @@ def _across(
     products = np.bincount(groups, weights=(vectors * own).sum(axis=1))
     shares = np.divide(products, squares, out=np.zeros_like(squares), where=is_clear)
     return vectors - shares[groups, None] * own, own.size - int(is_clear.sum())
-
-
-def _align(
-    points: Float[np.ndarray, "n 3"],
-    target: Float[np.ndarray, "n 3"],
-    weights: Float[np.ndarray, " n"],
-) -> Float[np.ndarray, "n 3"]:
-    """Move, turn and scale points onto a target in the weighted least squares (Umeyama 1991)."""
-    shares = weights[:, None] / weights.sum()
-    middle, goal = (shares * points).sum(axis=0), (shares * target).sum(axis=0)
-    centered, wanted = points - middle, target - goal
-    spread = float((shares * centered**2).sum())
-    if not np.ptp(points, axis=0).any():
-        raise InvalidShapeError(
-            f"The suspect must have an extent; all of its vertices are at {middle.tolist()}."
-        )
-    left, stretches, right = np.linalg.svd(wanted.T @ (shares * centered))
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])
-    rotation = (left * signs) @ right
-    return goal + (stretches @ signs) / spread * centered @ rotation.T
 
 
 def _exceedance(score: float, dimension: int) -> float:

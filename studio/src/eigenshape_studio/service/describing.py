@@ -19,7 +19,7 @@ from matplotlib.image import imsave
 
 import eigenshape as es
 from eigenshape._workers import outcome_of, schedule_work, start_pool
-from eigenshape.retrieval.description import describe_to_store
+from eigenshape.retrieval.kinds import describe_to_store
 from eigenshape_studio.parse import Limits, read_upload
 from eigenshape_studio.search import color_places
 
@@ -134,7 +134,7 @@ def draw_file(path: Path) -> Picture:
 
 
 def _draw(mesh: es.TriangleMesh) -> Picture:
-    drawing = es.plot.draw(mesh, es.plot.three_quarter_view(mesh, size=THUMBNAIL))
+    drawing = es.plot.draw(mesh, es.plot.aim_camera(mesh, size=THUMBNAIL))
     file = BytesIO()
     imsave(file, drawing.image, format="png")
     places = (drawing.places / THUMBNAIL).astype(np.float32)

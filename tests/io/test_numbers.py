@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from eigenshape import FileFormatError
-from eigenshape.io.formats.cursor import Cursor
+from eigenshape.io.formats.numbers import Cursor
 
 
 @given(

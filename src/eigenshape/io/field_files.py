@@ -1,4 +1,4 @@
-"""Functions on vertices and faces, in files of a mesh: .vtu, .vtk and .npz."""
+"""Functions on vertices and faces, in files of a mesh such as .vtu, or without one such as .func.gii."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -21,14 +21,20 @@ Fields = dict[str, np.ndarray]
 
 
 def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLike]) -> None:
-    """Write a mesh with functions on its vertices and faces, for ParaView, PyVista or NumPy.
+    """Write a mesh with functions on its vertices and faces, or functions on its vertices alone.
+
+    .vtu, .vtk, .npz and .gii hold the mesh, too. .func.gii, .shape.gii, .label.gii, .dscalar.nii,
+    .curv, .mgh and .mgz hold functions on vertices alone, as Connectome Workbench and FreeSurfer
+    keep them; a path such as lh.thickness is a file in .curv. Those and .gii hold numbers of 32
+    bits. In .dscalar.nii, the name of a function begins with its hemisphere, as in
+    "cortex_left:thickness", and vertices with NaN in all functions are left out.
 
     Parameters
     ----------
     mesh : MeshLike
         With n vertices and f faces. Tetrahedra and segments, which go to .vtu, count as faces.
     path : str or Path
-        Must end in .vtu, .vtk or .npz.
+        Its suffix names the format.
     fields : mapping of str to array
         Functions by name, (n,) or (n, d) on vertices, (f,) or (f, d) on faces. If there are as many
         vertices as faces, they are on vertices.
@@ -36,9 +42,12 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     Raises
     ------
     FileFormatError
-        If the suffix is another one, or another one than .vtu for tetrahedra or segments.
+        If the suffix is another one, or another one than .vtu for tetrahedra or segments, or the
+        format cannot hold the functions.
     InvalidParameterError
         If a field has another number of rows, or is not of numbers.
+    MissingExtraError
+        If nibabel is not installed, which writes .gii and .nii.
     OSError
         If the system cannot write the file.
 
@@ -88,30 +97,48 @@ def format_fields(mesh: Mesh, suffix: str, fields: Mapping[str, ArrayLike]) -> b
         raise FileFormatError(
             f"Files in {suffix} hold triangles in R^3; the mesh is {mesh!r}. Write it to .vtu."
         )
-    data: bytes = format_of(suffix).load().format_fields(mesh, of_vertices, of_faces)
-    return data
+    known = format_of(suffix)
+    if "fields" in known.traits:
+        data: bytes = known.load().format_fields(mesh, of_vertices, of_faces)
+        return data
+    if of_faces:
+        raise FileFormatError(
+            f"Files in {suffix} hold functions on vertices; {next(iter(of_faces))!r} is on faces."
+        )
+    maps: bytes = known.load().format_maps(mesh, of_vertices, suffix)
+    return maps
 
 
 def read_fields(path: str | Path) -> Fields:
-    """Read the functions on vertices and faces that a file holds beside its mesh.
+    """Read the functions on vertices and faces that a file holds, with or without a mesh.
 
     Parameters
     ----------
     path : str or Path
-        A file in .vtu, .vtk or .npz, such as `write_fields` writes.
+        A file such as `write_fields` writes; also lh.thickness and other files of FreeSurfer
+        without a suffix.
 
     Returns
     -------
     dict of str to array
         By name; each has a row for every vertex or for every face. If a function on faces has the
-        name of one on vertices, it comes under ``face_`` and its name.
+        name of one on vertices, it comes under ``face_`` and its name. A function without a name is
+        called "values", and those of one name in a GIFTI file are columns of one table. Functions
+        in .dscalar.nii are named as in "cortex_left:thickness", and are NaN at vertices that the
+        file leaves out.
 
     Raises
     ------
     FileFormatError
         If the format holds no fields, or the content differs from what the file declares.
+    MissingExtraError
+        If nibabel is not installed, which reads .nii.
     OSError
         If the system cannot open the file.
+
+    See Also
+    --------
+    read_parcellation : Read labels with their names and colors.
 
     Examples
     --------

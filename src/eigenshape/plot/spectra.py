@@ -1,14 +1,13 @@
 """Figures of eigenvalues."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 from matplotlib.ticker import MaxNLocator
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_values
+from eigenshape._arrays import finite_values, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.plot.figure import Figure
@@ -87,7 +86,7 @@ def figure_spectrum(
     return figure
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Row:
     """One spectrum to be drawn, with the intervals of its eigenvalues where they are known."""
 

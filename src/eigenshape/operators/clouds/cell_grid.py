@@ -7,13 +7,13 @@ nothing depends on the number of threads.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape._threads import map_in_threads
 from eigenshape.operators.clouds import pair_loops
 
@@ -23,7 +23,7 @@ CELLS_PER_AXIS = 2**20
 CHUNK = 64  # cells a task
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CellGrid:
     """Points sorted into cells no smaller than the reach.
 

@@ -1,0 +1,9 @@
+from .alignment import Similarity as Similarity
+from .alignment import align_surfaces as align_surfaces
+from .building import build_collection as build_collection
+from .carrying import CarriedLandmarks as CarriedLandmarks
+from .carrying import carry_landmarks as carry_landmarks
+from .collection import Collection as Collection
+from .collection import open_collection as open_collection
+from .surface_fit import SurfaceFit as SurfaceFit
+from .surface_fit import fit_surface as fit_surface

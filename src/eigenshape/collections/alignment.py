@@ -1,0 +1,282 @@
+"""The similarity transformation that places one surface on another, found from the surfaces alone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from eigenshape._arrays import ReadOnly, finite_rows
+from eigenshape._text import short_repr
+from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
+from eigenshape.collections.spread_points import join_normals, main_pieces, spread_points
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.mesh import TriangleMesh
+
+# Lengths are in units of the root mean square distance of a surface from its middle. All numbers
+# were chosen on the tuning half of experiments/ch7_collection: skulls, whole, and cut by planes.
+N_POINTS, N_ROUGH = 1200, 240  # of the surface that is placed, for its refined and rough places
+N_WHOLE = 6000, 1200  # of the whole; denser, since a gap ends at the nearest point
+NORMAL_WEIGHT = 0.15  # length of a normal beside a place
+N_TURNS = 32  # random ones, besides the four that align the principal axes
+OFFSET = 0.5  # of further starts along the axes: the middle of a part is not that of the whole
+SIZES = (1.0, 0.77)  # of a part at the start, as shares of what its own extent gives
+SMALLEST, LARGEST = 0.6, 1.15  # beyond, a part would shrink into one spot of the whole
+N_KEPT, N_REFINED = 126, 10  # of 504 starts: after half of the rough rounds, and after all
+# Distances at which a pair counts a quarter, from the first round to the last
+ROUGH_REACH = np.geomspace(0.6, 0.2, 10)
+FINE_REACH = np.geomspace(0.2, 0.05, 40)
+ON_SURFACE = 0.1
+# Share of the gap of a surface below which the gap of its mirror image means that it is reflected.
+# Forms with two equal sides have about the same gap both ways.
+REFLECTED = 0.7
+MIRROR = np.diag([-1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity(ReadOnly):
+    """A motion with a change of size that places one surface on another: x ↦ s R x + t.
+
+    Attributes
+    ----------
+    scale : float
+        The factor s of lengths.
+    rotation : (3, 3) float
+        The orthogonal matrix R. Its determinant is -1 if the surface is reflected.
+    translation : (3,) float
+        The vector t.
+    gap : float
+        0 if the surface lies on the other one, 1 if it lies nowhere near it: the mean of
+        d² / (d² + 0.1²) over its points, with d the distance to the nearest point of the other
+        surface that faces the same way, in units of the root mean square radius.
+
+    See Also
+    --------
+    align_surfaces
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> fish = es.make_creature("fish", n_vertices=500)
+    >>> larger = es.TriangleMesh(3 * fish.vertices, fish.faces)
+    >>> found = es.collections.align_surfaces(larger, fish)
+    >>> bool(np.abs(found.inverse().move(fish.vertices) - larger.vertices).max() < 0.1)
+    True
+    """
+
+    scale: float
+    rotation: Float[np.ndarray, "3 3"]
+    translation: Float[np.ndarray, " 3"]
+    gap: float = 0.0
+
+    __repr__ = short_repr
+
+    @property
+    def reflected(self) -> bool:
+        """Whether it turns left into right."""
+        return bool(np.linalg.det(self.rotation) < 0)
+
+    def move(self, points: ArrayLike) -> Float[np.ndarray, "n 3"]:
+        """Return the places of points of the first surface on the second."""
+        return self.scale * finite_rows(points, "points", 3) @ self.rotation.T + self.translation
+
+    def inverse(self) -> "Similarity":
+        """Return the similarity that places the second surface on the first."""
+        back = self.rotation.T / self.scale
+        away = -back @ self.translation
+        return Similarity(1 / self.scale, self.rotation.T.copy(), away, self.gap)
+
+
+@one_blas_thread()
+def align_surfaces(surface: MeshLike, whole: MeshLike) -> Similarity:
+    """Find the similarity that places a surface, or a part of one, on a whole one of nearly its form.
+
+    Points of the surface are paired with the nearest ones of the whole that face the same way, and
+    the similarity of least weighted squares moves them there, again and again (iterated closest
+    points: Besl and McKay 1992; here with sizes and with weights against what has no partner). It
+    starts from many turns, places and sizes; the ten with the smallest gaps are refined. The mirror
+    image of the surface is tried as well.
+
+    Parameters
+    ----------
+    surface : MeshLike
+        In any unit, turned in any way; at least about half of the form of `whole`. Small loose
+        pieces are left out; any topology will do.
+    whole : MeshLike
+        Without large gaps. Faces of both should look outward.
+
+    Returns
+    -------
+    Similarity
+        It places `surface` on `whole`. A `gap` above about 0.55 means that no good place is known.
+        It is `reflected` only where the mirror image has less than 0.7 of the gap. A form with two
+        equal sides lies as well both ways, so that nothing tells whether it is reflected.
+
+    Raises
+    ------
+    InvalidShapeError
+        If a surface has no area.
+
+    See Also
+    --------
+    fit_surface : Bend one surface onto another from there.
+    es.matching.register_scans : Rigid motions of scans that overlap.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> hand = es.make_creature("hand", n_vertices=500)
+    >>> turned = es.TriangleMesh(hand.vertices[:, [1, 2, 0]] / 10, hand.faces)
+    >>> found = es.collections.align_surfaces(turned, hand)
+    >>> round(found.scale, 1), found.gap < 0.2, found.reflected
+    (10.0, True, False)
+    """
+    ours, our_middle, our_size = _points_in_own_size(as_mesh(surface, "surface"), N_POINTS)
+    theirs, middle, size = _points_in_own_size(as_mesh(whole, "whole"), N_WHOLE[0])
+    tree, rough_tree = cKDTree(theirs), cKDTree(theirs[:: N_WHOLE[0] // N_WHOLE[1]])
+    n = N_POINTS // N_ROUGH
+
+    def search(points: Float[np.ndarray, "k 6"]) -> _Places:
+        """Return the best place of points with normals."""
+        turns = _turns(points[:, :3], theirs[:, :3])
+        offsets = np.vstack([np.zeros(3), OFFSET * np.eye(3), -OFFSET * np.eye(3)])
+        grid = np.indices((len(turns), len(offsets), len(SIZES))).reshape(3, -1)
+        sizes = np.array(SIZES)[grid[2]]
+        starts = _Places(sizes, turns[grid[0]], offsets[grid[1]], np.zeros(len(sizes)))
+        half = len(ROUGH_REACH) // 2
+        starts = _refine(points[::n], rough_tree, starts, ROUGH_REACH[:half]).best(N_KEPT)
+        starts = _refine(points[::n], rough_tree, starts, ROUGH_REACH[half:]).best(N_REFINED)
+        return _refine(points, tree, starts, FINE_REACH).best(1)
+
+    mirrored = ours @ np.kron(np.eye(2), MIRROR)  # places and normals
+    found, reflected = search(ours), search(mirrored)
+    # A form with two equal sides lies as well on itself in a mirror: each place, mirrored by the
+    # planes of the principal axes of the whole, is a start of the other one.
+    axes = np.linalg.svd(theirs[:, :3], full_matrices=False)[2]
+    planes = np.eye(3) - 2 * axes[:, :, None] * axes[:, None]
+    found, reflected = (
+        own.joined(_refine(points, tree, other.mirrored(planes), FINE_REACH)).best(1)
+        for points, own, other in ((ours, found, reflected), (mirrored, reflected, found))
+    )
+    turned = reflected.gaps[0] < REFLECTED * found.gaps[0]
+    best = (reflected if turned else found).similarity()
+    if turned:
+        best = Similarity(best.scale, best.rotation @ MIRROR, best.translation, best.gap)
+    scale = best.scale * size / our_size
+    away = middle + size * best.translation - scale * best.rotation @ our_middle
+    return Similarity(scale, best.rotation, away, best.gap)
+
+
+def best_similarity(
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    weights: Float[np.ndarray, " n"],
+) -> Similarity:
+    """Return the similarity, without reflection, of least weighted squares."""
+    shares = weights / weights.sum()
+    middle, target = shares @ starts, shares @ ends
+    scales, turns = _best_turns((starts - middle)[None], (ends - target)[None], shares[None])
+    scale, turn = float(scales[0]), turns[0]
+    return Similarity(scale, turn, target - scale * turn @ middle)
+
+
+def _points_in_own_size(
+    mesh: TriangleMesh, n_points: int
+) -> tuple[Float[np.ndarray, "k 6"], Float[np.ndarray, " 3"], float]:
+    """Return points with normals about their middle, in units of their size; the middle; the size."""
+    spread = spread_points(main_pieces(mesh), n_points)
+    middle = spread.points.mean(axis=0)
+    away = spread.points - middle
+    size = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
+    return join_normals(away / size, spread.normals, NORMAL_WEIGHT), middle, size
+
+
+@dataclass
+class _Places:
+    """Similarities of points, side by side, with their gaps."""
+
+    scales: Float[np.ndarray, " q"]
+    rotations: Float[np.ndarray, "q 3 3"]
+    translations: Float[np.ndarray, "q 3"]
+    gaps: Float[np.ndarray, " q"]
+
+    def best(self, n: int) -> "_Places":
+        """Return those with the smallest gaps."""
+        chosen = np.argsort(self.gaps, kind="stable")[:n]
+        return _Places(*(entry[chosen] for entry in vars(self).values()))
+
+    def mirrored(self, planes: Float[np.ndarray, "3 3 3"]) -> "_Places":
+        """Return the first place after each reflection, for points that are reflected themselves."""
+        scales, gaps = np.repeat(self.scales[:1], 3), np.zeros(3)
+        turns = planes @ self.rotations[0] @ MIRROR
+        return _Places(scales, turns, planes @ self.translations[0], gaps)
+
+    def joined(self, other: "_Places") -> "_Places":
+        """Return these places and others."""
+        both = zip(vars(self).values(), vars(other).values(), strict=True)
+        return _Places(*(np.concatenate(pair) for pair in both))
+
+    def similarity(self) -> Similarity:
+        """Return the first place."""
+        return Similarity(
+            float(self.scales[0]), self.rotations[0], self.translations[0], float(self.gaps[0])
+        )
+
+
+def _turns(
+    ours: Float[np.ndarray, "k 3"], theirs: Float[np.ndarray, "m 3"]
+) -> Float[np.ndarray, "q 3 3"]:
+    """Return the four turns that align the principal axes of points, and random ones."""
+    axes, axes_there = (np.linalg.svd(points, full_matrices=False)[2] for points in (ours, theirs))
+    found = list(Rotation.random(N_TURNS, rng=np.random.default_rng(0)).as_matrix())
+    for signs in ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]):
+        turn = axes_there.T * signs @ axes
+        found.append(turn * np.sign(np.linalg.det(turn)))
+    return np.stack(found)
+
+
+def _refine(
+    points: Float[np.ndarray, "k 6"], tree: cKDTree, places: _Places, reaches: np.ndarray
+) -> _Places:
+    """Move points from each place to their nearest partners, with an ever shorter reach."""
+    ours, normals = points[:, :3], points[:, 3:]
+    scales, rotations, translations = places.scales, places.rotations, places.translations
+
+    def nearest() -> tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k 3"]]:
+        turned = ours @ rotations.transpose(0, 2, 1)
+        moved = scales[:, None, None] * turned + translations[:, None]
+        facing = normals @ rotations.transpose(0, 2, 1)
+        distances, partners = tree.query(np.concatenate([moved, facing], axis=2))
+        return distances, tree.data[partners, :3]
+
+    for reach in reaches:
+        distances, partners = nearest()
+        weights = (1 + (distances / reach) ** 2) ** -2
+        weights /= weights.sum(axis=1, keepdims=True)
+        middles, targets = weights @ ours, np.einsum("qk,qkd->qd", weights, partners)
+        scales, rotations = _best_turns(
+            ours - middles[:, None], partners - targets[:, None], weights
+        )
+        scales = np.clip(scales, SMALLEST, LARGEST)
+        translations = targets - scales[:, None] * np.einsum("qij,qj->qi", rotations, middles)
+    distances = nearest()[0]
+    gaps = np.mean(distances**2 / (distances**2 + ON_SURFACE**2), axis=1)
+    return _Places(scales, rotations, translations, gaps)
+
+
+def _best_turns(
+    starts: Float[np.ndarray, "q k 3"],
+    ends: Float[np.ndarray, "q k 3"],
+    weights: Float[np.ndarray, "q k"],
+) -> tuple[Float[np.ndarray, " q"], Float[np.ndarray, "q 3 3"]]:
+    """Return factors and proper turns of least weighted squares about the middle (Umeyama 1991)."""
+    products = np.einsum("qki,qkj,qk->qij", starts, ends, weights, optimize=True)
+    left, stretches, right = np.linalg.svd(products)
+    sides = np.sign(np.linalg.det(left @ right))
+    stretches[:, 2] *= sides
+    left[:, :, 2] *= sides[:, None]
+    extents = np.einsum("qki,qki,qk->q", starts, starts, weights)
+    return stretches.sum(axis=1) / extents, (left @ right).transpose(0, 2, 1)

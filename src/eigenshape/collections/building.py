@@ -1,0 +1,430 @@
+"""Build a collection: fit a template to all specimens, then their mean."""
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from eigenshape._arguments import require_type
+from eigenshape._errors import EigenshapeError, InvalidParameterError, InvalidShapeError
+from eigenshape._files import as_path
+from eigenshape._progress import Callback
+from eigenshape._workers import Item, Outcome, Workers, run_in_workers
+from eigenshape.collections.alignment import MIRROR, Similarity, best_similarity
+from eigenshape.collections.collection import (
+    Collection,
+    fit_file,
+    read_fit,
+    read_specimen,
+    save_collection,
+    unreflect,
+    write_fit,
+)
+from eigenshape.collections.surface_fit import (
+    LEVELS,
+    SurfaceFit,
+    bend_placed,
+    fit_surface,
+)
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import surface_area
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repairs.repair import repair, suggest_repairs
+from eigenshape.geometry.resolution.decimation import decimate
+from eigenshape.io.folders import find_items
+from eigenshape.io.mesh_files import write_mesh
+from eigenshape.morphometrics.procrustes import fit_procrustes
+from eigenshape.retrieval.building.batch import content_digest
+
+T = TypeVar("T")
+
+N_FACES = 20_000  # of the template
+# The second round starts in so many modes of the first, which smooths over what single fits did
+# wrong, and bends in the last three levels. Both were chosen on the tuning half of
+# experiments/ch7_collection.
+N_MODES = 8
+SECOND_LEVELS = tuple((width, reach, stiffness, 4) for width, reach, stiffness, _ in LEVELS[1:])
+# Share of area that a specimen lacks, or has beyond the template, from which it is noted. One that
+# lacks more gives no evidence for the mean.
+NOTABLE = 0.1
+OTHER_UNIT = 3.0  # factor from the median size from which a unit is suspected
+RECIPE = "1"  # changes when fits of an older version must not be used again
+SURE = 0.25  # confidence of a vertex that determines where the second round starts
+ROUNDS = 20  # of finding the place and the shape of a start in turn
+
+
+def build_collection(
+    specimens: str | Path | Mapping[str, str | Path | MeshLike],
+    folder: str | Path,
+    *,
+    template: str | None = None,
+    workers: Workers | None = None,
+    callback: Callback | None = None,
+) -> Collection:
+    """Bring specimens of one kind into dense correspondence, and compute their mean shape.
+
+    1. A template is bent onto each specimen (`fit_surface`), from the surfaces alone.
+    2. All fits are superimposed (generalized Procrustes analysis). Their mean is the template of a
+       second round, so that the choice of the first one hardly matters. Each specimen starts from
+       its first fit in the 8 largest modes of the collection.
+
+    What is done is kept in the folder. After Ctrl-C or a crash the same call goes on where it
+    stopped; files that have not changed are not fitted again. A specimen that cannot be read or
+    placed is reported, and the others go on.
+
+    Parameters
+    ----------
+    specimens : path, or mapping of str to path or MeshLike
+        A folder whose files are read as by `es.io.read_surface`, or specimens by name: at least two
+        surfaces of one form, such as bones, hands or cortices, in any unit and turned in any way.
+        Parts may be missing or in excess.
+    folder : str or Path
+        Where the collection is kept; it is made where it is missing.
+    template : str, optional
+        Name of a complete specimen. By default the one with the median area.
+    workers : Workers, optional
+        Processes, or the tasks of a cluster, that fit files side by side. By default all work is
+        done by this process; `es.retrieval.Workers()` uses all cores.
+    callback : callable, optional
+        Called as callback(n_done, n_steps, name, error or None); each specimen has three steps: to
+        read it, and two fits.
+
+    Returns
+    -------
+    Collection
+        `failures` names the specimens that are not in it, and why; `notes` what was noticed.
+
+    Raises
+    ------
+    InvalidParameterError
+        If there are fewer than two specimens, or none has the name of the template.
+    InvalidShapeError
+        If fewer than two specimens can be fitted.
+    EigenshapeError
+        If no worker can start. A script must call this under ``if __name__ == "__main__":``, since
+        workers import the script.
+
+    See Also
+    --------
+    carry_landmarks : Landmarks of some specimens, carried to all.
+    open_collection : Open it later.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import eigenshape as es
+    >>> hands = {
+    ...     f"hand {i}": es.make_creature("hand", individual=i, n_vertices=600) for i in range(3)
+    ... }
+    >>> collection = es.collections.build_collection(hands, mkdtemp())
+    >>> collection.names, collection.failures
+    (('hand 0', 'hand 1', 'hand 2'), {})
+    >>> collection.points.shape == (3, collection.mean.n_vertices, 3)
+    True
+    """
+    folder = as_path(folder, "folder")
+    require_type(workers, Workers | None, "workers")
+    items = _find_specimens(specimens, folder)
+    if len(items) < 2:
+        raise InvalidParameterError(
+            f"A collection must have at least two specimens; there are {len(items)}."
+        )
+    if template is not None and template not in {item.name for item in items}:
+        raise InvalidParameterError(
+            f"The template must be a specimen; there is none named {template!r}."
+        )
+    run = _Run(folder, workers, callback, len(items))
+
+    found = run.over(items, _measure_file)
+    items = [item for item in items if item.name in found]
+    run.require_two(found)
+    if template is None:
+        order = sorted(items, key=lambda item: (found[item.name].area, item.name))
+        template = order[len(order) // 2].name
+    if template in run.failures:
+        raise InvalidShapeError(f"The template must be readable. {run.failures[template]}")
+    digests = {name: measured.digest for name, measured in found.items()}
+    notes = {name: list(measured.report) for name, measured in found.items()}
+
+    paths = {item.name: item.path for item in items}
+    surface = _template_surface(paths[template])
+    key = _digest(surface.vertices, surface.faces)
+    fits = run.fit(items, partial(_fit_file, surface), "first", digests, key)
+    run.require_two(fits)
+
+    starts, modes = _starts_from_modes(fits)
+    key = _digest(surface.faces, modes, *(start.coefficients for start in starts.values()))
+    # The modes of others do not span another pose: such a specimen keeps its first fit.
+    posed = {name: fit for name, fit in fits.items() if fit.method == "intrinsic"}
+    again = [item for item in items if item.name in fits.keys() - posed.keys()]
+    by_path = {item.path: starts[item.name] for item in again}
+    work = partial(_fit_again, surface.faces, modes, by_path)
+    fits = run.fit(again, work, "fits", digests, key) | posed
+    for name, fit in posed.items():
+        write_fit(fit_file(folder, name), **asdict(fit))
+    run.require_two(fits)
+
+    names = tuple(sorted(fits))
+    reflected = tuple(fits[name].reflected for name in names)
+    points = np.stack([fits[name].vertices for name in names])
+    complete = _complete([fits[name] for name in names])
+    together = fit_procrustes(unreflect(points, reflected)[complete])
+    size = float(np.median(together.sizes))
+    mean = TriangleMesh(together.mean * size, surface.faces)
+    for name in names:
+        notes[name] += _noticed(fits[name], size)
+    collection = Collection(
+        folder=folder,
+        names=names,
+        mean=mean,
+        points=points,
+        gaps=np.stack([fits[name].gaps for name in names]),
+        confidence=np.stack([fits[name].confidence for name in names]),
+        reflected=reflected,
+        sources=tuple(paths[name].absolute() for name in names),
+        template=template,
+        notes={name: tuple(notes[name]) for name in names},
+        failures=dict(sorted(run.failures.items())),
+    )
+    save_collection(collection)
+    return collection
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """What is known of a specimen before it is fitted."""
+
+    digest: str
+    area: float
+    report: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Start:
+    """Where the second fit of a specimen starts: a shape in modes, and its place."""
+
+    coefficients: Float[np.ndarray, " q"]
+    placing: Similarity
+
+
+class _Run:
+    """The steps of all specimens: in workers or here, with what failed."""
+
+    def __init__(
+        self, folder: Path, workers: Workers | None, callback: Callback | None, n_items: int
+    ) -> None:
+        self.folder, self.workers = folder, workers
+        self.callback = callback or _ignore
+        self.n_items, self.n_done, self.n_rounds = n_items, 0, 0
+        self.failures: dict[str, str] = {}
+
+    def over(self, items: Sequence[Item], work: Callable[[Path], T]) -> dict[str, T]:
+        """Return what work makes of each item, by name, as far as it does not fail."""
+        self._begin(len(items))
+        return dict(self._results(items, work))
+
+    def fit(
+        self,
+        items: Sequence[Item],
+        work: Callable[[Path], SurfaceFit],
+        room: str,
+        digests: Mapping[str, str],
+        key: str,
+    ) -> dict[str, SurfaceFit]:
+        """Return the fit of each item, from the folder if it was made of the same input."""
+        self._begin(len(items))
+        fits: dict[str, SurfaceFit] = {}
+        keys = {item.name: f"{RECIPE} {key} {digests[item.name]}" for item in items}
+        for item in items:
+            try:
+                kept = read_fit(fit_file(self.folder, item.name, room))
+                if str(kept.pop("key")) == keys[item.name]:
+                    fits[item.name] = SurfaceFit(**{n: _plain(kept[n]) for n in kept})
+            except (OSError, ValueError, KeyError, TypeError):
+                continue  # there is none that is whole
+        for item in items:
+            if item.name in fits:
+                self._done(item.name, None)
+        for name, fit in self._results([i for i in items if i.name not in fits], work):
+            write_fit(fit_file(self.folder, name, room), **asdict(fit), key=keys[name])
+            fits[name] = fit
+        return {item.name: fits[item.name] for item in items if item.name in fits}
+
+    def _results(self, items: Sequence[Item], work: Callable[[Path], T]) -> Iterator[tuple[str, T]]:
+        if self.workers is None:
+            outcomes = ((item, _outcome(work, item.path)) for item in items)
+        else:
+            outcomes = run_in_workers(work, items, self.workers)
+        with closing(outcomes):
+            for item, outcome in outcomes:
+                if outcome.value is None:
+                    self.failures[item.name] = str(outcome.error)
+                else:
+                    yield item.name, outcome.value
+                self._done(item.name, outcome.error)
+
+    def _begin(self, n_left: int) -> None:
+        """Begin a round; the steps of what has failed before count as done."""
+        self.n_rounds += 1
+        self.n_done = self.n_rounds * self.n_items - n_left
+
+    def _done(self, name: str, error: str | None) -> None:
+        self.n_done += 1
+        self.callback(self.n_done, 3 * self.n_items, name, error)
+
+    def require_two(self, found: Mapping[str, object]) -> None:
+        """Raise an error if too few specimens are left."""
+        if len(found) < 2:
+            name, reason = next(iter(self.failures.items()))
+            raise InvalidShapeError(
+                f"At least two specimens must be readable and fit; {len(found)} did. {name}: {reason}"
+            )
+
+
+def _outcome(work: Callable[[Path], T], path: Path) -> Outcome[T]:
+    try:
+        return Outcome(work(path))
+    except (EigenshapeError, OSError) as err:
+        return Outcome(error=str(err))
+
+
+def _plain(array: np.ndarray) -> Any:
+    return array.item() if array.ndim == 0 else array
+
+
+def _ignore(n_done: int, n_steps: int, name: str, error: str | None) -> None:
+    """Do nothing after a step."""
+
+
+def _find_specimens(
+    specimens: str | Path | Mapping[str, str | Path | MeshLike], folder: Path
+) -> list[Item]:
+    """Return the files of specimens; meshes in memory are written to the folder first."""
+    if not isinstance(specimens, Mapping):
+        own = folder.absolute()
+        found = find_items(as_path(specimens, "specimens"))
+        return [item for item in found if own not in item.path.absolute().parents]
+    items = []
+    for name, value in specimens.items():
+        if isinstance(value, str | Path):
+            path = as_path(value)
+        else:
+            path = fit_file(folder, str(name), "specimens")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_mesh(as_mesh(value, f"specimens[{name!r}]"), path)
+        items.append(Item(str(name), path))
+    return items
+
+
+def _measure_file(path: Path) -> _Measured:
+    mesh, report = read_specimen(path)
+    return _Measured(content_digest(path), surface_area(mesh), report)
+
+
+def _template_surface(path: Path) -> TriangleMesh:
+    """Return a sound surface of at most `N_FACES` faces."""
+    mesh = read_specimen(path)[0]
+    mesh = repair(mesh, suggest_repairs(mesh)).mesh
+    return decimate(mesh, N_FACES).mesh if mesh.n_faces > N_FACES else mesh
+
+
+def _fit_file(source: TriangleMesh, path: Path) -> SurfaceFit:
+    return fit_surface(source, read_specimen(path)[0])
+
+
+def _fit_again(
+    faces: np.ndarray, modes: np.ndarray, starts: Mapping[Path, _Start], path: Path
+) -> SurfaceFit:
+    start = starts[path]
+    shape = np.tensordot(start.coefficients, modes, 1)
+    target = read_specimen(path)[0]
+    source = TriangleMesh(shape, faces)
+    return bend_placed(shape, source, start.placing.inverse(), target, SECOND_LEVELS)
+
+
+def _digest(*arrays: np.ndarray) -> str:
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(array.tobytes())
+    return found.hexdigest()
+
+
+def _complete(fits: Sequence[SurfaceFit]) -> np.ndarray:
+    """Return which fits have all of the template; all of them if fewer than two have."""
+    is_complete = np.array([fit.missing < NOTABLE for fit in fits])
+    return is_complete if is_complete.sum() >= 2 else np.ones(len(fits), dtype=bool)
+
+
+def _starts_from_modes(
+    fits: Mapping[str, SurfaceFit],
+) -> tuple[dict[str, _Start], Float[np.ndarray, "q n 3"]]:
+    """Return starts of the second round, and the mean with the modes that they are in."""
+    ordered = list(fits.values())
+    reflected = tuple(fit.reflected for fit in ordered)
+    points = unreflect(np.stack([fit.vertices for fit in ordered]), reflected)
+    complete = _complete(ordered)
+    together = fit_procrustes(points[complete])
+    away = (together.shapes - together.mean).reshape(len(together.shapes), -1)
+    _, lengths, right = np.linalg.svd(away, full_matrices=False)
+    modes = np.vstack([together.mean.ravel(), right[:N_MODES]]).reshape(-1, *points.shape[1:])
+    deviations = lengths[:N_MODES] / np.sqrt(len(away) - 1)
+    starts = {}
+    for name, fit, own in zip(fits, ordered, points, strict=True):
+        sure = np.ones(len(own), dtype=bool)
+        if fit.missing >= NOTABLE:
+            sure = fit.confidence >= SURE
+        coefficients, placing = _fit_modes(own, sure, modes, deviations)
+        if fit.reflected:
+            placing = Similarity(
+                placing.scale, MIRROR @ placing.rotation, MIRROR @ placing.translation
+            )
+        starts[name] = _Start(coefficients, placing)
+    return starts, modes
+
+
+def _fit_modes(
+    points: Float[np.ndarray, "n 3"],
+    sure: np.ndarray,
+    modes: Float[np.ndarray, "q n 3"],
+    deviations: Float[np.ndarray, " p"],
+) -> tuple[Float[np.ndarray, " q"], Similarity]:
+    """Return the shape in modes nearest to the sure points, and the similarity that places it there.
+
+    Place and shape are computed in turn. Where points are missing, the others and the deviations of
+    the modes determine the shape.
+    """
+    weights = sure.astype(np.float64)
+    basis = modes[1:, sure].reshape(len(modes) - 1, -1)
+    penalty = np.diag(np.mean(deviations**2) / np.maximum(deviations**2, 1e-300)) * 1e-3
+    coefficients = np.concatenate([[1.0], np.zeros(len(basis))])
+    for _ in range(ROUNDS):
+        placing = best_similarity(np.tensordot(coefficients, modes, 1), points, weights)
+        away = placing.inverse().move(points)[sure] - modes[0, sure]
+        coefficients[1:] = np.linalg.solve(basis @ basis.T + penalty, basis @ away.ravel())
+    return coefficients, best_similarity(np.tensordot(coefficients, modes, 1), points, weights)
+
+
+def _noticed(fit: SurfaceFit, usual_size: float) -> list[str]:
+    """Return what a person should know of a specimen."""
+    found = []
+    centered = fit.vertices - fit.vertices.mean(axis=0)
+    factor = float(np.linalg.norm(centered)) / usual_size
+    if not 1 / OTHER_UNIT < factor < OTHER_UNIT:
+        found.append(
+            f"its size is {factor:.3g} times the median: perhaps its unit of length is another one"
+        )
+    if fit.reflected:
+        found.append("it is a mirror image of the others")
+    if fit.missing > NOTABLE:
+        found.append(f"{fit.missing:.0%} of the mean shape has no counterpart in it")
+    if fit.excess > NOTABLE:
+        found.append(f"{fit.excess:.0%} of its area has no counterpart in the mean shape")
+    if fit.method == "intrinsic":
+        found.append("its pose differs: the map is by intrinsic evidence (match_shapes)")
+    return found

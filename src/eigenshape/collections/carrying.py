@@ -1,0 +1,206 @@
+"""Landmarks carried from some specimens of a collection to all."""
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import ReadOnly
+from eigenshape._errors import InvalidParameterError
+from eigenshape._files import as_path, replace_file
+from eigenshape._text import short_repr
+from eigenshape.collections.collection import Collection
+from eigenshape.geometry.distances.closest import closest_points
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.samples.surface_points import SurfacePoints
+from eigenshape.morphometrics.landmarks import Landmarks
+
+# Expected error of a landmark from a single labelled specimen, where there is no second one to
+# judge by, in root mean square radii: that of the tuning half of experiments/ch7_collection.
+ERROR_OF_ONE = 0.037
+# Labelled specimens that the mean error of all landmarks counts for in the error of each
+N_PRIOR = 2.0
+FAR = 0.05  # gap from which a person should look, in root mean square radii
+WRONG_LABEL = 5.0  # expected errors between a label and its carried place, from which to look
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedLandmarks(ReadOnly):
+    """Landmarks on all specimens of a collection.
+
+    Attributes
+    ----------
+    specimens, names : tuple of str
+        Of the s specimens and of the k landmarks.
+    points : (s, k, 3) float
+        In each specimen's own frame and unit: the given landmarks of labelled specimens, and those
+        carried to all others, on their surfaces.
+    spread : (s, k) float
+        Expected error of each, the root of its mean square, in length; 0 for given ones. It is what
+        is found when the landmarks of each labelled specimen are carried from all others.
+    doubtful : (s, k) bool
+        Where a person should look: the specimen has no such place, or a given landmark lies far
+        from where the others put it.
+
+    See Also
+    --------
+    carry_landmarks
+    """
+
+    specimens: tuple[str, ...]
+    names: tuple[str, ...]
+    points: Float[np.ndarray, "s k 3"]
+    spread: Float[np.ndarray, "s k"]
+    doubtful: Bool[np.ndarray, "s k"]
+
+    __repr__ = short_repr
+
+    def save(self, path: str | Path) -> None:
+        """Write a table of comma-separated values: specimen, landmark, x, y, z, spread, doubtful.
+
+        Raises
+        ------
+        OSError
+            If the system cannot write there.
+        """
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(["specimen", "landmark", "x", "y", "z", "spread", "doubtful"])
+        for i, specimen in enumerate(self.specimens):
+            for j, name in enumerate(self.names):
+                numbers = [*self.points[i, j].tolist(), float(self.spread[i, j])]
+                table.writerow([specimen, name, *numbers, int(self.doubtful[i, j])])
+        replace_file(as_path(path), text.getvalue().encode())
+
+
+def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -> CarriedLandmarks:
+    """Carry the landmarks of some specimens to all.
+
+    Each is taken to the mean shape, where those of all labelled specimens are averaged, and from
+    there to the surface of each specimen.
+
+    Parameters
+    ----------
+    collection : Collection
+    labelled : mapping of str to Landmarks
+        By the name of the specimen, the same landmarks each; NaN where one is missing.
+
+    Returns
+    -------
+    CarriedLandmarks
+
+    Raises
+    ------
+    InvalidParameterError
+        If no specimen is labelled, a labelled one is not in the collection, landmarks have other
+        names, or one is missing on all specimens.
+
+    See Also
+    --------
+    build_collection
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> hands = {
+    ...     f"hand {i}": es.make_creature("hand", individual=i, n_vertices=600) for i in range(3)
+    ... }
+    >>> collection = es.collections.build_collection(hands, mkdtemp())
+    >>> given = es.morphometrics.Landmarks(["tip"], hands["hand 0"].vertices[[100]])
+    >>> carried = es.collections.carry_landmarks(collection, {"hand 0": given})
+    >>> away = np.linalg.norm(carried.points[2, 0] - hands["hand 2"].vertices[100])
+    >>> bool(away < 0.1)
+    True
+    """
+    require_type(collection, Collection, "collection")
+    require_type(labelled, Mapping, "labelled")
+    names, given = _given_points(collection, labelled)
+    mean, faces = collection.mean, collection.mean.faces
+    rows = [collection.number(name) for name in labelled]
+    on_mean = np.full_like(given, np.nan)
+    for number, row in enumerate(rows):
+        known = np.isfinite(given[number]).all(axis=1)
+        own = TriangleMesh(collection.points[row], faces)
+        on_mean[number, known] = _corresponding(mean, closest_points(own, given[number, known]))
+
+    places = closest_points(mean, np.nanmean(on_mean, axis=0))
+    points = np.empty((len(collection.names), len(names), 3))
+    radii = np.array([_radius(own) for own in collection.points])
+    carried = np.full_like(given, np.nan)  # to each labelled specimen, from all others
+    for row, name in enumerate(collection.names):
+        surface = collection.read_specimen(name)  # one at a time: together they may fill the memory
+        points[row] = _carry(collection, row, surface, places)
+        if row in rows and len(rows) > 1:
+            others = np.delete(on_mean, rows.index(row), axis=0)
+            seen = np.isfinite(others).all(axis=2).any(axis=0)
+            there = closest_points(mean, np.nanmean(others[:, seen], axis=0))
+            carried[rows.index(row), seen] = _carry(collection, row, surface, there)
+
+    # Errors that are made where the truth is known
+    squares = np.sum((carried - given) ** 2, axis=2) / radii[rows, None] ** 2
+    n_known = np.isfinite(squares).sum(axis=0)
+    common = float(np.nanmean(squares)) if n_known.any() else ERROR_OF_ONE**2
+    errors = np.sqrt((np.nansum(squares, axis=0) + N_PRIOR * common) / (n_known + N_PRIOR))
+
+    corners = faces[places.simplices]
+    gaps = np.einsum("kc,skc->sk", places.weights, collection.gaps[:, corners])
+    spread = np.hypot(radii[:, None] * errors, gaps)
+    doubtful = gaps > FAR * radii[:, None]
+    for number, row in enumerate(rows):
+        known = np.isfinite(given[number]).all(axis=1)
+        away = np.linalg.norm(carried[number] - given[number], axis=1)
+        doubtful[row, known] = (away > WRONG_LABEL * spread[row])[known]
+        points[row, known] = given[number, known]
+        spread[row, known] = 0
+    return CarriedLandmarks(collection.names, names, points, spread, doubtful)
+
+
+def _given_points(
+    collection: Collection, labelled: Mapping[str, Landmarks]
+) -> tuple[tuple[str, ...], Float[np.ndarray, "m k 3"]]:
+    """Return the names of the landmarks, and the points of each labelled specimen."""
+    if not labelled:
+        raise InvalidParameterError("At least one specimen must have landmarks; there are none.")
+    for specimen, landmarks in labelled.items():
+        require_type(landmarks, Landmarks, f"labelled[{specimen!r}]")
+    names = next(iter(labelled.values())).names
+    for specimen, landmarks in labelled.items():
+        collection.number(specimen)
+        if landmarks.names != names:
+            raise InvalidParameterError(
+                f"All specimens must have the same landmarks; those of {specimen!r} are "
+                f"{landmarks.names}, and the first ones {names}."
+            )
+    given = np.stack([landmarks.points for landmarks in labelled.values()])
+    missing = ~np.isfinite(given).all(axis=2).any(axis=0)
+    if missing.any():
+        raise InvalidParameterError(
+            "Each landmark must be given on one specimen at least; "
+            f"{names[np.argmax(missing)]!r} is missing on all."
+        )
+    return names, given
+
+
+def _corresponding(mesh: TriangleMesh, places: SurfacePoints) -> Float[np.ndarray, "k 3"]:
+    """Return the points of a mesh in the same faces, at the same weights."""
+    corners = mesh.vertices[mesh.faces[places.simplices]]
+    return np.einsum("kc,kcd->kd", places.weights, corners)
+
+
+def _carry(
+    collection: Collection, row: int, surface: TriangleMesh, places: SurfacePoints
+) -> Float[np.ndarray, "k 3"]:
+    """Return the points of a specimen's surface that correspond to places on the mean."""
+    bent = TriangleMesh(collection.points[row], collection.mean.faces)
+    return closest_points(surface, _corresponding(bent, places)).points
+
+
+def _radius(points: Float[np.ndarray, "n 3"]) -> float:
+    return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))

@@ -1,0 +1,81 @@
+"""Points spread evenly over a surface, with normals: what alignment and fitting compare."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+
+from eigenshape._errors import InvalidShapeError
+from eigenshape.geometry.distances.crossing_loops import curve_places
+from eigenshape.geometry.measure import area_vectors, face_areas
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
+from eigenshape.geometry.topology import vertex_components
+
+# Area of the smallest piece that counts, as a share of the largest one: the halves of a broken bone
+# do, crumbs of a scan do not.
+SMALLEST_PIECE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class SpreadPoints:
+    """Places on a surface with their unit normals."""
+
+    places: SurfacePoints
+    normals: Float[np.ndarray, "k 3"]
+
+    @property
+    def points(self) -> Float[np.ndarray, "k 3"]:
+        """Return the coordinates of the places."""
+        return self.places.points
+
+
+def main_pieces(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a surface without its small loose pieces; vertices stay."""
+    _, labels = vertex_components(mesh)
+    areas = np.bincount(labels[mesh.faces[:, 0]], face_areas(mesh))
+    kept = areas[labels[mesh.faces[:, 0]]] >= SMALLEST_PIECE * areas.max()
+    return TriangleMesh(mesh.vertices, mesh.faces[kept])
+
+
+def spread_points(mesh: TriangleMesh, n_points: int) -> SpreadPoints:
+    """Place points along a curve through all faces, one in each piece of equal area.
+
+    Faces that follow each other on Morton's curve are neighbors in space, so the points are spread
+    nearly as evenly as by rejection, in the time of a sort, and are the same in each run.
+    """
+    corners = mesh.vertices[mesh.faces]
+    vectors = area_vectors(corners)
+    areas = np.linalg.norm(vectors, axis=1)
+    if not areas.sum() > 0:
+        raise InvalidShapeError("A surface must have area; all faces of this one have none.")
+    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    order = np.argsort(curve_places(boxes), kind="stable")
+    order = order[areas[order] > 0]
+    reached = np.cumsum(areas[order])
+    draw = np.random.default_rng(0)
+    steps = (np.arange(n_points) + draw.random(n_points)) / n_points * reached[-1]
+    faces = order[np.minimum(np.searchsorted(reached, steps), len(order) - 1)]
+    # Uniform in a triangle: the root makes rows near the first corner as rare as they are short
+    root, share = np.sqrt(draw.random(n_points)), draw.random(n_points)
+    weights = np.column_stack([1 - root, root * (1 - share), root * share])
+    return SpreadPoints(place_points(mesh, faces, weights), vectors[faces] / areas[faces, None])
+
+
+def join_normals(
+    points: Float[np.ndarray, "k 3"], normals: Float[np.ndarray, "k 3"], weight: float
+) -> Float[np.ndarray, "k 6"]:
+    """Return rows of six numbers, in which other normals are farther away by up to 2 `weight`."""
+    return np.concatenate([points, weight * normals], axis=1)
+
+
+def nearest_both_ways(
+    ours: Float[np.ndarray, "k 6"], theirs: Float[np.ndarray, "m 6"], tree: cKDTree
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pair each point with the nearest one of the other surface: ours, theirs, and the distances."""
+    to_them, nearest = tree.query(ours)
+    to_us, nearest_of_them = cKDTree(ours).query(theirs)
+    first = np.concatenate([np.arange(len(ours)), nearest_of_them])
+    second = np.concatenate([nearest, np.arange(len(theirs))])
+    return first, second, np.concatenate([to_them, to_us])

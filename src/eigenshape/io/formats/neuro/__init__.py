@@ -1,0 +1,1 @@
+"""The formats of brains and neurons, a module each."""

@@ -1,0 +1,257 @@
+"""GIFTI files: surfaces, functions and labels of vertices, in XML. nibabel writes them."""
+
+import base64
+import binascii
+from xml.etree import ElementTree
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from eigenshape._errors import FileFormatError
+from eigenshape.features.parcellation import Parcellation
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.formats.neuro.shared import Arrays, find_keys, narrow, require_nibabel
+from eigenshape.io.formats.numbers import ZLIB, numbers_of, require_reasonable, unpack_block
+from eigenshape.io.formats.stl import single_precision
+
+NUMBERS = {
+    "NIFTI_TYPE_UINT8": "u1", "NIFTI_TYPE_INT32": "i4", "NIFTI_TYPE_FLOAT32": "f4",
+    "NIFTI_TYPE_INT64": "i8", "NIFTI_TYPE_FLOAT64": "f8",
+}  # fmt: skip
+ORDERS = {
+    "LittleEndian": "<", "BigEndian": ">", "GIFTI_ENDIAN_LITTLE": "<", "GIFTI_ENDIAN_BIG": ">",
+}  # fmt: skip
+TEXT = ("ASCII", "GIFTI_ENCODING_ASCII")  # encodings, by their names now and in version 1.0 of 2008
+PLAIN = ("Base64Binary", "GIFTI_ENCODING_B64BIN")
+PACKED = ("GZipBase64Binary", "GIFTI_ENCODING_B64GZ")
+POINTS, TRIANGLES, LABELS = "NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE", "NIFTI_INTENT_LABEL"
+UNNAMED = "values"
+NO_PARCEL = "???"  # name of the label 0 in files of Connectome Workbench
+
+
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "f 3"]]:
+    """Return vertices and faces; the transformation to other coordinates is not applied.
+
+    Raise FileFormatError if the file does not hold one surface, or not what it declares.
+    """
+    arrays = _parse_tags(data).findall("DataArray")
+    found = []
+    for intent, kind in ((POINTS, "f"), (TRIANGLES, "iu")):
+        fitting = [array for array in arrays if array.get("Intent") == intent]
+        if len(fitting) != 1:
+            raise FileFormatError(
+                f"A GIFTI file of a surface must have one array {intent}; it has {len(fitting)}. "
+                "es.io.read_fields reads the functions in it."
+            )
+        rows = _values(fitting[0], len(data))
+        if rows.ndim != 2 or rows.shape[1] != 3 or rows.dtype.kind not in kind:
+            raise FileFormatError(
+                f"{intent} of a GIFTI file must have three numbers a row, coordinates or whole numbers; "
+                f"the shape is {rows.shape} and the type {rows.dtype}."
+            )
+        found.append(rows)
+    return found[0].astype(np.float64), found[1].astype(np.int64)
+
+
+def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
+    """Return the functions on vertices by name, and none on faces; arrays of one name are columns.
+
+    Raise FileFormatError if the file does not hold what it declares.
+    """
+    columns: dict[str, list[np.ndarray]] = {}
+    for array in _parse_tags(data).findall("DataArray"):
+        intent = array.get("Intent")
+        if intent in (POINTS, TRIANGLES):
+            continue
+        values = _values(array, len(data))
+        name = _meta(array).get("Name", "") or UNNAMED
+        before = columns.setdefault(name, [])
+        if intent == "NIFTI_INTENT_NODE_INDEX" or (before and len(before[0]) != len(values)):
+            raise FileFormatError(
+                f"Functions of a GIFTI file must have a value for every vertex; {name!r} is of "
+                f"{len(values)} numbers and {intent}."
+            )
+        before.append(values.reshape(len(values), -1))
+    tables = {name: np.hstack(found) for name, found in columns.items()}
+    return {
+        name: table[:, 0] if table.shape[1] == 1 else table for name, table in tables.items()
+    }, {}
+
+
+def parse_parcels(data: bytes, n_points: int) -> Parcellation:
+    """Return the parcellation of a file of labels; the label named ??? is no parcel.
+
+    Raise FileFormatError if there is not one array of labels, or a label has no name or color.
+    """
+    root = _parse_tags(data)
+    arrays = [array for array in root.findall("DataArray") if array.get("Intent") == LABELS]
+    if len(arrays) != 1:
+        raise FileFormatError(
+            f"A GIFTI file of labels must have one array {LABELS}; it has {len(arrays)}."
+        )
+    labels = _values(arrays[0], len(data)).ravel()
+    keys, names, colors = [], [], []
+    for label in root.findall("./LabelTable/Label"):
+        words = [label.get(each, "") for each in ("Key", "Red", "Green", "Blue", "Alpha")]
+        name = (label.text or "").strip()
+        try:
+            keys.append(int(words[0]))
+            color = [float(word) for word in words[1:]] if name != NO_PARCEL else []
+        except ValueError:
+            color = [np.nan]
+        if not all(0 <= share <= 1 for share in color):
+            raise FileFormatError(
+                f"Labels of a GIFTI file must have a key and a color; {name!r} has {words}."
+            )
+        colors += [color] if color else []
+        names.append(name)
+    if not colors:
+        raise FileFormatError(
+            "A GIFTI file of labels must have a table of names and colors; it has none. "
+            "es.io.read_fields reads its numbers, such as those of a mask."
+        )
+    places = find_keys(np.array(keys), labels)
+    odd = np.flatnonzero((places < 0) & (labels != 0))
+    if odd.size:
+        raise FileFormatError(
+            f"Labels of a GIFTI file must stand in its table; that of vertex {odd[0]} is "
+            f"{labels[odd[0]]} ({odd.size} such)."
+        )
+    is_parcel = np.array([name != NO_PARCEL for name in names])
+    numbers = np.append(np.where(is_parcel, np.cumsum(is_parcel) - 1, -1), -1)
+    parcels = tuple(name for name in names if name != NO_PARCEL)
+    return Parcellation(numbers[places], parcels, np.array(colors))
+
+
+def structure_of(data: bytes) -> str:
+    """Return the structure that the file names, such as CortexLeft, or an empty text."""
+    root = _parse_tags(data)
+    found = (
+        _meta(each).get("AnatomicalStructurePrimary") for each in [root, *root.iter("DataArray")]
+    )
+    return next(filter(None, found), "")
+
+
+def _parse_tags(data: bytes) -> ElementTree.Element:
+    if b"<!ENTITY" in data:
+        raise FileFormatError(
+            "A GIFTI file must be plain XML; it declares entities, which could be of any size."
+        )
+    try:
+        root = ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError, LookupError) as err:
+        raise FileFormatError(f"A GIFTI file must be whole XML; {err}.") from err
+    count = root.get("NumberOfDataArrays", "")
+    if root.tag != "GIFTI" or count.strip() != str(len(root.findall("DataArray"))):
+        raise FileFormatError(
+            f"A GIFTI file must hold the arrays that it declares; it is {root.tag[:30]!r}, declares "
+            f"{count[:30]!r} and holds {len(root.findall('DataArray'))}."
+        )
+    return root
+
+
+def _meta(element: ElementTree.Element) -> dict[str, str]:
+    return {
+        (pair.findtext("Name") or "").strip(): (pair.findtext("Value") or "").strip()
+        for pair in element.findall("./MetaData/MD")
+    }
+
+
+def _values(array: ElementTree.Element, n_bytes: int) -> np.ndarray:
+    """Return the numbers of an array; `n_bytes` is the size of the file."""
+    intent, encoding = array.get("Intent", "an array"), array.get("Encoding", "")
+    kind, order = NUMBERS.get(array.get("DataType", "")), ORDERS.get(array.get("Endian", ""))
+    try:
+        count = int(array.get("Dimensionality", ""))
+        shape = tuple(int(array.get(f"Dim{axis}", "")) for axis in range(min(count, 3)))
+    except ValueError:
+        shape = ()
+    if kind is None or order is None or not shape or min(shape) < 0:
+        raise FileFormatError(
+            f"Arrays of a GIFTI file must declare their type, byte order and size; {intent} declares "
+            f"{dict(list(array.attrib.items())[:12])}."
+        )
+    dtype = np.dtype(order + kind)
+    size = int(np.prod([float(each) for each in shape])) * dtype.itemsize
+    text = (array.findtext("Data") or "").encode()
+    if encoding in TEXT:
+        try:
+            data = numbers_of(text.split()).astype(dtype).tobytes()
+        except ValueError as err:
+            raise FileFormatError(
+                f"Arrays of a GIFTI file must be of numbers; {intent} is not: {err}."
+            ) from err
+    elif encoding in PLAIN + PACKED:
+        try:
+            data = base64.b64decode(b"".join(text.split()), validate=True)
+        except binascii.Error as err:
+            raise FileFormatError(
+                f"Arrays of a GIFTI file must be in base64; {intent} is not: {err}."
+            ) from err
+        if encoding in PACKED:
+            require_reasonable(size, n_bytes)
+            data = unpack_block(data, size, ZLIB)
+    else:
+        raise FileFormatError(
+            f"Arrays of a GIFTI file must be in it, as text or in base64; {intent} is {encoding[:30]!r}. "
+            "Save it with the data inside."
+        )
+    if len(data) != size:
+        raise FileFormatError(
+            f"A GIFTI file must hold what it declares; {intent} takes {size} bytes, not {len(data)}."
+        )
+    is_by_columns = array.get("ArrayIndexingOrder") == "ColumnMajorOrder"
+    values = np.frombuffer(data, dtype).reshape(shape, order="F" if is_by_columns else "C")
+    return values.astype(dtype.newbyteorder("="))
+
+
+def format_fields(mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:
+    """Write a surface and functions on its vertices, in single precision.
+
+    Raise FileFormatError if a number does not fit into 32 bits, or a function is on faces.
+    """
+    if of_faces:
+        raise FileFormatError(
+            f"GIFTI files hold functions on vertices; {next(iter(of_faces))!r} is on faces."
+        )
+    if mesh.n_vertices > np.iinfo(np.int32).max:
+        raise FileFormatError(f"GIFTI files hold 2^31 vertices; the mesh has {mesh.n_vertices}.")
+    arrays = [(POINTS, "", single_precision(mesh, "GIFTI")), (TRIANGLES, "", mesh.faces)]
+    shapes = [("NIFTI_INTENT_SHAPE", name, values) for name, values in of_vertices.items()]
+    return _format(arrays + shapes)
+
+
+def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
+    """Write functions on vertices alone."""
+    intents = {".shape.gii": "NIFTI_INTENT_SHAPE", ".label.gii": LABELS}
+    intent = intents.get(suffix, "NIFTI_INTENT_NONE")
+    return _format([(intent, name, values) for name, values in of_vertices.items()])
+
+
+def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) -> bytes:
+    """Write labels with names and colors; parcel i has the label i + 1, since 0 is for none."""
+    return _format([(LABELS, "parcels", parcellation.labels + 1)], parcellation)
+
+
+def _format(
+    arrays: list[tuple[str, str, np.ndarray]], parcellation: Parcellation | None = None
+) -> bytes:
+    gifti = require_nibabel("nibabel.gifti")
+    table = gifti.GiftiLabelTable()
+    if parcellation is not None:
+        rows = zip((NO_PARCEL, *parcellation.names), [[0] * 4, *parcellation.colors], strict=True)
+        for key, (name, color) in enumerate(rows):
+            label = gifti.GiftiLabel(key, *map(float, color))
+            label.label = name
+            table.labels.append(label)
+    image = gifti.GiftiImage(labeltable=table)
+    for intent, name, values in arrays:
+        for column in (
+            [values] if intent in (POINTS, TRIANGLES) else values.reshape(len(values), -1).T
+        ):
+            meta = gifti.GiftiMetaData({"Name": name} if name else {})
+            image.add_gifti_data_array(
+                gifti.GiftiDataArray(narrow(name, column), intent=intent, meta=meta)
+            )
+    text: bytes = image.to_bytes()
+    return text

@@ -1,0 +1,58 @@
+"""What the formats of brains share: nibabel, if it is installed, and numbers of 32 bits."""
+
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from eigenshape._errors import FileFormatError, MissingExtraError
+
+Arrays = dict[str, np.ndarray]
+
+
+def require_nibabel(module: str) -> Any:
+    """Return a module of nibabel."""
+    try:
+        return import_module(module)
+    except ImportError as err:
+        raise MissingExtraError(
+            "nibabel must be installed; it is not. Run pip install 'eigenshape[neuro]'."
+        ) from err
+
+
+def narrow(name: str, values: np.ndarray) -> np.ndarray:
+    """Return numbers in 32 bits, which these formats hold; floats are rounded.
+
+    Raise FileFormatError if a number is too large.
+    """
+    kind = np.float32 if values.dtype.kind == "f" else np.int32
+    with np.errstate(over="ignore"):
+        short = np.ascontiguousarray(values.astype(kind))
+    lost = (short != values) if kind is np.int32 else np.isinf(short) & np.isfinite(values)
+    bad = np.argwhere(lost)
+    if len(bad):
+        place = tuple(bad[0].tolist())
+        raise FileFormatError(
+            f"Numbers must fit into 32 bits; that of {name!r} at vertex {place[0]} is {values[place]}."
+        )
+    return short
+
+
+def one_table(of_vertices: Arrays, what: str) -> np.ndarray:
+    """Return the one function that a file without names can hold."""
+    if len(of_vertices) != 1:
+        raise FileFormatError(
+            f"{what} holds one function, without a name; there are {len(of_vertices)}. "
+            "Write each to a file of its own."
+        )
+    (item,) = of_vertices.items()
+    return narrow(*item)
+
+
+def find_keys(keys: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the place of each value among the keys, or -1."""
+    if not len(keys):
+        return np.full(len(values), -1)
+    order = np.argsort(keys, kind="stable")
+    found = order[np.searchsorted(keys, values, sorter=order).clip(0, len(keys) - 1)]
+    return np.where(keys[found] == values, found, -1)

@@ -1,0 +1,129 @@
+"""Read and write parcels of a surface: annotation, label and GIFTI files."""
+
+import re
+from pathlib import Path
+
+from eigenshape._errors import FileFormatError
+from eigenshape._files import as_path, replace_file
+from eigenshape.features.parcellation import Parcellation, require_parcels
+from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.repairs.masks import hemisphere_of
+from eigenshape.io.attributes import naming, open_file
+from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, suffix_of
+
+# Names of files that name a hemisphere: lh.aparc.annot, sub-01_hemi-L.label.gii, S1.L.aparc.label.gii
+LEFT, RIGHT = (
+    re.compile(rf"^{hemisphere}\.|hemi-{letter}\b|hemi-{letter}_|[._]{letter}\.")
+    for hemisphere, letter in (("lh", "L"), ("rh", "R"))
+)
+
+
+def read_parcellation(path: str | Path, mesh: MeshLike) -> Parcellation:
+    """Read the parcels of a surface, with their names and colors.
+
+    Parameters
+    ----------
+    path : str or Path
+        An annotation (.annot) or label file (.label) of FreeSurfer, or a GIFTI file (.label.gii). A
+        label file lists the vertices of one parcel.
+    mesh : MeshLike
+        The surface that the file belongs to.
+
+    Returns
+    -------
+    Parcellation
+        Label -1 is for vertices in no parcel: the label 0 of an annotation, and ??? in GIFTI.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is of another surface or hemisphere, has no names and colors, or does not hold
+        what it declares.
+    OSError
+        If the system cannot open the file.
+
+    See Also
+    --------
+    es.io.write_parcellation : Write parcels.
+    es.io.read_fields : Read numbers without names, such as those of a mask.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "halves.annot")
+    >>> ball = es.icosphere(1)
+    >>> halves = es.features.Parcellation((ball.vertices[:, 2] > 0).astype(int), ("low", "high"))
+    >>> es.io.write_parcellation(ball, path, halves)
+    >>> es.io.read_parcellation(path, ball).names
+    ('low', 'high')
+    """
+    mesh = as_mesh(mesh)
+    source = open_file(path, None, PARCEL_FORMATS)
+    with naming(source.path):
+        module = format_of(source.suffix).load()
+        parcellation: Parcellation = module.parse_parcels(source.data, mesh.n_vertices)
+        n_labels = len(parcellation.labels)
+        if n_labels != mesh.n_vertices:
+            raise FileFormatError(
+                f"A parcellation must have a label for each of {mesh.n_vertices} vertices; it has "
+                f"{n_labels}, so it belongs to another surface."
+            )
+        name = source.path.name
+        of_structure = module.structure_of(source.data) if source.suffix == ".label.gii" else ""
+        for side, pattern in (("left", LEFT), ("right", RIGHT)):
+            is_of_side = side in of_structure.lower() if of_structure else pattern.search(name)
+            found = hemisphere_of(mesh)
+            if is_of_side and found not in (side, ""):
+                raise FileFormatError(
+                    f"A parcellation must belong to the hemisphere of the surface; it is of the {side} "
+                    f"one ({of_structure or name}), and the surface lies on the {found}, x "
+                    f"{'<' if found == 'left' else '>'} 0."
+                )
+    return parcellation
+
+
+def write_parcellation(mesh: MeshLike, path: str | Path, parcellation: Parcellation) -> None:
+    """Write the parcels of a surface, as FreeSurfer and Connectome Workbench keep them.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        With n vertices.
+    path : str or Path
+        Must end in .annot, .label or .label.gii. Annotations keep colors in bytes, and a label file
+        keeps one parcel without its name. In GIFTI, parcel i has the label i + 1.
+    parcellation : Parcellation
+        Of the n vertices.
+
+    Raises
+    ------
+    FileFormatError
+        If the suffix is another one, or the format cannot hold the parcels: colors in an annotation
+        must differ, and a label file holds one parcel.
+    InvalidParameterError
+        If the parcellation is of another number of vertices.
+    MissingExtraError
+        If nibabel is not installed, which writes GIFTI.
+    OSError
+        If the system cannot write the file.
+
+    See Also
+    --------
+    es.io.read_parcellation : Read parcels.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> import eigenshape as es
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "cap.label")
+    >>> ball = es.icosphere(1)
+    >>> cap = es.features.Parcellation((ball.vertices[:, 2] > 0.5).astype(int) - 1, ("cap",))
+    >>> es.io.write_parcellation(ball, path, cap)
+    >>> int((es.io.read_parcellation(path, ball).labels == 0).sum())
+    9
+    """
+    mesh, path = as_mesh(mesh), as_path(path)
+    require_parcels(parcellation, mesh.n_vertices)
+    suffix = suffix_of(path, None, PARCEL_FORMATS)
+    replace_file(path, format_of(suffix).load().format_parcels(mesh, parcellation, suffix))

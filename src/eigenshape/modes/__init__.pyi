@@ -1,0 +1,12 @@
+from .alignment import ModeAlignment as ModeAlignment
+from .alignment import align_modes as align_modes
+from .connectome import geometric_connectome as geometric_connectome
+from .fits import accuracy_curve as accuracy_curve
+from .fits import fit_modes as fit_modes
+from .morphometry import ModeComparison as ModeComparison
+from .morphometry import compare_modes as compare_modes
+from .nulls import rotation_nulls as rotation_nulls
+from .parcels import ParcelTree as ParcelTree
+from .parcels import nodal_parcels as nodal_parcels
+from .waves import blood_response as blood_response
+from .waves import wave_response as wave_response

@@ -1,0 +1,180 @@
+"""Activity that spreads as damped waves, and the blood signal that follows it, mode by mode."""
+
+import numpy as np
+import scipy.linalg as sl
+from jaxtyping import Float
+
+from eigenshape._arguments import require_type
+from eigenshape._arrays import positive_values, real_numbers, require_finite_rows
+from eigenshape._errors import InvalidParameterError
+from eigenshape._threads import one_blas_thread
+from eigenshape._typing import ArrayLike
+from eigenshape.spectral.spectrum import Spectrum
+
+# Of the balloon model (Friston and others 2000; Pang and others 2023): decay of the signal in 1/s,
+# feedback of the flow in 1/s², transit time in s, exponent of the outflow, share of oxygen extracted
+# at rest, and the coefficients of the signal.
+DECAY, FLOW, TRANSIT, STIFFNESS, EXTRACTED = 0.65, 0.41, 0.98, 0.32, 0.34
+VOLUME, K1, K2, K3 = 0.02, 3.72, 0.527, 0.48
+
+
+@one_blas_thread()
+def wave_response(
+    drive: ArrayLike,
+    spectrum: Spectrum,
+    dt: float,
+    *,
+    length_scale: float = 17.4,
+    damping: float = 116.0,
+) -> Float[np.ndarray, "k times"]:
+    """Simulate activity that spreads as damped waves, such as in a neural field.
+
+    (1/γ² ∂²/∂t² + 2/γ ∂/∂t + 1 - r²Δ) φ = Q (Robinson, Rennie and Wright 1997; Pang and others
+    2023). Mode j with eigenvalue λ is an oscillator of its own, φ'' + 2γ φ' + γ²(1 + r²λ) φ = γ² q,
+    at rest at the first time. It is solved exactly for a drive that is linear between times.
+
+    Parameters
+    ----------
+    drive : (j, times) float
+        Coefficients of the input Q in the first j modes, from `es.spectral.project`.
+    spectrum : Spectrum
+        k ≥ j eigenpairs.
+    dt : float
+        Between two times, in s.
+    length_scale : float
+        r, in the unit of the coordinates: the default is that of a human cortex in mm.
+    damping : float
+        γ, in 1/s. Waves travel at r γ: 2 m/s by default.
+
+    Returns
+    -------
+    (j, times) float
+        Coefficients of the activity; `es.spectral.reconstruct` makes maps of them.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the drive is no table of finite numbers with at most one row per mode, or a parameter is
+        not positive.
+
+    See Also
+    --------
+    blood_response : The blood signal of activity.
+
+    Examples
+    --------
+    A constant drive of mode j ends at 1 / (1 + r²λ):
+
+    >>> import numpy as np, eigenshape as es
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(es.icosphere(3)), 4)
+    >>> found = es.modes.wave_response(np.ones((4, 2000)), spectrum, 1e-3, length_scale=1.0)
+    >>> found[:, -1].round(2).tolist()  # the eigenvalues are 0, 2, 2, 2
+    [1.0, 0.33, 0.33, 0.33]
+    """
+    require_type(spectrum, Spectrum, "spectrum")
+    inputs = _time_series(drive, "drive", len(spectrum.eigenvalues))
+    scale, rate = positive_values([length_scale, damping], "length_scale and damping")
+    # In units of 1/γ for time, so that velocities are of the size of values.
+    stretch = 1 + scale**2 * spectrum.eigenvalues[: len(inputs)]
+    system = np.zeros((len(inputs), 2, 2))
+    system[:, 0, 1] = 1.0
+    system[:, 1, 0] = -stretch
+    system[:, 1, 1] = -2.0
+    (step,) = positive_values(dt, "dt")
+    return _respond(rate * system, rate * np.array([0.0, 1.0]), inputs, step)[:, 0]
+
+
+@one_blas_thread()
+def blood_response(activity: ArrayLike, dt: float) -> Float[np.ndarray, "rows times"]:
+    """Compute the blood-oxygen signal of activity by the balloon model, linear around rest.
+
+    With the deviations from rest of flow f, volume v and deoxyhemoglobin q (Buxton, Wong and Frank
+    1998; Stephan and others 2007): f'' + κ f' + γ f = x, τ v' = f - v/α, τ q' = e f - (1/α - 1) v -
+    q with e = 1 + (1 - ρ) log(1 - ρ)/ρ, and the signal V₀ ((k₂ - k₃) v - (k₁ + k₂) q). All is at
+    rest at the first time. It is solved exactly for activity that is linear between times.
+
+    Being linear, it may be taken of maps or of their coefficients.
+
+    Parameters
+    ----------
+    activity : (rows, times) float
+        One row per mode or point, such as from `wave_response`.
+    dt : float
+        Between two times, in s.
+
+    Returns
+    -------
+    (rows, times) float
+        Change of the signal as a share of the signal at rest.
+
+    Raises
+    ------
+    InvalidParameterError
+        If the activity is no table of finite numbers, or dt is not positive.
+
+    Examples
+    --------
+    After a second of activity the signal is largest at 3.8 s, and undershoots later:
+
+    >>> import numpy as np, eigenshape as es
+    >>> activity = np.zeros((1, 300))
+    >>> activity[0, :10] = 1.0
+    >>> signal = es.modes.blood_response(activity, 0.1)[0]
+    >>> signal.argmax().item(), signal.argmin().item()  # in tenths of a second
+    (38, 98)
+    """
+    inputs = _time_series(activity, "activity")
+    (step,) = positive_values(dt, "dt")
+    rest = 1 + (1 - EXTRACTED) * np.log(1 - EXTRACTED) / EXTRACTED
+    outflow = 1 / STIFFNESS
+    system = np.array(
+        [  # signal, flow, volume, deoxyhemoglobin
+            [-DECAY, -FLOW, 0.0, 0.0],
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1 / TRANSIT, -outflow / TRANSIT, 0.0],
+            [0.0, rest / TRANSIT, -(outflow - 1) / TRANSIT, -1 / TRANSIT],
+        ]
+    )
+    states = _respond(system[None], np.array([1.0, 0.0, 0.0, 0.0]), inputs, step)
+    return VOLUME * ((K2 - K3) * states[:, 2] - (K1 + K2) * states[:, 3])
+
+
+def _time_series(
+    values: ArrayLike, name: str, most: int | None = None
+) -> Float[np.ndarray, "rows times"]:
+    series = real_numbers(values, name).astype(np.float64)
+    if series.ndim != 2 or not series.size or (most is not None and len(series) > most):
+        rows = "one row per mode or point" if most is None else f"one row per mode, 1 to {most}"
+        raise InvalidParameterError(
+            f"{name} must have {rows}, and one column per time; the shape is {series.shape}."
+        )
+    require_finite_rows(series, name, "row")
+    return series
+
+
+def _respond(
+    system: Float[np.ndarray, "systems m m"],
+    entry: Float[np.ndarray, " m"],
+    inputs: Float[np.ndarray, "rows times"],
+    step: float,
+) -> Float[np.ndarray, "rows m times"]:
+    """Solve y' = A y + b u from rest, exactly for u linear between times; one A for each row or all.
+
+    The exponential of the triangular block matrix [[A, b, 0], [0, 0, 1], [0, 0, 0]] of a step holds
+    the integrals over it (Van Loan 1978).
+    """
+    size = len(entry)
+    joint = np.zeros((len(system), size + 2, size + 2))
+    joint[:, :size, :size] = step * system
+    joint[:, :size, size] = step * entry
+    joint[:, size, size + 1] = 1.0
+    power = np.broadcast_to(sl.expm(joint), (len(inputs), size + 2, size + 2))
+    advance, constant, ramp = power[:, :size, :size], power[:, :size, size], power[:, :size, -1]
+    before, changes = inputs.T[:-1, :, None], np.diff(inputs.T, axis=0)[:, :, None]
+    # What the input adds in each step; the states follow in the same memory.
+    states = np.concatenate(
+        [np.zeros((1, len(inputs), size)), constant * before + ramp * changes], axis=0
+    )
+    for time in range(1, len(states)):
+        states[time] += np.einsum("rij,rj->ri", advance, states[time - 1])
+    return states.transpose(1, 2, 0)

@@ -1,0 +1,55 @@
+"""Similarities that place surfaces on each other."""
+
+import numpy as np
+import pytest
+from specimens import half, make_specimen, mirror, move
+
+import eigenshape as es
+
+
+def error(found, mesh, moved):
+    """Return the mean distance of moved vertices from their places, in units of the mesh's size."""
+    return np.linalg.norm(found.move(moved.vertices) - mesh.vertices, axis=1).mean()
+
+
+def test_a_turned_specimen_in_another_unit_comes_back():
+    mesh = make_specimen(0)
+    moved = move(mesh, 1000.0)
+    found = es.collections.align_surfaces(moved, mesh)
+    assert not found.reflected
+    assert found.scale == pytest.approx(0.001, rel=0.02)
+    assert error(found, mesh, moved) < 0.03
+    back = found.inverse().move(found.move(moved.vertices))
+    assert np.allclose(back, moved.vertices)
+
+
+def test_a_mirror_image_of_a_form_without_symmetry_is_noticed():
+    mesh = make_specimen(0)
+    moved = move(mirror(make_specimen(1)))
+    found = es.collections.align_surfaces(moved, mesh)
+    assert found.reflected
+    assert found.inverse().reflected
+    assert error(found, mesh, moved) < 0.2
+
+
+def test_a_symmetric_form_is_not_called_reflected():
+    fish, other = (es.make_creature("fish", individual=i, n_vertices=500) for i in (0, 1))
+    assert not es.collections.align_surfaces(mirror(other), fish).reflected
+
+
+def test_half_of_a_specimen_and_a_crumb_far_away_are_placed():
+    mesh = make_specimen(0)
+    part = half(mesh)
+    crumb = es.icosphere(1)
+    crumb = es.TriangleMesh(0.1 * crumb.vertices + 20, crumb.faces)
+    both = es.geometry.disjoint_union(part, crumb)
+    found = es.collections.align_surfaces(both, mesh)
+    assert found.scale == pytest.approx(1.0, rel=0.1)
+    moved = found.move(part.vertices)
+    assert np.linalg.norm(moved - part.vertices, axis=1).mean() < 0.1
+
+
+def test_a_surface_without_area_is_refused():
+    flat = es.TriangleMesh(np.zeros((3, 3)), [[0, 1, 2]])
+    with pytest.raises(es.InvalidShapeError, match="A surface must have area"):
+        es.collections.align_surfaces(flat, es.icosphere(1))

@@ -1,0 +1,43 @@
+"""One surface bent onto another, by place or by intrinsic evidence."""
+
+import numpy as np
+import pytest
+from specimens import half, make_specimen, mirror, move
+
+import eigenshape as es
+
+
+def test_a_specimen_is_bent_onto_another_in_place():
+    source, truth = make_specimen(0), make_specimen(1)
+    fit = es.collections.fit_surface(source, move(truth, 10.0))
+    away = np.linalg.norm(fit.vertices - move(truth, 10.0).vertices, axis=1)
+    assert np.median(away) < 0.05 * 10
+    assert np.median(fit.gaps) < 0.005 * 10
+    assert np.median(fit.confidence) > 0.9
+    assert (fit.method, fit.reflected) == ("position", False)
+    assert fit.missing == fit.excess == 0
+
+
+def test_the_mirror_image_of_half_a_specimen_is_fitted_and_its_missing_half_is_not_sure():
+    source, whole = make_specimen(0), make_specimen(1)
+    target = mirror(half(whole))
+    fit = es.collections.fit_surface(source, target)
+    assert fit.reflected
+    assert 0.1 < fit.missing < 0.6
+    there = mirror(whole).vertices
+    seen = whole.vertices[:, 2] > 0.2
+    assert np.median(np.linalg.norm(fit.vertices - there, axis=1)[seen]) < 0.1
+    assert fit.confidence[seen].mean() > 0.8
+    assert fit.confidence[whole.vertices[:, 2] < -0.3].max() < 0.25
+
+
+def test_another_pose_is_reached_by_intrinsic_evidence():
+    rest, posed = (es.make_creature("hand", pose, n_vertices=500) for pose in (0, 1))
+    fit = es.collections.fit_surface(rest, posed)
+    assert fit.method == "intrinsic"
+    assert np.linalg.norm(fit.vertices - posed.vertices, axis=1).mean() < 0.03
+
+
+def test_a_form_of_another_kind_is_refused():
+    with pytest.raises(es.InvalidShapeError, match="must have about the form of the source"):
+        es.collections.fit_surface(make_specimen(0), es.make_creature("octopus", n_vertices=500))

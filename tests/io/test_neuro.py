@@ -1,0 +1,611 @@
+"""Files of brains and neurons, beside nibabel: what we read and write is what it writes and reads, to the last bit."""
+
+import base64
+import gzip
+import re
+from importlib import resources
+from pathlib import Path
+
+import nibabel as nib
+import numpy as np
+import pytest
+from nibabel import freesurfer
+from nibabel.cifti2 import cifti2_axes
+from tetrahedra import FACES, TETRAHEDRON, VERTICES
+from typer.testing import CliRunner
+
+import eigenshape as es
+from eigenshape import FileFormatError, InvalidShapeError
+from eigenshape.cli import app
+from eigenshape.features import Parcellation
+from eigenshape.io import read_fields, read_parcellation, write_fields, write_parcellation
+from eigenshape.io.formats.neuro import annotations, cifti, gifti, swc
+from eigenshape.io.formats.neuro import freesurfer as fs
+
+CORTICES = Path(str(resources.files("neuromodes") / "data"))
+OF_NIBABEL = Path(nib.__file__).parent / "gifti" / "tests" / "data"
+LEFT = "sp-human_tpl-fsLR_den-4k_hemi-L_"
+BALL = es.icosphere(2)
+HEIGHT = BALL.vertices[:, 2].astype(np.float32)
+PARCELS = Parcellation(
+    np.searchsorted([-0.5, 0.1, 0.7], BALL.vertices[:, 2]) - 1,
+    ("low", "middle", "hoch <&> é"),
+    [[1, 0, 0, 1], [0, 0.2, 1, 0.4], [0, 1, 0, 1]],
+)
+FOUR = np.array([0.5, -1.0, np.nan, 3.0], np.float32)
+
+
+def both(path):
+    """Return the content of a GIFTI file by nibabel."""
+    return [array.data for array in nib.load(path).darrays]
+
+
+# Surfaces.
+
+
+@pytest.mark.parametrize("path", sorted(CORTICES.glob("*den-4k*.surf.gii")), ids=lambda p: p.name)
+def test_a_cortex_is_what_nibabel_reads_and_goes_back_as_it_was(path, tmp_path):
+    points, faces = both(path)
+    mesh = es.read_mesh(path)
+    assert mesh.vertices.astype(np.float32).tobytes() == points.tobytes()
+    assert np.array_equal(mesh.faces, faces)
+    for name in ("again.surf.gii", "lh.pial"):
+        es.write_mesh(mesh, tmp_path / name)
+        again = es.read_mesh(tmp_path / name)
+        assert again.vertices.tobytes() == mesh.vertices.tobytes()
+        assert again.faces.tobytes() == mesh.faces.tobytes()
+    assert both(tmp_path / "again.surf.gii")[0].tobytes() == points.tobytes()
+    found, corners = freesurfer.read_geometry(tmp_path / "lh.pial")
+    assert found.tobytes() == mesh.vertices.tobytes()
+    assert np.array_equal(corners, mesh.faces)
+
+
+def test_a_surface_of_freesurfer_is_known_by_its_first_bytes(tmp_path):
+    stamp, info = (
+        "created by someone",
+        {"head": [2, 0, 20], "valid": "1", "filename": "a", "volume": [9] * 3},
+    )
+    info |= {key: [1.0, 0, 0] for key in ("voxelsize", "xras", "yras", "zras", "cras")}
+    freesurfer.write_geometry(tmp_path / "fs.white", BALL.vertices, BALL.faces, stamp, info)
+    mesh = es.read_mesh(tmp_path / "fs.white")
+    assert np.array_equal(mesh.vertices, BALL.vertices.astype(np.float32))
+    assert np.array_equal(mesh.faces, BALL.faces)
+    assert es.read_shape(tmp_path / "fs.white").n_faces == BALL.n_faces
+    (tmp_path / "other.white").write_bytes(b"abcdef")
+    with pytest.raises(FileFormatError, match="of a known format"):
+        es.read_mesh(tmp_path / "other.white")
+
+
+@pytest.mark.parametrize("name", ["ascii.gii", "ascii_flat_data.gii", "base64bin.gii"])
+def test_every_encoding_of_gifti_is_read(name):
+    points, faces = both(OF_NIBABEL / name)
+    found, corners = gifti.parse((OF_NIBABEL / name).read_bytes())
+    assert np.array_equal(found, points)
+    assert np.array_equal(corners, faces)
+
+
+def test_arrays_by_columns_and_of_the_other_byte_order_are_read():
+    text = '<GIFTI Version="1.0" NumberOfDataArrays="2">'
+    for values, kind, intent in ((VERTICES, "FLOAT32", "POINTSET"), (FACES, "INT32", "TRIANGLE")):
+        data = np.array(values, ">f4" if kind == "FLOAT32" else ">i4").tobytes("F")
+        text += (
+            f'<DataArray Intent="NIFTI_INTENT_{intent}" DataType="NIFTI_TYPE_{kind}" Dimensionality="2"'
+            ' Dim0="4" Dim1="3" ArrayIndexingOrder="ColumnMajorOrder" Encoding="Base64Binary"'
+            f' Endian="BigEndian"><Data>{base64.b64encode(data).decode()}</Data></DataArray>'
+        )
+    text = (text + "</GIFTI>").encode()
+    points, faces = (array.data for array in nib.GiftiImage.from_bytes(text).darrays)
+    assert gifti.parse(text)[0].tolist() == points.tolist() == VERTICES
+    assert gifti.parse(text)[1].tolist() == faces.tolist() == FACES
+
+
+def test_the_command_line_takes_them(tmp_path):
+    es.write_mesh(BALL, tmp_path / "lh.pial")
+    es.write_mesh(BALL, tmp_path / "ball.surf.gii")
+    for name in ("lh.pial", "ball.surf.gii"):
+        done = CliRunner().invoke(app, ["info", str(tmp_path / name)])
+        assert done.exit_code == 0, done.output
+        assert "320" in done.output
+        done = CliRunner().invoke(app, ["spectrum", str(tmp_path / name), "-k", "4"])
+        assert done.exit_code == 0, done.output
+    write_fields(BALL, tmp_path / "ball.func.gii", {"height": HEIGHT})
+    arguments = [str(tmp_path / name) for name in ("ball.surf.gii", "lh.white")]
+    done = CliRunner().invoke(app, ["repair", arguments[0], "-o", arguments[1]])
+    assert done.exit_code == 0, done.output
+    assert es.read_mesh(arguments[1]).n_faces == 320
+    assert [item.name for item in es.io.find_items(tmp_path)] == ["ball.surf"]
+    done = CliRunner().invoke(app, ["info", str(tmp_path / "ball.func.gii")])
+    assert done.exit_code == 1
+    assert "read_fields reads the functions" in " ".join(done.output.split())
+
+
+# Functions.
+
+
+@pytest.mark.parametrize("suffix", [".gii", ".func.gii", ".shape.gii"])
+def test_functions_in_gifti(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    fields = {"height": HEIGHT, "part": PARCELS.labels, "modes": BALL.vertices.astype(np.float32)}
+    write_fields(BALL, path, fields)
+    found = read_fields(path)
+    assert {name: values.tobytes() for name, values in found.items()} == {
+        "height": HEIGHT.tobytes(),
+        "part": PARCELS.labels.astype(np.int32).tobytes(),
+        "modes": fields["modes"].tobytes(),
+    }
+    read = nib.load(path)
+    names = [array.meta.get("Name") for array in read.darrays]
+    assert names[-5:] == ["height", "part", "modes", "modes", "modes"]
+    assert read.darrays[-5].data.tobytes() == HEIGHT.tobytes()
+    if suffix == ".gii":
+        mesh, attributes = es.read_mesh(path, attributes=True)
+        assert mesh.n_faces == BALL.n_faces
+        assert attributes.fields["modes"].shape == (BALL.n_vertices, 3)
+        es.write_mesh(mesh, path, attributes=attributes)
+        assert read_fields(path).keys() == fields.keys()
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *sorted(CORTICES.glob("*den-4k*[pk].*.gii")),
+        OF_NIBABEL / "task.func.gii",
+        OF_NIBABEL / "rh.shape.curv.gii",
+    ],
+    ids=lambda p: p.name,
+)
+def test_functions_are_what_nibabel_reads(path):
+    arrays = both(path)
+    (values,) = read_fields(path).values()
+    assert np.array_equal(values.reshape(len(values), -1), np.column_stack(arrays), equal_nan=True)
+
+
+@pytest.mark.parametrize("name", ["lh.thickness", "a.curv", "a.mgh", "a.mgz"])
+def test_one_function_in_files_of_freesurfer(tmp_path, name):
+    path = tmp_path / name
+    write_fields(TETRAHEDRON, path, {"thickness": FOUR})
+    assert read_fields(path)["values"].tobytes() == FOUR.tobytes()
+    data = path.read_bytes()
+    if ".mg" in name:
+        data = gzip.decompress(data) if name == "a.mgz" else data
+        read = np.asarray(nib.MGHImage.from_bytes(data).dataobj).ravel()
+    else:
+        read = freesurfer.read_morph_data(path)
+    assert read.astype(np.float32).tobytes() == FOUR.tobytes()
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.int16, np.int32, np.float32])
+@pytest.mark.parametrize("suffix", [".mgh", ".mgz"])
+def test_frames_of_mgh(tmp_path, kind, suffix):
+    table = np.arange(12).reshape(4, 3).astype(kind)
+    nib.save(nib.MGHImage(table.reshape(4, 1, 1, 3), np.eye(4)), tmp_path / f"a{suffix}")
+    found = read_fields(tmp_path / f"a{suffix}")["values"]
+    assert found.dtype == kind
+    assert np.array_equal(found, table)
+    write_fields(TETRAHEDRON, tmp_path / f"b{suffix}", {"any": table})
+    data = (tmp_path / f"b{suffix}").read_bytes()
+    read = nib.MGHImage.from_bytes(gzip.decompress(data) if suffix == ".mgz" else data)
+    assert np.array_equal(np.asarray(read.dataobj)[:, 0, 0], table)
+
+
+def test_dense_scalars_of_cifti(tmp_path):
+    path = tmp_path / "a.dscalar.nii"
+    left, right = FOUR, np.array([1, 2, np.nan, np.nan], np.float32)
+    fields = {
+        f"cortex_{side}:{name}": factor * values
+        for side, values in (("left", left), ("right", right))
+        for name, factor in (("myelin", np.float32(1)), ("two", np.float32(2)))
+    }
+    write_fields(TETRAHEDRON, path, fields)
+    found = read_fields(path)
+    assert {name: values.tobytes() for name, values in found.items()} == {
+        name: values.tobytes() for name, values in fields.items()
+    }
+    read = nib.load(path)
+    assert (
+        np.asarray(read.dataobj).tobytes()
+        == np.float32([[0.5, -1, 3, 1, 2], [1, -2, 6, 2, 4]]).tobytes()
+    )
+    (first, second) = [
+        model.vertex.tolist() for _, _, model in read.header.get_axis(1).iter_structures()
+    ]
+    assert (first, second) == ([0, 1, 3], [0, 1])
+
+
+def test_dense_scalars_of_voxels(tmp_path):
+    voxels = cifti2_axes.BrainModelAxis.from_mask(np.ones((2, 1, 1)), "thalamus_left", np.eye(4))
+    surface = cifti2_axes.BrainModelAxis.from_surface([1, 2], 4, "cortex_right")
+    image = nib.Cifti2Image(
+        np.float32([[1, 2, 3, 4]]), (cifti2_axes.ScalarAxis(["a"]), surface + voxels)
+    )
+    nib.save(image, tmp_path / "a.dscalar.nii")
+    found = read_fields(tmp_path / "a.dscalar.nii")
+    assert found["thalamus_left:a"].tolist() == [3, 4]
+    assert np.array_equal(found["cortex_right:a"], [np.nan, 1, 2, np.nan], equal_nan=True)
+
+
+# Parcels.
+
+
+@pytest.mark.parametrize("name", ["lh.aparc.annot", "ball.label.gii"])
+def test_parcels_read_back_with_names_and_colors(tmp_path, name):
+    path = tmp_path / name
+    write_parcellation(BALL, path, PARCELS)
+    found = read_parcellation(path, BALL)
+    assert np.array_equal(found.labels, PARCELS.labels)
+    assert found.names == PARCELS.names
+    np.testing.assert_allclose(found.colors, PARCELS.colors, atol=1e-15)
+
+
+def test_nibabel_reads_our_annotation_and_we_read_its(tmp_path):
+    write_parcellation(BALL, tmp_path / "a.annot", PARCELS)
+    labels, table, names = freesurfer.read_annot(tmp_path / "a.annot")
+    assert np.array_equal(labels, PARCELS.labels)
+    assert [name.decode() for name in names] == list(PARCELS.names)
+    assert np.array_equal(table[:, :4], [[255, 0, 0, 0], [0, 51, 255, 153], [0, 255, 0, 0]])
+    freesurfer.write_annot(tmp_path / "b.annot", labels, table, names)
+    found = read_parcellation(tmp_path / "b.annot", BALL)
+    assert np.array_equal(found.labels, PARCELS.labels)
+    assert found.names == PARCELS.names
+
+
+def test_an_annotation_of_the_first_version_is_read():
+    def numbers(*values):
+        return np.array(values, ">i4").tobytes()
+
+    data = numbers(2, 0, 255, 1, 0, 1, 1, 2) + b"a\0" + numbers(2) + b"x\0" + numbers(255, 0, 0, 0)
+    found = annotations.parse_parcels(data, 2)
+    assert found.labels.tolist() == [0, -1]
+    assert found.names == ("x",)
+
+
+def test_nibabel_reads_our_labels_and_we_read_its(tmp_path):
+    write_parcellation(BALL, tmp_path / "a.label.gii", PARCELS)
+    image = nib.load(tmp_path / "a.label.gii")
+    assert np.array_equal(image.darrays[0].data, PARCELS.labels + 1)
+    assert image.labeltable.get_labels_as_dict() == dict(enumerate(("???", *PARCELS.names)))
+    path = OF_NIBABEL / "rh.aparc.annot.gii"
+    image = nib.load(path)
+    found = gifti.parse_parcels(path.read_bytes(), 0)
+    names = image.labeltable.get_labels_as_dict()
+    keys = [label.key for label in image.labeltable.labels]
+    assert found.names == tuple(names.values())
+    assert np.array_equal(np.append(keys, 0)[found.labels], image.darrays[0].data)
+    colors = [label.rgba for label in image.labeltable.labels]
+    assert np.array_equal(found.colors, colors)
+    with pytest.raises(FileFormatError, match=r"must have a key and a color; '[?]{3}' has"):
+        gifti.parse_parcels((OF_NIBABEL / "label.gii").read_bytes(), 0)
+
+
+def test_a_label_file_is_one_parcel(tmp_path):
+    cap = Parcellation(np.where(BALL.vertices[:, 2] > 0.5, 0, -1), ("cap",))
+    write_parcellation(BALL, tmp_path / "a.label", cap)
+    assert np.array_equal(
+        freesurfer.read_label(tmp_path / "a.label"), np.flatnonzero(cap.labels == 0)
+    )
+    assert np.array_equal(read_parcellation(tmp_path / "a.label", BALL).labels, cap.labels)
+    assert annotations.parse_parcels(b"#!ascii none\n0\n", 3).labels.tolist() == [-1] * 3
+
+
+def test_parcels_of_another_surface_or_hemisphere_are_named(tmp_path):
+    path = tmp_path / "lh.aparc.annot"
+    right = es.TriangleMesh(BALL.vertices + 3.0, BALL.faces)
+    write_parcellation(BALL, path, PARCELS)
+    with pytest.raises(
+        FileFormatError, match="each of 42 vertices; it has 162, so it belongs to another"
+    ):
+        read_parcellation(path, es.icosphere(1))
+    with pytest.raises(
+        FileFormatError, match=r"the left one \(lh.aparc.annot\), and the surface lies on the right"
+    ):
+        read_parcellation(path, right)
+    path = tmp_path / "sub-01_hemi-R.label.gii"
+    write_parcellation(BALL, path, PARCELS)
+    assert read_parcellation(path, right).names == PARCELS.names
+    left = es.TriangleMesh(BALL.vertices - 3.0, BALL.faces)
+    with pytest.raises(FileFormatError, match="hemisphere of the surface; it is of the right one"):
+        read_parcellation(path, left)
+    text = path.read_bytes().replace(
+        b"<MetaData />",
+        b"<MetaData><MD><Name>AnatomicalStructurePrimary</Name><Value>CortexLeft</Value></MD></MetaData>",
+        1,
+    )
+    path.write_bytes(text)
+    with pytest.raises(FileFormatError, match=r"the left one \(CortexLeft\)"):
+        read_parcellation(path, right)
+    with pytest.raises(FileFormatError, match="table of names and colors; it has none"):
+        read_parcellation(
+            CORTICES / f"{LEFT}medmask.label.gii",
+            es.read_mesh(CORTICES / f"{LEFT}midthickness.surf.gii"),
+        )
+    with pytest.raises(es.InvalidParameterError, match="a label for each of 42 vertices"):
+        write_parcellation(es.icosphere(1), path, PARCELS)
+
+
+# Skeletons.
+
+SKELETON = b"# a neuron\n1 1 0 0 0 2.0 -1\n2 3 1 0 0 1.0 1\n7 3 2 0 0 1.0 2\n9 3 1 1 0 0.5 2\n"
+
+
+def test_a_skeleton_is_a_graph(tmp_path):
+    (tmp_path / "a.swc").write_bytes(SKELETON)
+    shape = es.read_shape(tmp_path / "a.swc")
+    assert shape.simplices.tolist() == [[1, 0], [2, 1], [3, 1]]
+    assert shape.points.tolist() == [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]]
+    assert es.solve_spectrum(es.cotangent_laplacian(shape), 2).eigenvalues[0] < 1e-9
+
+
+# What is wrong is named.
+
+LABELS = gifti.format_parcels(TETRAHEDRON, Parcellation([0, 1, 0, -1], ("x", "y")), ".label.gii")
+ANNOTATION = annotations.format_parcels(
+    TETRAHEDRON, Parcellation([0, 1, 0, -1], ("x", "y")), ".annot"
+)
+SURFACE = gifti.format_fields(TETRAHEDRON, {}, {})
+MAPS = gifti.format_maps(TETRAHEDRON, {"a": FOUR, "b": FOUR}, ".func.gii")
+CURVATURE = fs.format_maps(TETRAHEDRON, {"a": FOUR}, ".curv")
+MGH = fs.format_maps(TETRAHEDRON, {"a": FOUR}, ".mgh")
+CIFTI = cifti.format_maps(TETRAHEDRON, {"cortex_left:a": FOUR}, ".dscalar.nii")
+
+
+def parcels(parse):
+    return lambda data: parse(data, 4)
+
+
+def words(start, *values):
+    """Return an annotation whose numbers from one on are others."""
+    data = bytearray(ANNOTATION)
+    data[start : start + 4 * len(values)] = np.array(values, ">i4").tobytes()
+    return bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("parse", "data", "message"),
+    [
+        (gifti.parse, MAPS, "one array NIFTI_INTENT_POINTSET; it has 0"),
+        (
+            gifti.parse,
+            SURFACE.replace(b'Dimensionality="2"', b'Dimensionality="1"'),
+            "takes 16 bytes|must unpack",
+        ),
+        (gifti.parse, SURFACE.replace(b"INT32", b"FLOAT32"), "three numbers a row"),
+        (gifti.parse, SURFACE.replace(b"INT32", b"COMPLEX"), "declare their type"),
+        (
+            gifti.parse,
+            SURFACE.replace(b'Dim0="4"', b'Dim0="-4"'),
+            "declare their type, byte order and size",
+        ),
+        (gifti.parse, SURFACE.replace(b'Dim0="4"', b'Dim0="4000000000"'), "must unpack to at most"),
+        (
+            gifti.parse,
+            SURFACE.replace(b"GZipBase64Binary", b"ExternalFileBinary"),
+            "Save it with the data inside",
+        ),
+        (gifti.parse, SURFACE.replace(b"GZipBase64Binary", b"ASCII"), "must be of numbers"),
+        (gifti.parse, SURFACE.replace(b"GZipBase64Binary", b"Base64Binary"), "takes 48 bytes, not"),
+        (gifti.parse, SURFACE.replace(b"<Data>", b"<Data>!"), "must be in base64"),
+        (
+            gifti.parse,
+            SURFACE.replace(b"DOCTYPE GIFTI", b"DOCTYPE GIFTI [<!ENTITY a 'a'>]"),
+            "declares entities",
+        ),
+        (gifti.parse, SURFACE[:-3], "must be whole XML"),
+        (
+            gifti.parse,
+            SURFACE.replace(b'Arrays="2"', b'Arrays="3"'),
+            "hold the arrays that it declares",
+        ),
+        (
+            gifti.parse_fields,
+            MAPS.replace(b"INTENT_NONE", b"INTENT_NODE_INDEX"),
+            "a value for every vertex",
+        ),
+        (parcels(gifti.parse_parcels), MAPS, "one array NIFTI_INTENT_LABEL; it has 0"),
+        (
+            parcels(gifti.parse_parcels),
+            re.sub(rb'Red="[\d.]+"', b"", LABELS),
+            "must have a key and a color; 'x' has",
+        ),
+        (
+            parcels(gifti.parse_parcels),
+            re.sub(rb'Red="[\d.]+"', b'Red="2"', LABELS),
+            "a key and a color; 'x' has",
+        ),
+        (
+            parcels(gifti.parse_parcels),
+            re.sub(rb"<Label .*?/Label>", b"", LABELS),
+            "of names and colors; it has none",
+        ),
+        (
+            parcels(gifti.parse_parcels),
+            LABELS.replace(b'Key="2"', b'Key="9"'),
+            "stand in its table; that of vertex 1 is 2",
+        ),
+        (fs.parse, CURVATURE, "must begin with the bytes ff ff fe; it begins with ff ff ff"),
+        (fs.parse, fs.format_binary(TETRAHEDRON)[:-2], "must hold what it declares"),
+        (fs.parse_fields, CURVATURE + b"0", "more follows"),
+        (fs.parse_fields, CURVATURE[:14] + b"\2" + CURVATURE[15:], "one number a vertex; it has 2"),
+        (fs.parse_fields, MGH[:11] + b"\2" + MGH[12:], "n x 1 x 1 x frames"),
+        (fs.parse_fields, MGH[:-1], "must hold what it declares"),
+        (fs.parse_fields, gzip.compress(MGH)[:-30], "must hold what it declares|must be whole"),
+        (
+            fs.parse_fields,
+            gzip.compress(MGH[:7] + b"\x7f" + MGH[8:16] + b"\x7f" + MGH[17:]),
+            "must unpack to at most|n x 1 x 1|must be whole",
+        ),
+        (
+            parcels(annotations.parse_parcels),
+            words(4, 3),
+            "each of its 4 vertices once; it does not list 0",
+        ),
+        (
+            parcels(annotations.parse_parcels),
+            ANNOTATION[:36],
+            "names and colors after its 4 vertices; it has none",
+        ),
+        (parcels(annotations.parse_parcels), words(36, 0), "it has none"),
+        (parcels(annotations.parse_parcels), words(40, -3), "must be 1 or 2; it is 3"),
+        (
+            parcels(annotations.parse_parcels),
+            words(8, 77),
+            "stand in its table; that of vertex 0 is 77",
+        ),
+        (
+            parcels(annotations.parse_parcels),
+            words(len(ANNOTATION) - 4, 999),
+            "must lie in 0..255; that of 'y'",
+        ),
+        (
+            parcels(annotations.parse_parcels),
+            b"#!ascii\n2\n0 0 0 0 0\n",
+            "it declares 2 and holds 1",
+        ),
+        (
+            parcels(annotations.parse_parcels),
+            b"#!ascii\n1\n4 0 0 0 0\n",
+            "vertices are 0..3; it lists 4",
+        ),
+        (cifti.parse_fields, CIFTI[:-9], f"uncompressed; {len(CIFTI)} bytes do not fit into its"),
+        (cifti.parse_fields, CIFTI.replace(b"n+2", b"n+3"), "-1: the header is damaged"),
+        (
+            cifti.parse_fields,
+            CIFTI.replace(b"BrainModel", b"BrainNodel"),
+            "functions on brain models",
+        ),
+        (swc.parse, b"1 1 0 0 0 2.0\n", "rows of seven numbers"),
+        (swc.parse, b"", "rows of seven numbers"),
+        (swc.parse, SKELETON.replace(b"7 3", b"2 3"), "must differ; 2 occurs twice"),
+        (swc.parse, SKELETON.replace(b"0.5 2", b"0.5 4"), "that of point 9 is 4"),
+    ],
+)
+def test_errors_of_reading(parse, data, message):
+    with pytest.raises(FileFormatError, match=message):
+        parse(data)
+
+
+def test_a_surface_is_checked_as_any_other(tmp_path):
+    path = tmp_path / "a.gii"
+    bad = gifti.format_fields(TETRAHEDRON, {}, {})
+    image = nib.GiftiImage.from_bytes(bad)
+    image.darrays[1].data[2, 1] = 9
+    path.write_bytes(image.to_bytes())
+    with pytest.raises(InvalidShapeError, match=r"index vertices 0..3; face 2 is \[1, 9, 3\]"):
+        es.read_mesh(path)
+    image.darrays[0].data[1] = np.nan
+    path.write_bytes(image.to_bytes())
+    with pytest.raises(InvalidShapeError, match="must be finite; vertex 1"):
+        es.read_mesh(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "fields", "message"),
+    [
+        ("a.gii", {"a": np.arange(3)}, "must have a row for each"),
+        ("a.func.gii", {"a": np.arange(320)}, "hold functions on vertices; 'a' is on faces"),
+        ("a.gii", {"a": np.arange(320)}, "GIFTI files hold functions on vertices"),
+        (
+            "a.func.gii",
+            {"a": np.full(162, 1e300)},
+            "fit into 32 bits; that of 'a' at vertex 0 is 1e",
+        ),
+        ("a.func.gii", {"a": np.full(162, 2**40)}, "fit into 32 bits"),
+        ("a.curv", {"a": HEIGHT, "b": HEIGHT}, "one function, without a name; there are 2"),
+        ("a.curv", {"a": BALL.vertices}, "holds one number a vertex; there are 3"),
+        ("a.dscalar.nii", {"a": HEIGHT}, "must begin with cortex_left: or cortex_right:"),
+        ("a.dscalar.nii", {"cortex_left:a": HEIGHT, "cortex_right:b": HEIGHT}, "same functions"),
+        ("a.dscalar.nii", {}, "same functions, and at least one"),
+    ],
+)
+def test_errors_of_writing_functions(tmp_path, name, fields, message):
+    with pytest.raises((FileFormatError, es.InvalidParameterError), match=message):
+        write_fields(BALL, tmp_path / name, fields)
+
+
+@pytest.mark.parametrize(
+    ("name", "colors", "message"),
+    [
+        ("a.label", None, "holds one parcel; there are 3"),
+        (
+            "a.annot",
+            np.ones((3, 4)),
+            "must differ in their colors, and none is black; that of 'low'",
+        ),
+        ("a.annot", [[1, 0, 0, 1], [0, 0, 0, 1], [0, 1, 0, 1]], "none is black; that of 'middle'"),
+    ],
+)
+def test_errors_of_writing_parcels(tmp_path, name, colors, message):
+    with pytest.raises(FileFormatError, match=message):
+        write_parcellation(
+            BALL, tmp_path / name, Parcellation(PARCELS.labels, PARCELS.names, colors)
+        )
+
+
+def test_what_else_a_file_holds_is_named(tmp_path):
+    write_parcellation(BALL, tmp_path / "a.annot", PARCELS)
+    with pytest.raises(FileFormatError, match="read_parcellation reads the parcels"):
+        es.read_mesh(tmp_path / "a.annot")
+    write_fields(BALL, tmp_path / "lh.sulc", {"a": HEIGHT})
+    with pytest.raises(
+        FileFormatError, match=r"it is '.curv'. es.io.read_fields reads the functions"
+    ):
+        es.read_mesh(tmp_path / "lh.sulc")
+
+
+def test_without_nibabel_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("eigenshape.io.formats.neuro.shared.import_module", _no_module)
+    with pytest.raises(es.MissingExtraError, match=r"eigenshape\[neuro\]"):
+        es.write_mesh(BALL, tmp_path / "a.gii")
+
+
+def _no_module(name):
+    raise ImportError(name)
+
+
+FILES = {
+    "surface": (gifti.parse, SURFACE),
+    "maps": (gifti.parse_fields, MAPS),
+    "labels": (parcels(gifti.parse_parcels), LABELS),
+    "freesurfer": (fs.parse, fs.format_binary(TETRAHEDRON)),
+    "curvature": (fs.parse_fields, CURVATURE),
+    "mgh": (fs.parse_fields, MGH),
+    "mgz": (fs.parse_fields, fs.format_maps(TETRAHEDRON, {"a": FOUR}, ".mgz")),
+    "annotation": (parcels(annotations.parse_parcels), ANNOTATION),
+    "label": (parcels(annotations.parse_parcels), b"#!ascii label\n2\n0 0 0 0 0\n3 0 0 1 0\n"),
+    "cifti": (cifti.parse_fields, CIFTI),
+    "skeleton": (swc.parse, SKELETON),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_damaged_files_are_refused_or_read(name):
+    """Of each format 300 files: cut off, with bits flipped, with a number or a word changed."""
+    parse, good = FILES[name]
+    rng = np.random.default_rng(1)
+    n_refused = 0
+    for trial in range(300):
+        bad = bytearray(good)
+        place = int(rng.integers(len(bad)))
+        if trial % 3 == 0:
+            del bad[place:]
+        elif trial % 3 == 1:
+            for each in rng.integers(len(bad), size=rng.integers(1, 5)):
+                bad[each] ^= 1 << int(rng.integers(8))
+        else:
+            pieces = [
+                b"\x7f\xff\xff\xff",
+                b"\xff" * 4,
+                b"\0" * 4,
+                b"9" * 9,
+                b"-1",
+                b"nan",
+                b"<",
+                b'"',
+            ]
+            bad[place : place + 4] = pieces[int(rng.integers(len(pieces)))]
+        try:
+            with np.errstate(all="ignore"):
+                parse(bytes(bad))
+        except es.EigenshapeError:
+            n_refused += 1
+    # What is cut off is refused, but for the end of text.
+    assert n_refused >= 80
