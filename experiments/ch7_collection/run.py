@@ -1,4 +1,4 @@
-"""Landmarks of a few skulls carried to others: how far from where an expert put them?
+"""Landmarks of a few skulls carried to others: how far are they from where an expert put them.
 
 Constants were chosen on the tuning strains alone; the errors are those of the reporting strains.
 """

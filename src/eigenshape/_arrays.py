@@ -66,7 +66,7 @@ def record(kind: type[T]) -> type[T]:
 
     Whether arrays are equal has no one answer, so values that hold arrays are not compared.
     """
-    return dataclass(frozen=True, eq=False, repr=not issubclass(kind, ReadOnly))(kind)
+    return dataclass(frozen=True, eq=False)(kind)
 
 
 def _arrays_of(entry: Any) -> Iterator[NDArray[Any]]:

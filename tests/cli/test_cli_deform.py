@@ -156,7 +156,8 @@ def test_words_for_handles(giraffe):
         (["--region", "head", "--move", "0,1,0"], "A region is one of these"),
         (
             ["--region", "head", "--move", "0,1,0", "-o", "a.txt"],
-            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtk, .npz; a.txt",
+            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtk, .npz, "
+            ".gii, .surf; a.txt",
         ),
         (
             ["--region", "head", "--move", "0,1,0", "-o", "nowhere/a.obj"],

@@ -81,7 +81,8 @@ def test_without_repairs_it_converts(tmp_path):
         ),
         (
             ("--repair", "weld", "-o", "{folder}/b.dxf"),
-            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtk, .npz, .gii, .surf; ",
+            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtk, .npz, "
+            ".gii, .surf; ",
         ),
         (
             ("--repair", "weld", "-o", "{folder}/no/b.ply"),

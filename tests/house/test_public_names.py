@@ -15,8 +15,8 @@ import eigenshape as es
 
 SOURCE = Path(es.__file__).parent
 ROOMS = {
-    "calculus", "collections", "compat", "compat.lapy", "deformation", "features", "geometry", "io", "matching", "modes",
-    "morphometrics", "operators", "plot", "retrieval", "scans", "shapes", "spectral", "stability", "types",
+    "calculus", "collections", "compat", "compat.lapy", "deformation", "features", "geometry", "io", "matching",
+    "modes", "morphometrics", "operators", "plot", "retrieval", "scans", "shapes", "spectral", "stability", "types",
 }  # fmt: skip
 PROMISED = {
     "read_mesh", "write_mesh", "TriangleMesh", "partial_scan", "make_creature", "cotangent_laplacian",

@@ -71,6 +71,8 @@ def test_a_surface_of_freesurfer_is_known_by_its_first_bytes(tmp_path):
     assert np.array_equal(mesh.vertices, BALL.vertices.astype(np.float32))
     assert np.array_equal(mesh.faces, BALL.faces)
     assert es.read_shape(tmp_path / "fs.white").n_faces == BALL.n_faces
+    data = (tmp_path / "fs.white").read_bytes().replace(b"\n\n", b"\nof a scanner\n", 1)
+    assert np.array_equal(fs.parse(data)[1], BALL.faces)
     (tmp_path / "other.white").write_bytes(b"abcdef")
     with pytest.raises(FileFormatError, match="of a known format"):
         es.read_mesh(tmp_path / "other.white")

@@ -76,6 +76,7 @@ def shared_names(folder: Path) -> dict[str, Any]:
         "points": 0.9 * mesh.vertices[:7],
         "path": str(folder / "shape.off"),
         "points_path": str(folder / "points.ply"),
+        "field_path": str(folder / "height.vtu"),
         "new_path": str(folder / "new.obj"),
         "sheet_values": sheet.vertices[:, 0] ** 2,
         "segments": np.column_stack([np.arange(len(rim)), np.roll(np.arange(len(rim)), -1)]),
@@ -104,6 +105,8 @@ def shared_names(folder: Path) -> dict[str, Any]:
         "holes": np.where(mesh.vertices[:, 2] > 0.7, np.nan, mesh.vertices[:, 1]),
         "hetero": 1 + 0.3 * mesh.vertices[:, 1],
         "ext_input": np.outer(mesh.vertices[:, 1], np.linspace(0, 1, 30) ** 2),
+        "keep": mesh.vertices[:, 2] < 0.6,
+        "parcels": np.digitize(mesh.vertices[:, 0], [-0.3, 0.4]),
         "pair": np.array(mesh.vertices[:, :2]),
         "k": 12,
         "n": 20,
@@ -192,7 +195,7 @@ def names_of_neuromodes(shared: dict[str, Any]) -> dict[str, Any]:
     tria = lapy.TriaMesh(shared["V"].copy(), shared["F"].copy())
     solver = neuromodes.EigenSolver(tria).solve(36)
     names: dict[str, Any] = {}
-    for module in ("basis", "eigen", "network", "nulls", "stats", "waves"):
+    for module in ("basis", "eigen", "io", "mesh", "network", "nulls", "stats", "waves"):
         names |= vars(import_module(f"neuromodes.{module}"))
     return names | {
         "EigenSolver": Instance(neuromodes.EigenSolver, lambda: solver),

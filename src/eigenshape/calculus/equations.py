@@ -330,4 +330,4 @@ def _add(one: Float[np.ndarray, "n ..."], two: Float[np.ndarray, "n ..."]) -> np
     """Add functions; one function is added to each of several."""
     if one.ndim != two.ndim:
         one, two = one.reshape(len(one), -1), two.reshape(len(two), -1)
-    return np.asarray(one + two)
+    return one + two

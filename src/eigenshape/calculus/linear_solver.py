@@ -186,7 +186,7 @@ class LinearSolver(ReadOnly):
         members = sp.csr_array(
             (np.ones(len(points)), (self.floating[points], points)), shape=(count, self.n_points)
         )
-        return np.asarray(members @ load)
+        return members @ load
 
     def _without_means(self, found: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
         """Subtract the weighted mean over each floating component."""

@@ -111,7 +111,7 @@ def align_surfaces(surface: MeshLike, whole: MeshLike) -> Similarity:
     Returns
     -------
     Similarity
-        It places `surface` on `whole`. A `gap` above about 0.55 means that no good place is known.
+        It places `surface` on `whole`. A `gap` above about 0.4 means that no good place is known.
         It is `reflected` only where the mirror image has less than 0.7 of the gap. A form with two
         equal sides lies as well both ways, so that nothing tells whether it is reflected.
 

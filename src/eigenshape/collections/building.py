@@ -342,10 +342,9 @@ def _fit_again(
     faces: np.ndarray, modes: np.ndarray, starts: Mapping[Path, _Start], path: Path
 ) -> SurfaceFit:
     start = starts[path]
-    shape = np.tensordot(start.coefficients, modes, 1)
+    source = TriangleMesh(np.tensordot(start.coefficients, modes, 1), faces)
     target = read_specimen(path)[0]
-    source = TriangleMesh(shape, faces)
-    return bend_placed(shape, source, start.placing.inverse(), target, SECOND_LEVELS)
+    return bend_placed(source, start.placing.inverse(), target, SECOND_LEVELS)
 
 
 def _digest(*arrays: np.ndarray) -> str:

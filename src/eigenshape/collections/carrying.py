@@ -26,7 +26,9 @@ ERROR_OF_ONE = 0.037
 # Labelled specimens that the mean error of all landmarks counts for in the error of each
 N_PRIOR = 2.0
 FAR = 0.05  # gap from which a person should look, in root mean square radii
-WRONG_LABEL = 5.0  # expected errors between a label and its carried place, from which to look
+WRONG_LABEL = (
+    5.0  # median errors between a given landmark and its carried place, from which to look
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +158,8 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     for number, row in enumerate(rows):
         known = np.isfinite(given[number]).all(axis=1)
         away = np.linalg.norm(carried[number] - given[number], axis=1)
-        doubtful[row, known] = (away > WRONG_LABEL * spread[row])[known]
+        usual = radii[row] * np.sqrt(np.nanmedian(squares)) if n_known.any() else np.inf
+        doubtful[row, known] = (away > WRONG_LABEL * usual)[known]
         points[row, known] = given[number, known]
         spread[row, known] = 0
     return CarriedLandmarks(collection.names, names, points, spread, doubtful)

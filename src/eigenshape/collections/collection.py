@@ -20,7 +20,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward, outward_vote
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.io.mesh_files import read_mesh, write_mesh
-from eigenshape.io.surfaces import read_surface
+from eigenshape.io.surface_files import read_surface
 
 VERSION = 1  # of the folder's layout
 TABLE, MEAN = "collection.json", "mean.ply"

@@ -19,7 +19,7 @@ from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.measure import area_vectors, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import boundary_vertices
+from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.matching.match import match_shapes
 
 # Lengths are in units of the root mean square distance of the placed source from its middle. All
@@ -41,9 +41,10 @@ SPACING = 0.7  # of centers of displacements, in widths
 FAR = 0.05  # gap at which the confidence is at most a quarter
 ON_RIM = 1e-9  # weight of inner vertices below which a point lies on the rim of a surface
 UNMATCHED = 0.1  # distance from which a point has no counterpart
-NOT_PLACED = 0.55  # gap from which no similarity fits; whole skulls have 0.1, halves up to 0.4
-# Gap after bending from which the poses may differ, and another way is tried
-POSES_DIFFER = 0.12
+# Misfit after bending from which the poses may differ, so that another start is tried, and from
+# which a form is of another kind: skulls of mice have 0.01 to 0.02, creatures in another pose 0.01
+# to 0.04, other kinds 0.25 to 0.55.
+POSES_DIFFER, NOT_ALIKE = 0.03, 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +58,14 @@ class SurfaceFit(ReadOnly):
     gaps : (n,) float
         Distance of each to the target, in length of the target.
     confidence : (n,) float
-        From 1, on the target and facing the same way, to 0: cos⁺ / (1 + (gap / 0.05 r)²)², with the
-        angle of the normals there and the root mean square radius r. 0 beyond a rim of the target.
+        From 1, on the target and facing the same way, to 0: min(2 cos⁺, 1) / (1 + (gap / 0.05 r)²)²,
+        with the angle of the normals there and the root mean square radius r. 0 beyond a rim of the
+        target.
     gap : float
         0 to 1: the mean of d² / (d² + (0.1 r)²), with the distance d of the target's points to the
         bent source.
+    strain : float
+        Standard deviation of the logarithms by which edges became longer, where nothing is missing.
     missing : float
         Share of the source's area that is beyond a rim of the target, or more than 0.1 r away.
     excess : float
@@ -80,12 +84,18 @@ class SurfaceFit(ReadOnly):
     gaps: Float[np.ndarray, " n"]
     confidence: Float[np.ndarray, " n"]
     gap: float
+    strain: float
     missing: float
     excess: float
     reflected: bool
     method: Literal["position", "intrinsic"]
 
     __repr__ = short_repr
+
+    @property
+    def misfit(self) -> float:
+        """The gap and the square of the strain: 0.01 to 0.02 between skulls of mice, 0.25 to a hand."""
+        return self.gap + self.strain**2
 
 
 @one_blas_thread()
@@ -99,8 +109,9 @@ def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
        and Song 2010). Kernels become narrower in four levels. Pairs count less with their distance
        and with the angle of their normals, so that what has no partner hardly acts: loose pieces,
        pores, what is missing.
-    3. If much of the target is not reached, the poses may differ: `match_shapes` gives another
-       start, and the better of both results is returned. `method` says which.
+    3. If parts of the target are not reached or the source is strained, the poses may differ:
+       `match_shapes` gives another start, and the result with the smaller `misfit` is returned.
+       `method` says which.
 
     Parameters
     ----------
@@ -116,7 +127,7 @@ def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
     Raises
     ------
     InvalidShapeError
-        If a surface has no area, or the target cannot be placed on the source.
+        If a surface has no area, or the target is of another form.
 
     See Also
     --------
@@ -135,44 +146,39 @@ def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
     (True, 'position', False)
     """
     source, target = as_mesh(source, "source"), as_mesh(target, "target")
-    found = align_surfaces(target, source)
-    fit = None
-    if found.gap < NOT_PLACED:
-        fit = bend_placed(source.vertices, source, found, target, LEVELS)
-    if fit is None or fit.gap > POSES_DIFFER:
+    fit = bend_placed(source, align_surfaces(target, source), target, LEVELS)
+    if fit.misfit > POSES_DIFFER:
         try:
             image = match_shapes(source, target).pull(target.vertices)
         except EigenshapeError:  # what it refuses, such as needles, is no fault here
             image = None
         if image is not None:
-            other = bend_onto(TriangleMesh(image, source.faces), target, LEVELS)
-            if other.gap < (NOT_PLACED if fit is None else fit.gap):
-                fit = replace(other, method="intrinsic")
-    if fit is None:
+            other = replace(bend_onto(source, image, target, LEVELS), method="intrinsic")
+            fit = min(fit, other, key=lambda each: each.misfit)
+    if fit.misfit > NOT_ALIKE:
         raise InvalidShapeError(
-            "The target must have about the form of the source, and half of it at least; its gap "
-            f"to the source is {found.gap:.2f} after the best similarity, and the most is "
-            f"{NOT_PLACED}."
+            "The target must have about the form of the source, and half of it at least; after "
+            f"bending the misfit is {fit.misfit:.2f}, and the most is {NOT_ALIKE}."
         )
     return fit
 
 
 def bend_placed(
-    vertices: Float[np.ndarray, "n 3"],
-    source: TriangleMesh,
-    found: Similarity,
-    target: TriangleMesh,
-    levels: Levels,
+    source: TriangleMesh, found: Similarity, target: TriangleMesh, levels: Levels
 ) -> SurfaceFit:
-    """Bend vertices with the faces of a source onto a target that a similarity places on them."""
+    """Bend a source onto a target that a similarity places on it."""
+    start = found.inverse().move(source.vertices)
     # A reflected surface faces outward if its faces are turned.
     faces = source.faces[:, ::-1] if found.reflected else source.faces
-    placed = TriangleMesh(found.inverse().move(vertices), faces)
-    return replace(bend_onto(placed, target, levels), reflected=found.reflected)
+    fit = bend_onto(TriangleMesh(source.vertices, faces), start, target, levels)
+    return replace(fit, reflected=found.reflected)
 
 
-def bend_onto(placed: TriangleMesh, target: TriangleMesh, levels: Levels) -> SurfaceFit:
-    """Bend a surface that lies nearly on another one onto it."""
+def bend_onto(
+    source: TriangleMesh, start: Float[np.ndarray, "n 3"], target: TriangleMesh, levels: Levels
+) -> SurfaceFit:
+    """Bend a source onto a target, from where its vertices lie nearly on it."""
+    placed = TriangleMesh(start, source.faces)
     ours = spread_points(placed, N_POINTS)
     middle = ours.points.mean(axis=0)
     size = float(np.sqrt(np.mean(np.sum((ours.points - middle) ** 2, axis=1))))
@@ -221,16 +227,23 @@ def bend_onto(placed: TriangleMesh, target: TriangleMesh, levels: Levels) -> Sur
     # What is nearest to a rim is beyond it.
     inside = ~np.isin(np.arange(target.n_vertices), boundary_vertices(target))
     beyond = np.sum(nearest.weights * inside[target.faces[nearest.simplices]], axis=1) < ON_RIM
-    confidence = np.where(
-        beyond, 0, np.clip(cosines, 0, 1) * (1 + (gaps / (FAR * size)) ** 2) ** -2
-    )
+    confidence = np.clip(2 * cosines, 0, 1) * (1 + (gaps / (FAR * size)) ** 2) ** -2
+    unmatched = beyond | (gaps > UNMATCHED * size)
     areas = dual_volumes(placed)
+    edges = edge_table(source).edges
+    before, after = (
+        np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+        for points in (source.vertices, vertices)
+    )
+    kept = ~unmatched[edges].any(axis=1) & (before > 0) & (after > 0)
+    stretch = np.log(after[kept] / before[kept])
     return SurfaceFit(
         vertices=moved,
         gaps=gaps,
-        confidence=confidence,
+        confidence=np.where(beyond, 0, confidence),
         gap=float(np.mean(far**2 / (far**2 + ON_SURFACE**2))),
-        missing=float(areas @ (beyond | (gaps > UNMATCHED * size)) / areas.sum()),
+        strain=float(np.std(stretch)) if len(stretch) else 1.0,
+        missing=float(areas @ unmatched / areas.sum()),
         excess=float(np.mean(far > UNMATCHED)),
         reflected=False,
         method="position",

@@ -141,7 +141,7 @@ def transfer_deformation(
 def _center(
     points: Float[np.ndarray, "n 3"], areas: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, " 3"]:
-    return np.asarray((areas / areas.sum()) @ points)
+    return (areas / areas.sum()) @ points
 
 
 def _turn_edges(target: TriangleMesh, turns: Turns) -> Float[np.ndarray, "n 3"]:

@@ -174,7 +174,7 @@ def region_mask(mesh: MeshLike, region: Region) -> Bool[np.ndarray, " n"]:
     if isinstance(region, BrushRegion):
         nearest = int(cKDTree(mesh.vertices).query(region.center)[1])
         distances = geodesic_distances(mesh, [nearest], reach=region.radius)[0]
-        return np.asarray(distances <= region.radius)
+        return distances <= region.radius
     chosen = _entries(region)
     if chosen.dtype == bool:
         if chosen.shape != (mesh.n_vertices,):

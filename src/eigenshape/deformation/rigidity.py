@@ -248,4 +248,4 @@ def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray,
     left, _, right = np.linalg.svd(matrices)
     # A reflection becomes a rotation by a change of sign along the smallest singular value.
     left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
-    return np.asarray(left @ right)
+    return left @ right

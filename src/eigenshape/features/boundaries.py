@@ -1,14 +1,12 @@
 """Smooth the boundaries between parts: move each to a shortest cut that follows creases."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values
+from eigenshape._arrays import positive_values, record
 from eigenshape.features.segmentation import Segmentation, adjacent_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facet_lists import label_components
@@ -120,7 +118,7 @@ def move_boundaries(
     return Segmentation(labels, segmentation.features)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Network:
     """Graph of faces joined over edges, for a mesh scaled to unit size.
 

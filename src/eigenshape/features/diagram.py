@@ -1,12 +1,10 @@
 """Persistence diagrams: where components of level sets begin and end, and how far two are apart."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, vertex_values
+from eigenshape._arrays import ReadOnly, record, vertex_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import Shown
 from eigenshape._typing import ArrayLike
@@ -24,7 +22,7 @@ N_NEIGHBORS = 10
 Points = Float[np.ndarray, "_ 2"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PersistencePairs(ReadOnly):
     """Pairs of vertices at which a class of homology begins and ends.
 
@@ -56,7 +54,7 @@ class PersistencePairs(ReadOnly):
         return np.abs(self.births - self.deaths)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PersistenceDiagram(Shown):
     """Persistence of a function on a shape, in dimension 0, and its essential loops.
 

@@ -1,13 +1,13 @@
 """Essential loops of curves and surfaces, paired by extended persistence."""
 
 from collections import defaultdict
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import breadth_first_order
 
+from eigenshape._arrays import record
 from eigenshape.features.merge_loops import spanning_forest
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.facets import facet_table
@@ -74,7 +74,7 @@ def extended_loops(mesh: Mesh, order: Int[np.ndarray, " n"]) -> Int[np.ndarray, 
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Complex:
     """The two vertices and the two faces of each edge; `n_faces` stands for a missing face."""
 
@@ -106,7 +106,7 @@ def _build_complex(mesh: Mesh) -> _Complex | None:
     return _Complex(edges, sides, len(face_edges))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Generators:
     """Edges of the two spanning trees, and the other edges in the order of entry."""
 
@@ -124,7 +124,7 @@ def _find_generators(complex_: _Complex, order: Int[np.ndarray, " n"]) -> _Gener
     return _Generators(tree, cotree, entering[~(tree | cotree)[entering]])
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _RootedForest:
     """Trees below one common root.
 

@@ -1,13 +1,12 @@
 """How clearly people see two parts: by heat flow, creases, thickness and lines of sight."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
+from eigenshape._arrays import record
 from eigenshape.features.contrast import FINE_CONTRAST, PART_CONTRAST
 from eigenshape.features.part_merging import (
     PART_TIME,
@@ -109,7 +108,7 @@ def weigh_parts(
     return tree_of_merges(Segmentation(tree.basins, points), merges)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Parts:
     """What is measured of parts, for a surface of area 1.
 

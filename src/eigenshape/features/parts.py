@@ -1,11 +1,11 @@
 """Find the parts of a mesh: limbs, head, torso."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, finite_values, whole_number
+from eigenshape._arrays import ReadOnly, finite_values, record, whole_number
 from eigenshape._progress import Progress
 from eigenshape.features.boundaries import CONCAVITY, move_boundaries, smooth_boundaries
 from eigenshape.features.contrast import FINE_CONTRAST, contrast_at
@@ -29,7 +29,7 @@ from eigenshape.spectral.spectrum import Spectrum
 N_MODES = 25
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PartDecomposition(ReadOnly):
     """The parts of a surface and the intermediate results of `find_parts`.
 

@@ -1,15 +1,13 @@
 """Trees of regions of a surface: which region merges into which, and when."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape.geometry.facet_lists import label_components
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class RegionTree(ReadOnly):
     """What `MergeTree` and `PartTree` have in common, and all that `segment` needs to cut either.
 
@@ -23,7 +21,7 @@ class RegionTree(ReadOnly):
     basins: Int[np.ndarray, " f"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MergeTree(RegionTree):
     """The maxima of a function on a surface, and the saddles at which their regions merge.
 
@@ -67,7 +65,7 @@ class MergeTree(RegionTree):
     saddles: Int[np.ndarray, "m 2"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PartTree(RegionTree):
     """The parts of a surface, and the parts from which they split.
 

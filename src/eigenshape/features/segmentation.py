@@ -1,12 +1,10 @@
 """Cut a merge tree, by number or by persistence, into parts around feature points."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, whole_number
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -15,7 +13,7 @@ from eigenshape.geometry.topology import edge_table, face_pairs
 Tree = MergeTree | PartTree
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FeaturePoints(ReadOnly):
     """The maxima that remain after a cut, sorted by falling persistence, then by falling height.
 
@@ -47,7 +45,7 @@ class FeaturePoints(ReadOnly):
     persistence: Float[np.ndarray, " m"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Segmentation(ReadOnly):
     """A partition of a surface into regions, one around each feature point.
 

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.special import expit
 
+from eigenshape._arrays import record
 from eigenshape.geometry.measure import area_vectors, face_areas, triangle_areas
 from eigenshape.geometry.simplices import at_points
 from eigenshape.geometry.topology import edge_table, neighbor_links
@@ -52,7 +53,7 @@ class Quality:
         return kept * self.coverage**2 * self.support * self.likeness**4
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FittedMap:
     """A map of a connected part: the pairs that it was grown from, and the part bent by them."""
 

@@ -6,7 +6,7 @@ of the whole that face the same way (non-rigid registration, compare Li, Sumner 
 A wrong map needs strong bending and stays far from the whole, so that few wrong ones pass.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial import cKDTree
 
+from eigenshape._arrays import record
 from eigenshape.matching.fitting_loops import add_pulls, add_tensions, turn_frames
 from eigenshape.matching.match_loops import nearest_rows
 from eigenshape.matching.surface import Surface
@@ -43,7 +44,7 @@ LARGEST_GAP = 0.2  # units: longer gaps say no more
 TINY = np.finfo(float).tiny
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FitPlan:
     """What fits of one part on one whole share: samples, frames and the whole as a tree.
 
@@ -72,7 +73,7 @@ class FitPlan:
     shares: Float[np.ndarray, " v"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Fit:
     """A part bent onto a whole.
 
@@ -89,14 +90,6 @@ class Fit:
     def select(self, chosen: Int[np.ndarray, " k"]) -> "Fit":
         """Return the same fit at some of its vertices."""
         return Fit(self.points[chosen], self.places[chosen], self.gaps[chosen], self.misfit)
-
-
-@dataclass(frozen=True, eq=False)
-class _Pose:
-    """Where the frames are: a matrix (a rotation times a size) and a place for each."""
-
-    turns: Float[np.ndarray, "m 3 3"]
-    places: Float[np.ndarray, "m 3"]
 
 
 def plan_fit(part: Surface, whole: Surface) -> FitPlan:
@@ -163,9 +156,17 @@ def fit_part(plan: FitPlan, ends: Int[np.ndarray, " m"]) -> Fit:
 def slide_part(plan: FitPlan, fit: Fit) -> Fit:
     """Bend a part anew from where a fit of all its vertices places it, nearly free to slide.
 
-    The misfit stays that of the given fit, so that it compares with those of other maps.
+    All vertices are pulled now. The misfit stays that of the given fit, so that it compares with
+    those of other maps.
     """
-    slid = _fit(plan, fit.places[plan.frames], SLIDING_STIFFNESS, SLIDING_ALONG)
+    vertices = plan.part.mesh.vertices
+    every = replace(
+        plan,
+        samples=np.arange(len(vertices)),
+        pull=plan.part.areas / plan.part.area,
+        arms=vertices[:, None] - vertices[plan.frames[plan.carriers]],
+    )
+    slid = _fit(every, fit.places[plan.frames], SLIDING_STIFFNESS, SLIDING_ALONG)
     return replace(slid, misfit=fit.misfit)
 
 
@@ -185,12 +186,14 @@ def _fit(
     left[:, 2] *= np.sign(np.linalg.det(left @ right))
     turn = left @ right
     turns = np.repeat(turn[None], len(frames), axis=0)
-    pose = _Pose(turns, target + (frames - middle) @ turn.T)
+    places = target + (frames - middle) @ turn.T
+    m = len(frames)
+    places_in_matrix = (carriers[:, :, None] * m + carriers[:, None, :]).ravel()
 
     for step, stiffness in enumerate(stiffnesses):
         if step >= N_GIVEN:
             # The nearest points of the whole that face the same way pull, the more the nearer.
-            points, normals = _carry(plan, pose, plan.samples)
+            points, normals = _carry(plan, turns, places, plan.samples)
             nearest = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))[1]
             planes = whole.normals[nearest]
             steps = whole.mesh.vertices[nearest] - points
@@ -198,56 +201,43 @@ def _fit(
             targets = points + flat + along * (steps - flat)
             facing = np.clip(np.einsum("si,si->s", normals, planes), 0, 1)
             pull = plan.pull * facing / (1 + (steps**2).sum(axis=1) / SOFT**2)
-        pose = _bend(plan, pose, targets, pull, stiffness, N_FIRST if step == 0 else N_NEXT)
+        # Move frames so that samples come nearer to their targets, and turn frames to follow.
+        entries = (pull[:, None] * portions)[:, :, None] * portions[:, None, :]
+        pulled = np.bincount(places_in_matrix, weights=entries.ravel(), minlength=m * m)
+        matrix = pulled.reshape(m, m) + stiffness * plan.graph
+        matrix[np.diag_indices_from(matrix)] += 1e-9 / m  # of frames that nothing pulls
+        factor = cho_factor(matrix, check_finite=False)
+        weight = stiffness * 2 / len(plan.one)  # as in `graph`
+        for _ in range(N_FIRST if step == 0 else N_NEXT):
+            right = np.zeros_like(places)
+            add_pulls(turns, carriers, portions, plan.arms, pull, targets, right)
+            add_tensions(turns, plan.one, plan.two, plan.links, weight, right)
+            places = cho_solve(factor, right, check_finite=False)
+            turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
 
-    points, normals = _carry(plan, pose, plan.compared)
+    points, normals = _carry(plan, turns, places, plan.compared)
     gaps, found = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))
     gaps = np.minimum(gaps, LARGEST_GAP)
     # Strain: how far edges are from what their frames make of them, as a share of squares
-    moved = pose.places[plan.two] - pose.places[plan.one]
-    wrong = np.einsum("eij,ej->ei", pose.turns[plan.one], plan.links) - moved
+    moved = places[plan.two] - places[plan.one]
+    wrong = np.einsum("eij,ej->ei", turns[plan.one], plan.links) - moved
     strain = float((wrong**2).sum() / max(float((plan.links**2).sum()), TINY))
     return Fit(points, found, gaps, float(plan.shares @ gaps * np.sqrt(strain)))
 
 
-def _bend(
-    plan: FitPlan,
-    pose: _Pose,
-    targets: Float[np.ndarray, "s 3"],
-    pull: Float[np.ndarray, " s"],
-    stiffness: float,
-    rounds: int,
-) -> _Pose:
-    """Move frames so that samples come nearer to their targets, and turn frames to follow."""
-    carriers, portions = plan.carriers[plan.samples], plan.portions[plan.samples]
-    m = len(plan.frames)
-    places_in_matrix = carriers[:, :, None] * m + carriers[:, None, :]
-    entries = (pull[:, None] * portions)[:, :, None] * portions[:, None, :]
-    pulled = np.bincount(places_in_matrix.ravel(), weights=entries.ravel(), minlength=m * m)
-    matrix = pulled.reshape(m, m) + stiffness * plan.graph
-    matrix[np.diag_indices_from(matrix)] += 1e-9 / len(matrix)  # of frames that nothing pulls
-    factor = cho_factor(matrix, check_finite=False)
-    weight = stiffness * 2 / len(plan.one)  # as in `graph`
-    turns, places = pose.turns.copy(), pose.places
-    for _ in range(rounds):
-        right = np.zeros_like(places)
-        add_pulls(turns, carriers, portions, plan.arms, pull, targets, right)
-        add_tensions(turns, plan.one, plan.two, plan.links, weight, right)
-        places = cho_solve(factor, right, check_finite=False)
-        turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
-    return _Pose(turns, places)
-
-
 def _carry(
-    plan: FitPlan, pose: _Pose, vertices: Int[np.ndarray, " v"]
+    plan: FitPlan,
+    turns: Float[np.ndarray, "m 3 3"],
+    places: Float[np.ndarray, "m 3"],
+    vertices: Int[np.ndarray, " v"],
 ) -> tuple[Float[np.ndarray, "v 3"], Float[np.ndarray, "v 3"]]:
-    """Return where the frames carry vertices, and their normals there."""
+    """Return where frames, each a turn times a size at a place, carry vertices, and the normals there."""
     mesh, carriers, portions = plan.part.mesh, plan.carriers[vertices], plan.portions[vertices]
-    centers = np.einsum("vc,vci->vi", portions, pose.places[carriers])
+    centers = np.einsum("vc,vci->vi", portions, places[carriers])
     arms = mesh.vertices[vertices][:, None] - mesh.vertices[plan.frames[carriers]]
-    turned = np.einsum("vcij,vcj->vci", pose.turns[carriers], arms)
+    turned = np.einsum("vcij,vcj->vci", turns[carriers], arms)
     points = centers + np.einsum("vc,vci->vi", portions, turned)
-    turns = np.einsum("vc,vcij->vij", portions, pose.turns[carriers])
-    normals = np.einsum("vij,vj->vi", turns, plan.part.normals[vertices])
+    blended = np.einsum("vc,vcij->vij", portions, turns[carriers])
+    normals = np.einsum("vij,vj->vi", blended, plan.part.normals[vertices])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
     return points, normals

@@ -1,13 +1,12 @@
 """Join scans of one rigid shape from several sides to one surface."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._threads import one_blas_thread
@@ -27,7 +26,7 @@ from eigenshape.scans.reconstruction import reconstruct_surface
 LEAST_SCORE = 0.3
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class FusedScan(ReadOnly):
     """Several scans as one surface.
 

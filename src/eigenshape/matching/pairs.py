@@ -1,10 +1,9 @@
 """Pairs of points of a part and a whole that agree in distances and directions."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Complex64, Float, Int
 
+from eigenshape._arrays import record
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.matching.match_loops import couple_pairs, nearest_rows, place_by_distances
 from eigenshape.matching.surface import Surface, View
@@ -48,7 +47,7 @@ SOFTNESS = 0.03  # added to distances before they are weighed
 CAP = 0.1  # largest error of a distance that counts, so that single wrong pairs count little
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Pairs:
     """Points of a part, by number, their partners on the whole, and the support of each pair."""
 

@@ -4,12 +4,12 @@ A copy has fewer vertices and no needles. Loose pieces are left out.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
+from eigenshape._arrays import record
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import edge_lengths, face_areas, mean_normals, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -40,7 +40,7 @@ TORN = 0.1
 NORMAL_SHARE = 0.01
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class WorkingCopy:
     """A connected surface that faces outward, and the mesh that stands for it while matching.
 
@@ -163,7 +163,7 @@ def _nearest_places(
     return places_in_faces(mesh, corners, points, cKDTree(corners).query(points)[1])
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Piece:
     """A connected piece of a mesh: its faces and vertices there, its area, and its working copy."""
 

@@ -1,6 +1,6 @@
 """Place one scan of a rigid shape beside another: by patches first, then point to plane."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_rows
+from eigenshape._arrays import ReadOnly, finite_rows, record
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -48,7 +48,7 @@ FEWEST_POINTS = 20  # that determine a motion
 SAME_TURN, SAME_PLACE = 0.2, 0.1  # radians, and sides of the box
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Registration(ReadOnly):
     """A motion that places one scan on another: x ↦ R x + t.
 
@@ -99,7 +99,7 @@ class Registration(ReadOnly):
 NO_MOTION = Registration(np.eye(3), np.zeros(3), -1.0)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Scan:
     """A scan without noise, moved to its middle, with what its registration needs."""
 

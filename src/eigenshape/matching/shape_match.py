@@ -1,18 +1,17 @@
 """A map from a part to a whole, with how sure it is of each vertex."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.typing import DTypeLike, NDArray
 
-from eigenshape._arrays import ReadOnly, as_array
+from eigenshape._arrays import ReadOnly, as_array, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ShapeMatch(ReadOnly):
     """Where each vertex of a part lies on a whole.
 

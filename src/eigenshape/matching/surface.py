@@ -1,10 +1,11 @@
 """Surfaces as matching sees them: points, their patches, and distances and directions from them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Complex64, Float, Float32, Int
 
+from eigenshape._arrays import record
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -28,7 +29,7 @@ UNIT = 1.2
 MATCHED_RADII = RADII[list(BASES)]  # of the discs that are compared, in units
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class View:
     """Points of a whole, by number, that one viewpoint sees, and their whitened discs there."""
 
@@ -37,7 +38,7 @@ class View:
     weights: Float32[np.ndarray, "q r"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Surface:
     """A mesh in the unit of the whole, and m of its vertices with what matching compares.
 

@@ -1,10 +1,11 @@
 """A whole that many parts are matched to: what is computed once."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._arrays import record
 from eigenshape._text import html_repr
 from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -35,7 +36,7 @@ LEAST_AREA = 0.01
 N_VIEWS = 8
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class TargetPiece:
     """A connected piece of a whole, and what matching compares with it."""
 
@@ -50,7 +51,7 @@ class TargetPiece:
         return self.surface.area * self.unit**2
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@record
 class MatchTarget:
     """A whole, prepared so that many parts can be matched to it.
 

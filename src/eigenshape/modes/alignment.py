@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
@@ -135,7 +134,6 @@ def align_modes(
     True
     """
     for name, each in (("spectrum", spectrum), ("reference", reference)):
-        require_type(each, Spectrum, name)
         require_lowest(each, name)
     n, n_reference = len(spectrum.eigenvectors), len(reference.eigenvectors)
     if points is None and n != n_reference:

@@ -81,7 +81,6 @@ def rotation_nulls(
     >>> (1 + int(n_as_large)) / (1 + 99)  # the p-value
     0.01
     """
-    require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
     require_type(rng, np.random.Generator, "rng")
     count = whole_number(n_nulls, "n_nulls", 1)

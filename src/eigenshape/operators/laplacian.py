@@ -160,7 +160,7 @@ def find_zero_row_sums(matrix: sp.sparray) -> Bool[np.ndarray, " n"]:
     entries: beside one stiff edge, the rows at a fixed boundary are small and not zero.
     """
     sums, sizes = np.abs(matrix.sum(axis=1)), abs(matrix).sum(axis=1)
-    return np.asarray(sums <= ZERO_ROW_SUM * sizes)
+    return sums <= ZERO_ROW_SUM * sizes
 
 
 def dirichlet_laplacian(

@@ -227,7 +227,7 @@ def _direction(value: View, name: str, names: tuple[str, ...]) -> Float[np.ndarr
             f"{', '.join(names)}; it is {vector.tolist()}."
         )
     vector = vector / np.abs(vector).max()
-    return np.asarray(vector / np.linalg.norm(vector))
+    return vector / np.linalg.norm(vector)
 
 
 def _guess_front(

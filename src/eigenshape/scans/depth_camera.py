@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, whole_number
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._text import html_repr
 from eigenshape._typing import ArrayLike
@@ -74,7 +74,7 @@ class DepthCamera:
     _repr_html_ = html_repr
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class DepthScan(ReadOnly):
     """A simulated scan of a depth camera.
 

@@ -1,12 +1,10 @@
 """Parts of a shape: what is visible from one side, or what planes leave (thesis 5.4)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, real_numbers, whole_number
+from eigenshape._arrays import ReadOnly, real_numbers, record, whole_number
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
@@ -27,7 +25,7 @@ STEEPEST_SURFACE = 10.0
 MOST_VIEWS = 1000  # of one shape; a view takes about 0.1 s
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MeshPart(ReadOnly):
     """A part of a mesh, and the indices of its vertices and faces in the whole mesh.
 

@@ -1,10 +1,9 @@
 """A z-buffer, for partial scans and for pictures."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._arrays import record
 from eigenshape.scans.raster_loops import fill_buffer
 
 # Twice the area, in square pixels, up to which a face is seen from its edge and covers no pixel.
@@ -14,7 +13,7 @@ LEAST_DOUBLED_AREA = 1e-12
 EDGE_SLACK = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Raster:
     """The nearest face at each pixel.
 

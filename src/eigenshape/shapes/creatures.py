@@ -2,7 +2,6 @@
 
 import heapq
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -10,14 +9,14 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.linalg import splu
 
-from eigenshape._arrays import whole_number
+from eigenshape._arrays import record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import adjacency_matrix, edge_table
 from eigenshape.shapes.creature_plans import CREATURES, PLANS
 from eigenshape.shapes.isosurface import find_spacing, isosurface, relax
-from eigenshape.shapes.limbs import Body, distance_to_body, nearest_limbs, place_limbs
+from eigenshape.shapes.limbs import distance_to_body, nearest_limbs, place_limbs
 
 # The first mesh has this multiple of the requested number of vertices. The surplus lets `collapse_shortest_edges`
 # remove the shortest edges; a larger surplus takes longer.
@@ -36,7 +35,7 @@ STEPS = 3
 FEWEST_NEIGHBORS, MOST_NEIGHBORS = 4, 8
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Joints:
     """The joints of a creature, the outermost first.
 
@@ -126,11 +125,7 @@ def _rest_pose(kind: str, n_vertices: int, individual: int) -> tuple[TriangleMes
     spacing = min(wanted, body.thinnest)
     mesh = collapse_shortest_edges(isosurface(field, *body.box, spacing), n_vertices)
     mesh = relax(field, mesh, spacing)
-    return mesh, _joints(mesh, body)
-
-
-def _joints(mesh: TriangleMesh, body: Body) -> Joints:
-    """Return the joints, the outermost first, and how much each vertex turns with each of them."""
+    # The joints, the outermost first, and how much each vertex turns with each of them
     owner, place = nearest_limbs(mesh.vertices, body)
     rows, beyond, widths = [], [], []
     for number in range(len(body.limbs) - 1, -1, -1):
@@ -145,7 +140,8 @@ def _joints(mesh: TriangleMesh, body: Body) -> Joints:
             widths.append(SOFTNESS * limb.nodes[node, 3] * limb.squash.mean())
     table = np.array(rows)
     follows = diffuse(mesh, np.column_stack(beyond).astype(np.float64), np.array(widths))
-    return Joints(table[:, :3], table[:, 3:6], np.radians(table[:, 6:]), follows)
+    joints = Joints(table[:, :3], table[:, 3:6], np.radians(table[:, 6:]), follows)
+    return mesh, joints
 
 
 def diffuse(

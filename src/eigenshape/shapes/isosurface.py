@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
@@ -153,7 +153,22 @@ def _sheet_points(
     crosses = (here < 0) != (there < 0)
     share = np.where(crosses, here / np.where(crosses, here - there, 1.0), 0.0)
     places = STARTS + share[..., None] * DIRECTIONS + cells[:, None, :]
-    sheets = 12 * np.arange(len(cells))[:, None] + _sheets(corners < 0, crosses)
+    # Label the crossings of each cell by the sheet on which they lie (Nielson 2004). A sheet connects
+    # two crossings of a face of the cell. If all four edges of a face are crossed, it connects the two
+    # crossings next to a corner that is inside.
+    sheet = np.broadcast_to(np.arange(12), crosses.shape).copy()
+    # A sheet has at most 12 crossings, and labels travel around it in both directions.
+    for _ in range(6):
+        for edges, ends in FACES:
+            plain = crosses[:, edges].sum(axis=1) == 2
+            for one in range(4):
+                for two in range(one):
+                    around = ends[one] if one - two == 1 else ends[0]
+                    joined = plain | (corners[:, around] < 0 if one - two != 2 else False)
+                    linked = joined & crosses[:, edges[one]] & crosses[:, edges[two]]
+                    least = np.minimum(sheet[:, edges[one]], sheet[:, edges[two]])
+                    sheet[linked, edges[one]] = sheet[linked, edges[two]] = least[linked]
+    sheets = 12 * np.arange(len(cells))[:, None] + sheet
     _, number = np.unique(sheets[crosses], return_inverse=True)
     counts = np.bincount(number)
     points = np.column_stack(
@@ -162,29 +177,6 @@ def _sheet_points(
     of_edge = np.full(crosses.shape, -1, dtype=np.int64)
     of_edge[crosses] = number
     return of_edge, points
-
-
-def _sheets(
-    inside: Bool[np.ndarray, "c 8"], crosses: Bool[np.ndarray, "c 12"]
-) -> Int[np.ndarray, "c 12"]:
-    """Label the crossings of each cell by the sheet on which they lie (Nielson 2004).
-
-    A sheet connects two crossings of a face of the cell. If all four edges of a face are crossed,
-    it connects the two crossings next to a corner that is inside.
-    """
-    sheet = np.broadcast_to(np.arange(12), crosses.shape).copy()
-    # A sheet has at most 12 crossings, and labels travel around it in both directions.
-    for _ in range(6):
-        for edges, corners in FACES:
-            plain = crosses[:, edges].sum(axis=1) == 2
-            for one in range(4):
-                for two in range(one):
-                    around = corners[one] if one - two == 1 else corners[0]
-                    joined = plain | (inside[:, around] if one - two != 2 else False)
-                    linked = joined & crosses[:, edges[one]] & crosses[:, edges[two]]
-                    least = np.minimum(sheet[:, edges[one]], sheet[:, edges[two]])
-                    sheet[linked, edges[one]] = sheet[linked, edges[two]] = least[linked]
-    return sheet
 
 
 def _quads(

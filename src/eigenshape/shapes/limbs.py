@@ -1,12 +1,12 @@
 """Bodies made of limbs: smooth tubes blended together, as a function that is zero on the skin."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.interpolate import CubicHermiteSpline
 
+from eigenshape._arrays import record
 from eigenshape.shapes.creature_plans import Limb, Swing
 
 # Limbs are blended where the difference of their distances is below this length (a creature is
@@ -18,7 +18,7 @@ TINY_SIZE = 1e-12  # lower bound of a size that is divided by
 VARIATION = 0.1  # largest logarithm of the lengths and widths of an individual
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PlacedLimb:
     """A limb in space.
 
@@ -36,7 +36,7 @@ class PlacedLimb:
     swings: tuple[Swing, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Body:
     """Limbs, each after its parent."""
 

@@ -116,7 +116,8 @@ def count_zero_modes(spectrum: Spectrum) -> int:
 
 
 def require_lowest(spectrum: Spectrum, name: str) -> None:
-    """Raise an error if a spectrum does not begin with the lowest eigenvalue."""
+    """Raise an error for what is no spectrum, or does not begin with the lowest eigenvalue."""
+    require_type(spectrum, Spectrum, name)
     if spectrum.certificate.first:
         raise InvalidParameterError(
             f"{name} must begin with the lowest eigenvalue; it begins with number "
@@ -141,6 +142,5 @@ def decay_factors(
     Raises an InvalidParameterError if a time is not positive and finite, or the spectrum does not
     begin with the lowest eigenvalue.
     """
-    require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
     return exponential_decay(spectrum.eigenvalues, positive_values(times, name))

@@ -1,13 +1,11 @@
 """Anchor nodes spread over a shape, and the regions around them (thesis 4.2.1)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, positive_values, whole_number
+from eigenshape._arrays import ReadOnly, positive_values, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.distances.closest import squared_distances
@@ -22,7 +20,7 @@ SLACK = 1e-12
 Points = Float[np.ndarray, "_ d"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class AnchorNodes(ReadOnly):
     """A (δ, δ)-sample of a surface, chosen among its vertices.
 

@@ -1,12 +1,10 @@
 """Estimates of the isoperimetric (Cheeger) constant of a surface: how narrow its neck is."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, whole_number
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -24,7 +22,7 @@ N_MODES = 6
 LEAST_RELATIVE_VALUE = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CheegerEstimate(ReadOnly):
     """Bounds for the isoperimetric constant μ of a surface.
 

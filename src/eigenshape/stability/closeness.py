@@ -1,13 +1,13 @@
 """Closeness of two shapes: the smallest δ of thesis 3.1 and 4.1."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape.geometry.enclosing_ball import enclosing_ball
 from eigenshape.geometry.simplices import require_volumes, size_one, volumes
 from eigenshape.stability.perturbation import Perturbation, vertex_pairs
@@ -15,7 +15,7 @@ from eigenshape.stability.perturbation import Perturbation, vertex_pairs
 Limit = Literal["nothing", "displacement", "Jacobian", "ball", "volume"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Closeness(ReadOnly):
     """The quantities in conditions C1 and C2 of δ-closeness (thesis 4.1).
 

@@ -1,14 +1,12 @@
 """One-to-one correspondences of two point sets: Theorem 4.2.1, and bottleneck matchings."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_rows, positive_values
+from eigenshape._arrays import ReadOnly, finite_rows, positive_values, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.features.bipartite_loops import match_rows
@@ -19,7 +17,7 @@ from eigenshape.stability.anchors import preimages, regions_met
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class MaximumMatching(ReadOnly):
     """A largest matching of the rows of a bipartite graph with its columns.
 
@@ -61,7 +59,7 @@ class MaximumMatching(ReadOnly):
         return self.n_matched == len(self.partners)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class BottleneckMatching(ReadOnly):
     """The one-to-one correspondence of two point sets with the smallest largest distance.
 

@@ -1,12 +1,10 @@
 """A shape and a changed shape: which faces correspond, and which regions are anomalous."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, face_labels
+from eigenshape._arrays import ReadOnly, face_labels, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -18,7 +16,7 @@ OUTSIDE = -1  # label of a face that is in no anomalous region
 Labels = Int[np.ndarray, " _"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Perturbation(ReadOnly):
     """A shape M, a changed shape N, and the map Φ between them (thesis 4.1).
 

@@ -1,13 +1,11 @@
 """Compare two shapes: their closeness, their spectra, and the heat times that are reliable."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, positive_values, whole_number, whole_numbers
+from eigenshape._arrays import ReadOnly, positive_values, record, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._typing import ArrayLike
@@ -41,7 +39,7 @@ DENSER = 20
 MOST_SAMPLES = 20_000
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class StabilityReport(ReadOnly):
     """Result of `compare_shapes`.
 

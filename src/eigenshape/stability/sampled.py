@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse.csgraph import connected_components
 
+from eigenshape._arrays import record
 from eigenshape._progress import Progress
 from eigenshape._text import html_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
@@ -86,7 +87,7 @@ class ChangeAtTime:
         return self.change > ABOVE_SAMPLING * self.floor
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Samples:
     """Random points of two shapes of dimension m.
 

@@ -1,13 +1,13 @@
 """A query beside its matches, with corresponding parts in one color."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Int
 from matplotlib.figure import Figure
 
+from eigenshape._arrays import record
 from eigenshape._errors import EigenshapeError, StoreError
 from eigenshape._text import literal
 from eigenshape.cli.console import err, escape_text, progress_bar
@@ -34,7 +34,7 @@ N_EXPLAINED = 12  # pairs of points of an explanation: as many colors as people 
 REACH = 3.0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ColoredQuery:
     """A query with the colors of its parts.
 

@@ -21,7 +21,8 @@ def install() -> None:
     It is replaced in LaPy and in every module that has imported it already (lapy.shapedna,
     lapy.heat, lapy.diffgeo, brainprint, neuromodes, ...), and as the base of classes that inherit
     from it (neuromodes.EigenSolver). Modules that are imported later find ours in LaPy. A solver
-    that exists already stays LaPy's. A second call changes nothing.
+    that exists already stays LaPy's. A second call changes nothing. Processes that are started later
+    need a call of their own.
 
     Raises
     ------

@@ -266,7 +266,7 @@ def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
     _, labels = vertex_components(mesh)
     of_face = np.unique(labels[mesh.faces[:, 0]], return_inverse=True)[1]
     areas = triangle_areas(scaled_corners(mesh)[0])
-    return np.asarray(of_face == np.argmax(np.bincount(of_face, weights=areas)))
+    return of_face == np.argmax(np.bincount(of_face, weights=areas))
 
 
 def drop_duplicate_points(cloud: PointCloud) -> RepairedCloud:

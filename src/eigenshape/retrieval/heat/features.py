@@ -1,13 +1,13 @@
 """Feature points of a mesh, and the heat descriptor that they carry."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, vertex_values
+from eigenshape._arrays import ReadOnly, record, vertex_values
 from eigenshape._progress import Progress
 from eigenshape._threads import map_in_threads
 from eigenshape._typing import ArrayLike
@@ -35,7 +35,7 @@ from eigenshape.spectral.spectrum import Spectrum
 N_VIEWS = 4
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HeatFeatures(ReadOnly):
     """Feature points of a mesh, with everything that was computed to find and describe them.
 

@@ -1,18 +1,16 @@
 """The heat descriptor of a shape, scores of two, and the features that correspond (thesis 5.3)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial.distance import cdist
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly, freeze, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class HeatDescriptor(ReadOnly):
     """A shape described by m feature points with q numbers each.
 

@@ -1,12 +1,11 @@
 """A shape whose faces have labels, and points of it with all that matching them by optimal transport needs."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, face_labels, freeze
+from eigenshape._arrays import ReadOnly, face_labels, freeze, record
 from eigenshape.geometry.conversion import as_mesh
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -34,7 +33,7 @@ SHORTEST_CHORD = 0.01  # sides of the box; shorter chords are within the same pa
 SMALLEST_RADIUS, LARGEST_RADIUS = 0.005, 1.0  # of balls, in sides of the box
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LabelPoints:
     """Points of a shape, their descriptors, and their distances.
 
@@ -108,7 +107,7 @@ def label_points(mesh: TriangleMesh) -> LabelPoints:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LabeledShape(ReadOnly):
     """A shape with a label on each face, from which `transfer_labels` copies.
 

@@ -1,7 +1,6 @@
 """Transfer labels from labeled shapes to another shape (thesis 7)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -9,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_each
-from eigenshape._arrays import ReadOnly, point_functions
+from eigenshape._arrays import ReadOnly, point_functions, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress
 from eigenshape._threads import one_blas_thread
@@ -47,7 +46,7 @@ LEAST_SHARE = 1e-6
 LEAST_PIECE = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LabelTransfer(ReadOnly):
     """Labels that a shape was given, and how reliable they are.
 

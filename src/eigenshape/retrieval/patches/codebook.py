@@ -1,6 +1,6 @@
 """A codebook of patches: its numbers, its file, and Fisher vectors in it."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property, lru_cache
 from hashlib import sha256
 from importlib.resources import files
@@ -11,7 +11,7 @@ from jaxtyping import Float, Float32, Int8
 from scipy.special import logsumexp
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly, freeze, record
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.patches import Patches
 
@@ -30,7 +30,7 @@ CLIP = 0.06
 DEFAULT = "default_codebook.npz"  # written by experiments/ch5_retrieval/make_codebook.py
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@record
 class PatchCodebook(ReadOnly):
     """A mixture of w Gaussians over whitened patches, for each of b base radii.
 

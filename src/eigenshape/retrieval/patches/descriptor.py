@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Int, Int8
 
 from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import Shown
 from eigenshape._threads import one_blas_thread
@@ -76,7 +76,7 @@ class PatchRecipe(Shown):
         return f"patches {self.codebook.digest[:8]}{frames}"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PatchDescriptor(ReadOnly):
     """A shape described by patches, and w partial views of it if it is closed.
 

@@ -1,12 +1,10 @@
 """Match points of two shapes whose patches are alike and that keep their distances."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whiten_numbers
@@ -42,7 +40,7 @@ STEPS = sorted(range(1 - N_SIZES, N_SIZES), key=abs)
 SIZE_STEP = float(RADII[1] / RADII[0])  # 1.25
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PatchPoints(ReadOnly):
     """Points of a shape with what matching needs; part of a `PatchDescriptor`.
 
@@ -76,7 +74,7 @@ class PatchPoints(ReadOnly):
     vertices: Int[np.ndarray, " m"]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PatchMatch(ReadOnly):
     """Points of two shapes that correspond.
 
@@ -229,7 +227,7 @@ def anchor_strain(
     return start.step, _strain(first, second, start)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class _Matches:
     """Matches at one relative size, the best supported first."""
 

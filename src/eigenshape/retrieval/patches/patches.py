@@ -1,13 +1,13 @@
 """Local descriptors of a surface: geodesic discs of several radii around sampled points."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
 from scipy.sparse.csgraph import shortest_path
 
-from eigenshape._arrays import ReadOnly, whole_number
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape._typing import Integer
@@ -46,7 +46,7 @@ AT_BOUNDARY = 0.5
 LEAST_WEIGHT = 0.02
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Patches(ReadOnly):
     """Geodesic discs around m points of a shape in a unit box, each described at r radii.
 

@@ -1,12 +1,10 @@
 """Principal axes of codes, by which a coarse scan compares shapes."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float32, Int8, Int16
 
-from eigenshape._arrays import freeze
+from eigenshape._arrays import freeze, record
 from eigenshape._threads import one_blas_thread
 
 # Axes kept at each base radius. With 64 the best ten were missed five times as often, and 256
@@ -16,7 +14,7 @@ LARGEST = 127  # the largest number of a coarse row, as int8 holds it
 LARGEST_OF_QUERY = 8191  # the sum of 3 × 128 products with coarse rows stays below 2³¹
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PatchAxes:
     """Axes on which codes of one codebook vary most.
 

@@ -1,13 +1,13 @@
 """Which shapes of an index are worth an exact comparison with a query."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import ceil
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int8
 
+from eigenshape._arrays import record
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.patches.distance import scale_distances
 from eigenshape.retrieval.search.coarse import CoarseRows
@@ -27,7 +27,7 @@ Method = Literal["exact", "staged", "candidates"]
 Supplier = Callable[[Int8[np.ndarray, "b s v"], int], Int[np.ndarray, " k"]]
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Candidates:
     """Shapes to compare exactly with a query, and how they were chosen.
 

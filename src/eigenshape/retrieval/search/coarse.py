@@ -1,7 +1,6 @@
 """What search keeps in files beside an index: short rows of all shapes, and how isolated each is."""
 
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 from zipfile import BadZipFile
@@ -11,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int, Int8, Int64
 from numpy.lib.format import open_memmap, read_array
 
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly, freeze, record
 from eigenshape._errors import FileFormatError
 from eigenshape._files import replacing
 from eigenshape.retrieval.patches.code_loops import scan
@@ -51,7 +50,7 @@ class Rows(Protocol):
         """Return the path of a file that can be made again from the rows."""
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CoarseRows(ReadOnly):
     """Short rows of the whole shapes, for a scan of all of them.
 

@@ -1,14 +1,13 @@
 """What a query finds in an index."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import overload
 
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import ReadOnly, freeze
+from eigenshape._arrays import ReadOnly, freeze, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._text import Shown, html_repr
 from eigenshape._threads import one_blas_thread
@@ -17,7 +16,7 @@ from eigenshape.retrieval.search.candidates import Method
 from eigenshape.retrieval.search.chances import class_chances
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Match(ReadOnly):
     """A shape that `ShapeIndex.query` found.
 
@@ -88,7 +87,7 @@ class Match(ReadOnly):
         return freeze(pair_points(self.query, self.descriptor))
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Matches(Shown, Sequence[Match]):
     """What `ShapeIndex.query` found: a sequence of matches, best first, and how they were found.
 

@@ -15,6 +15,7 @@ from zlib import crc32
 import numpy as np
 from jaxtyping import Int
 
+from eigenshape._arrays import record
 from eigenshape._errors import StoreError
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, restore, row_type
 from eigenshape.retrieval.store.damage import Damage
@@ -319,7 +320,7 @@ class IndexState:
         return Snapshot(self, recipe, rows if mask.all() else rows[mask])
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Snapshot:
     """All descriptors of an index by one recipe, at one moment; any number of threads may use it.
 

@@ -12,6 +12,7 @@ from zlib import crc32
 import numpy as np
 
 from eigenshape._arguments import require_each, require_type
+from eigenshape._arrays import record
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._text import Shown
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, details_of, recipe_to_text, rows_of
@@ -79,7 +80,7 @@ class Record(Shown):
 LARGEST_THUMBNAIL = 8192  # bytes, so that a shape takes less than 60 KB
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class DescribedShape(Shown):
     """A shape that is described already, to be added to an index.
 

@@ -143,11 +143,9 @@ def eigenspace_angles(
     >>> bool((found.angles <= found.bounds).all())
     True
     """
-    require_type(one, Spectrum, "one")
-    require_type(two, Spectrum, "two")
-    require_type(laplacian, Laplacian | None, "laplacian")
     require_lowest(one, "one")
     require_lowest(two, "two")
+    require_type(laplacian, Laplacian | None, "laplacian")
     n_one, n_two = len(one.eigenvectors), len(two.eigenvectors)
     if points is None and n_one != n_two:
         raise InvalidParameterError(

@@ -7,7 +7,6 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
 from eigenshape._arrays import finite_values, require_finite_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
@@ -68,7 +67,6 @@ def eigenspace_errors(
     >>> bool(es.spectral.eigenspace_errors(spectrum, exact, functions).max() < 0.01)
     True
     """
-    require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
     values = finite_values(eigenvalues, "eigenvalues")
     n, j = len(spectrum.eigenvectors), functions.shape[1]
@@ -198,7 +196,7 @@ def outside(
     vectors: Float[np.ndarray, "n q"], basis: Float[np.ndarray, "n p"], mass: sp.sparray
 ) -> Float[np.ndarray, "n q"]:
     """Return what the span of a B-orthonormal basis does not hold of some vectors."""
-    return np.asarray(vectors - basis @ (basis.T @ (mass @ vectors)))
+    return vectors - basis @ (basis.T @ (mass @ vectors))
 
 
 def norms(vectors: Float[np.ndarray, "n q"], mass: sp.sparray) -> Float[np.ndarray, " q"]:

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from eigenshape._arguments import require_each, require_type
+from eigenshape._arguments import require_each
 from eigenshape._arrays import ReadOnly, finite_values, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
@@ -61,7 +61,7 @@ class SpectrumComparison(ReadOnly):
     def proved_changes(self) -> Bool[np.ndarray, " k"]:
         """Mask (k,) of the changes that are proved: the two intervals do not overlap."""
         (low_one, high_one), (low_two, high_two) = self.intervals_one.T, self.intervals_two.T
-        return np.asarray((high_one < low_two) | (high_two < low_one))
+        return (high_one < low_two) | (high_two < low_one)
 
     @property
     def index_distance(self) -> float:
@@ -135,8 +135,6 @@ def compare_spectra(
     >>> found.proved_changes.tolist()
     [False, True, True, True]
     """
-    require_type(one, Spectrum, "one")
-    require_type(two, Spectrum, "two")
     require_lowest(one, "one")
     require_lowest(two, "two")
     k = min(len(one.eigenvalues), len(two.eigenvalues))
@@ -182,7 +180,7 @@ def within_brackets(brackets: Brackets, k: int, name: str) -> Float[np.ndarray, 
 
 def count_as_zero(values: Float[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
     """Return which of these eigenvalues are 0 beside the last."""
-    return np.asarray(values <= NULL * values[-1])
+    return values <= NULL * values[-1]
 
 
 def relative_change(

@@ -180,7 +180,7 @@ def _flow_by_steps(
         def step(given: Columns, factor: SymmetricFactor = factor) -> Columns:
             """Return S times columns of mean 0, their means set to 0 again, which rounding moves."""
             stepped = factor.solve(pencil.weigh(given))
-            return np.asarray(stepped - members @ (averages @ stepped))
+            return stepped - members @ (averages @ stepped)
 
         # Σ_d c_d T_d(2S - 1) of what moves, by the recurrence of Chebyshev polynomials.
         before = columns - still

@@ -118,7 +118,7 @@ def modes_of_both(source: Spectrum, target: Spectrum, n_modes: Integer) -> int:
 
 def point_areas(spectrum: Spectrum) -> Float[np.ndarray, " n"]:
     """Return the area around each point, the row sums of B."""
-    return np.asarray(spectrum.mass.sum(axis=1)).ravel()
+    return spectrum.mass.sum(axis=1)
 
 
 def unit_modes(spectrum: Spectrum, k: int) -> Float[np.ndarray, "n k"]:
@@ -128,7 +128,7 @@ def unit_modes(spectrum: Spectrum, k: int) -> Float[np.ndarray, "n k"]:
 
 def unit_projector(spectrum: Spectrum, k: int) -> Float[np.ndarray, "n k"]:
     """Return B φ_i / √A, whose transpose gives the coefficients of a function in `unit_modes`."""
-    return np.asarray(spectrum.mass @ unit_modes(spectrum, k) / point_areas(spectrum).sum())
+    return spectrum.mass @ unit_modes(spectrum, k) / point_areas(spectrum).sum()
 
 
 @one_blas_thread()
@@ -168,7 +168,7 @@ def transfer_function(mapping: FunctionalMap, values: ArrayLike) -> Float[np.nda
     functions = point_functions(values, "values", len(mapping.source.eigenvectors))
     k2, k1 = mapping.matrix.shape
     coefficients = mapping.matrix @ (unit_projector(mapping.source, k1).T @ functions)
-    return np.asarray(unit_modes(mapping.target, k2) @ coefficients)
+    return unit_modes(mapping.target, k2) @ coefficients
 
 
 @one_blas_thread()

@@ -257,7 +257,7 @@ def _fit(partners: list[_Partners], k2: int, k1: int) -> Float[np.ndarray, "k2 k
         weighed = (weights @ theirs[:, :k2]).T
         left += weighed @ theirs[:, :k2]
         right += weighed @ ours[:, :k1]
-    return np.asarray(sl.lstsq(left, right)[0])
+    return sl.lstsq(left, right)[0]
 
 
 def _samples(

@@ -112,7 +112,7 @@ def heat_kernel_signature(spectrum: Spectrum, times: ArrayLike) -> Float[np.ndar
     [1.0, 1.0, 1.0]
     """
     decay = decay_factors(spectrum, times)
-    return np.asarray(spectrum.eigenvectors**2 @ decay)
+    return spectrum.eigenvectors**2 @ decay
 
 
 @one_blas_thread()

@@ -117,7 +117,7 @@ def wave_kernel_signature(
         energies = suggested if energies is None else energies
         sigma = spread if sigma is None else sigma
     bands = wave_bands(spectrum, energies, sigma)
-    return np.asarray(spectrum.eigenvectors[:, -len(bands) :] ** 2 @ bands)
+    return spectrum.eigenvectors[:, -len(bands) :] ** 2 @ bands
 
 
 def wave_bands(

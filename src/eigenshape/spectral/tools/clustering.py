@@ -84,7 +84,6 @@ def spectral_clusters(
     >>> es.spectral.spectral_clusters(spectrum).tolist()
     [0, 0, 0, 1, 1, 1]
     """
-    require_type(spectrum, Spectrum, "spectrum")
     require_lowest(spectrum, "spectrum")
     require_choice(method, ClusterMethod, "method")
     k = len(spectrum.eigenvalues)

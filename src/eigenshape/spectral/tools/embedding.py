@@ -270,7 +270,7 @@ def _distances(
         "Pass fewer points.",
         share=SHARE_OF_ARRAYS,
     )
-    return np.asarray(cdist(embedded, embedded[chosen]))
+    return cdist(embedded, embedded[chosen])
 
 
 def _target_points(points: ArrayLike | None, n: int) -> Int[np.ndarray, " q"]:

@@ -80,9 +80,9 @@ def project(
     functions = point_functions(values, "values", len(modes))
     require_choice(inner_product, InnerProduct, "inner_product")
     if inner_product == "mass":
-        return np.asarray(modes.T @ (spectrum.mass @ functions))
+        return modes.T @ (spectrum.mass @ functions)
     orthonormal, triangle = sl.qr(modes, mode="economic")
-    return np.asarray(sl.solve_triangular(triangle, orthonormal.T @ functions))
+    return sl.solve_triangular(triangle, orthonormal.T @ functions)
 
 
 @one_blas_thread()
@@ -134,7 +134,7 @@ def reconstruct(coefficients: ArrayLike, spectrum: Spectrum) -> Float[np.ndarray
             f"{weights.shape}. Compute more eigenpairs, or pass the first {k} rows."
         )
     require_finite_rows(weights, "coefficients", "eigenvector")
-    return np.asarray(spectrum.eigenvectors[:, : len(weights)] @ weights)
+    return spectrum.eigenvectors[:, : len(weights)] @ weights
 
 
 # A filter: the factor of each frequency, as a function of the eigenvalues.
@@ -300,7 +300,7 @@ def smooth_mesh(
                 f"was {before * scale**3:.3g} and is {after * scale**3:.3g} length³. "
                 "Use a shorter time or a higher cutoff, or pass keep_volume=False."
             )
-        areas = np.asarray(spectrum.mass.sum(axis=1)).ravel()
+        areas = spectrum.mass.sum(axis=1)
         center = areas @ filtered / areas.sum()
         filtered = center + (before / after) ** (1 / 3) * (filtered - center)
     return TriangleMesh(filtered * scale, mesh.faces)

@@ -27,9 +27,11 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "f 3"]
             f"{data[:3].hex(' ')}. Functions on vertices, which begin with ff ff ff, are read by "
             "es.io.read_fields."
         )
-    # A line of text that may hold anything, and an empty one
-    end = data.find(b"\n\n")
-    cursor = Cursor(data, "A surface of FreeSurfer", place=end + 2 if end > 0 else len(data))
+    # Two lines of text may hold anything; the second one is mostly empty.
+    first_line, _, rest = data.partition(b"\n")
+    second_line = rest.partition(b"\n")[0]
+    place = min(len(first_line) + len(second_line) + 2, len(data))
+    cursor = Cursor(data, "A surface of FreeSurfer", place=place)
     n_vertices, n_faces = cursor.wholes(">i4", 2).tolist()
     vertices = cursor.take(">f4", 3 * n_vertices).reshape(-1, 3)
     faces = cursor.wholes(">i4", 3 * n_faces).reshape(-1, 3)
