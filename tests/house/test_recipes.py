@@ -103,6 +103,7 @@ def test_an_operator_is_documented_by_its_entry(halved):
 
 # Options with a number or name that the library has as the default of an argument or a field.
 DEFAULTS = {
+    "collection timeout": (es.retrieval.Workers, "timeout"),
     "compress bits": (es.spectral.compress_mesh, "bits"),
     "deform mode": (es.deform, "mode"),
     "features n_parts": (es.retrieval.HeatRecipe, "n_features"),

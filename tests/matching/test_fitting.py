@@ -95,12 +95,13 @@ def test_only_parts_with_a_rim_are_compared_with_views(surfaces):
 
 def test_low_modes_make_a_map_smooth(surfaces):
     part, whole = surfaces
-    modes = lowest_modes(whole.mesh, 20)
+    modes = lowest_modes(whole.mesh)
     ours = modes_of_part(part.mesh, modes)
     rng = np.random.default_rng(3)
     wrong = rng.random(part.mesh.n_vertices) < 0.2
     rough = np.where(wrong, rng.integers(0, N_VERTICES, N_VERTICES), np.arange(N_VERTICES))
-    places = smooth_places(ours, modes, rough)
+    places, smooth = smooth_places(ours, modes, rough, 20)
+    assert smooth.shape == (N_VERTICES, 20)
     # The poses share their vertices.
     before = np.linalg.norm(whole.mesh.vertices[rough] - whole.mesh.vertices, axis=1)
     after = np.linalg.norm(whole.mesh.vertices[places] - whole.mesh.vertices, axis=1)

@@ -141,15 +141,13 @@ def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
         yield update
 
 
-def batch_reporter(
-    progress: Callable[[float, str], None],
-) -> Callback:
+def batch_reporter(progress: Callable[[float, str], None], failed: str = "not indexed") -> Callback:
     """Return what a batch calls after each file: it moves the bar, and names a file that failed."""
 
     def report(n_done: int, n_items: int, name: str, error: str | None) -> None:
         progress(n_done / n_items, f"{n_done} of {n_items}, {name}")
         if error is not None:
-            err.print(f"[yellow]not indexed:[/] {escape_text(name)}: {escape_text(error)}")
+            err.print(f"[yellow]{failed}:[/] {escape_text(name)}: {escape_text(error)}")
 
     return report
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
-from eigenshape._studio import studio_module
+from eigenshape._extras import import_extra
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_address, print_written, progress_bar
 from eigenshape.cli.inputs import memory_bytes
@@ -45,7 +45,7 @@ def studio(
         encrypted.
     """
     side = steps.picture_side(view, up)
-    server = studio_module("server")
+    server = import_extra("eigenshape_studio.server", "eigenshape-studio")
 
     server.serve(
         mesh,
@@ -109,7 +109,7 @@ def serve(
     browser
         Open the address in a browser.
     """
-    server = studio_module("service.server")
+    server = import_extra("eigenshape_studio.service.server", "eigenshape-studio")
 
     server.serve(
         index,
@@ -150,7 +150,7 @@ def report(
     """
     steps.require_output(output, (".html",), "A report")
     side = steps.picture_side(view, up)
-    writer = studio_module("report")
+    writer = import_extra("eigenshape_studio.report", "eigenshape-studio")
     surface = steps.load_mesh(mesh, repair)
     with progress_bar("report") as progress:
         writer.write_report(

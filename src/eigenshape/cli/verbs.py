@@ -27,7 +27,7 @@ VERBS = (
     "info", "repair", "decimate",
     "spectrum", "operators",
     "features", "segment", "label",
-    "match", "deform", "pose", "stability",
+    "match", "collection", "deform", "pose", "stability",
     "index", "query",
     "fuse", "compress", "decompress",
     "studio", "serve", "report", "warm-up", "demo",

@@ -19,7 +19,7 @@ from eigenshape.features.part_merging import (
 )
 from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, adjacent_parts
-from eigenshape.geometry.measure import face_areas, face_normals, scale_to_unit
+from eigenshape.geometry.measure import face_areas, face_normals, scale_to_unit, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 from eigenshape.spectral.spectrum import Spectrum
@@ -247,9 +247,7 @@ def _measure_borders(
     # Compare normals at a fixed distance from the boundary, because the angle between neighboring
     # faces depends on the size of the faces.
     first, second = tree.data[pairs[:, 0]], tree.data[pairs[:, 1]]
-    across = second - first
-    distances = np.linalg.norm(across, axis=1)[:, None]
-    across = np.divide(across, distances, out=np.zeros_like(across), where=distances > 0)
+    across = unit_vectors(second - first)
     middle = (first + second) / 2
     _, before = tree.query(middle - TURN_REACH * side * across)
     _, after = tree.query(middle + TURN_REACH * side * across)

@@ -147,7 +147,7 @@ def face_normals(mesh: MeshLike) -> Float[np.ndarray, "f 3"]:
     [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]
     """
     mesh = as_mesh(mesh)
-    return _unit(area_vectors(scaled_corners(mesh)[0]))
+    return unit_vectors(area_vectors(scaled_corners(mesh)[0]))
 
 
 def vertex_normals(mesh: MeshLike) -> Float[np.ndarray, "n 3"]:
@@ -191,10 +191,11 @@ def mean_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
     """Return `vertex_normals` of any mesh; normals of neighbors that disagree cancel in part."""
     vectors = area_vectors(scaled_corners(mesh)[0])
     sums = [at_points(mesh, vectors[:, axis]) for axis in range(3)]
-    return _unit(np.column_stack(sums))
+    return unit_vectors(np.column_stack(sums))
 
 
-def _unit(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
+def unit_vectors(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
+    """Give vectors the length 1, and make zeros of those without one."""
     norms = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms > 0)
 

@@ -1,12 +1,11 @@
 """Conversion from and to trimesh and PyVista."""
 
-from importlib import import_module
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from eigenshape._errors import InvalidShapeError, MissingExtraError
+from eigenshape._errors import InvalidShapeError
+from eigenshape._extras import import_extra
 from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
@@ -14,6 +13,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io.formats.cells import CellLists
 
+EXTRA = "'eigenshape[bridges]'"
 VTK_CELLS = {1: 3, 2: 5, 3: 10}  # VTK's numbers for segment, triangle and tetrahedron
 POINTS, LINES = (
     (1, 2),
@@ -52,7 +52,7 @@ def from_trimesh(mesh: Any, *, dim: Integer = 2) -> TriangleMesh | PointCloud:
     >>> es.io.from_trimesh(trimesh.creation.box())
     TriangleMesh(8 vertices, 12 faces)
     """
-    trimesh = _extra("trimesh")
+    trimesh = import_extra("trimesh", EXTRA)
     if isinstance(mesh, trimesh.PointCloud):
         return PointCloud(np.asarray(mesh.vertices), dim)
     if not isinstance(mesh, trimesh.Trimesh):
@@ -93,7 +93,7 @@ def to_trimesh(shape: ShapeLike) -> Any:
     ((162, 3), True)
     """
     shape = as_shape(shape)
-    trimesh = _extra("trimesh")
+    trimesh = import_extra("trimesh", EXTRA)
     if isinstance(shape, PointCloud) and shape.points.shape[1] == 3:
         return trimesh.PointCloud(shape.points.copy())
     if not isinstance(shape, TriangleMesh):
@@ -133,7 +133,7 @@ def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
     >>> es.io.from_pyvista(pyvista.Plane(i_resolution=2, j_resolution=1).triangulate())
     TriangleMesh(6 vertices, 4 faces)
     """
-    pyvista = _extra("pyvista")
+    pyvista = import_extra("pyvista", EXTRA)
     if not isinstance(dataset, pyvista.PolyData | pyvista.UnstructuredGrid):
         raise InvalidShapeError(
             f"dataset must be a PolyData or an UnstructuredGrid; it is a {type(dataset).__name__}."
@@ -190,7 +190,7 @@ def to_pyvista(shape: ShapeLike) -> Any:
     (162, 320)
     """
     shape = as_shape(shape)
-    pyvista = _extra("pyvista")
+    pyvista = import_extra("pyvista", EXTRA)
     ambient = shape.points.shape[1]
     if ambient > 3:
         raise InvalidShapeError(
@@ -202,12 +202,3 @@ def to_pyvista(shape: ShapeLike) -> Any:
     if shape.dim == 2:
         return pyvista.PolyData.from_regular_faces(points, shape.simplices)
     return pyvista.UnstructuredGrid({VTK_CELLS[shape.dim]: shape.simplices}, points)
-
-
-def _extra(name: str) -> ModuleType:
-    try:
-        return import_module(name)
-    except ImportError as err:
-        raise MissingExtraError(
-            f"{name} must be installed; it is not. Run pip install 'eigenshape[bridges]'."
-        ) from err

@@ -156,17 +156,9 @@ def fit_part(plan: FitPlan, ends: Int[np.ndarray, " m"]) -> Fit:
 def slide_part(plan: FitPlan, fit: Fit) -> Fit:
     """Bend a part anew from where a fit of all its vertices places it, nearly free to slide.
 
-    All vertices are pulled now. The misfit stays that of the given fit, so that it compares with
-    those of other maps.
+    The misfit stays that of the given fit, so that it compares with those of other maps.
     """
-    vertices = plan.part.mesh.vertices
-    every = replace(
-        plan,
-        samples=np.arange(len(vertices)),
-        pull=plan.part.areas / plan.part.area,
-        arms=vertices[:, None] - vertices[plan.frames[plan.carriers]],
-    )
-    slid = _fit(every, fit.places[plan.frames], SLIDING_STIFFNESS, SLIDING_ALONG)
+    slid = _fit(plan, fit.places[plan.frames], SLIDING_STIFFNESS, SLIDING_ALONG)
     return replace(slid, misfit=fit.misfit)
 
 

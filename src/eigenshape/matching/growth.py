@@ -35,6 +35,8 @@ from eigenshape.matching.surface import Surface, turn_over
 
 # Of rough bends, the best ones are grown; of grown maps, the best few once more
 N_GROWN, N_GROWN_AGAIN = 9, 4
+# Modes that make a map smooth before the part is bent again: 30 and 100 lower the misfit less.
+N_LOW_MODES = 60
 MOST_SMOOTHINGS = 2  # it ends earlier if a bend is no better
 # Misfit up to which a map is as good as any, and the same in mean edges of the whole, which is more
 # on coarse meshes. The best rivals of 24 balls, ellipsoids, rings, cylinders and boxes, turned into
@@ -103,7 +105,7 @@ def find_maps(
     # The new map takes the place of the one that it was made from, and keeps its pairs.
     best = maps[0]
     for _ in range(MOST_SMOOTHINGS):
-        places = smooth_places(ours, theirs, best.fit.places)
+        places, _ = smooth_places(ours, theirs, best.fit.places, N_LOW_MODES)
         fit = fit_part(plan, places[plan.frames])
         if fit.misfit >= best.fit.misfit:
             break

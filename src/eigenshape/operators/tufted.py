@@ -5,6 +5,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import record
 from eigenshape._errors import ConvergenceError
+from eigenshape.geometry.measure import unit_vectors
 from eigenshape.operators import flip_loops
 
 # a pair of cotangents that sums to less below zero is cocircular, relative to the terms in it
@@ -86,9 +87,7 @@ def tufted_cover(
         face, corner = np.divmod(sides, 3)
         tail, head, apex = (faces[face, (corner + step) % 3] for step in range(3))
         low, high = np.minimum(tail, head), np.maximum(tail, head)
-        along = points[high] - points[low]
-        norms = np.linalg.norm(along, axis=1, keepdims=True)
-        along = np.divide(along, norms, out=np.zeros_like(along), where=norms > 0)
+        along = unit_vectors(points[high] - points[low])
         out = points[apex] - points[low]
         out -= np.einsum("ij,ij->i", out, along)[:, None] * along
         # Angles start from the face whose apex is farthest from the edge, which rounding has blurred

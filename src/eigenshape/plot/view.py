@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from eigenshape._studio import studio_module
+from eigenshape._extras import import_extra
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.plot.camera import Up, View
@@ -63,7 +63,8 @@ def view(
     if values is None:
         values = {}
     fields = values if isinstance(values, Mapping) else {"values": values}
-    widget = studio_module("widget").ShapeWidget(surface, fields, height=height)
+    studio = import_extra("eigenshape_studio.widget", "'eigenshape-studio[notebook]'")
+    widget = studio.ShapeWidget(surface, fields, height=height)
     if not (isinstance(view, str) and view == "auto" and isinstance(up, str) and up == "auto"):
         widget.look_from(view, up)
     return widget

@@ -171,44 +171,21 @@ def factorize_symmetric(
     """
     e = elimination
     memory = memory or factor_memory(e)
-    with memory.updates.lend() as updates:
-        making = _Making(
-            elimination=e,
-            lower=(e.lower_ptr, e.lower_rows, data[e.source]),
-            panels=np.empty(e.n_entries) if spent is None else spent.panels,
-            pivots=np.empty(len(e.order)),
-            updates=updates,
-            rooms=memory.rooms,
-        )
-        for tasks in e.tasks.rounds:
-            if not all(map_in_threads(making.factor_task, tasks.tolist())):
-                return None
-    return SymmetricFactor(e, making.panels, making.pivots)
+    tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
+    lower = e.lower_ptr, e.lower_rows, data[e.source]
+    panels = np.empty(e.n_entries) if spent is None else spent.panels
+    pivots = np.empty(len(e.order))
 
-
-@record
-class _Making:
-    """A factor in the making: what is given, what is filled, and memory that its fronts share."""
-
-    elimination: Elimination
-    lower: tuple[Indices, Indices, Float[np.ndarray, " l"]]
-    panels: Float[np.ndarray, " e"]
-    pivots: Float[np.ndarray, " n"]
-    updates: Updates
-    rooms: SpareMemory[Room]
-
-    def factor_task(self, task: int) -> bool:
+    def factor_task(task: int) -> bool:
         """Factor the fronts of a task; return whether all pivots are usable."""
-        e = self.elimination
         begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
         # Tall fronts, if there are threads to share them.
         shared: list[int] = []
         if free_threads() > 1:
             heights = np.diff(e.begins[begin : end + 1])
             shared = (begin + np.flatnonzero(heights >= SHARED_HEIGHT)).tolist()
-        with self.rooms.lend() as room:
-            tree = e.first, e.begins, e.rows, e.last_child, e.older, e.places
-            given = tree, self.lower, self.panels, self.pivots, self.updates, room, begin
+        with memory.rooms.lend() as room:
+            given = tree, lower, panels, pivots, updates, room, begin
 
             def run(low: int, high: int, top: int, stage: int = fronts.WHOLE) -> int:
                 return int(fronts.factor_fronts(*given, low, high, top, stage, addresses()))
@@ -220,29 +197,38 @@ class _Making:
                     return False
                 if tall < end:
                     top = run(tall, tall + 1, top, fronts.GATHER)
-                    if not self._eliminate_together(tall, room):
+                    if not _eliminate_together(e, pivots, tall, room):
                         return False
                     top = run(tall, tall + 1, top, fronts.KEEP)
                 low = tall + 1
         return True
 
-    def _eliminate_together(self, s: int, room: Room) -> bool:
-        """Eliminate the columns of a front whose rows several threads update."""
-        e, blas = self.elimination, addresses()
-        front, times, _ = room
-        height, width = int(e.begins[s + 1] - e.begins[s]), int(e.first[s + 1] - e.first[s])
-        shape = front, height, width
-        for start in range(0, width, dense.NARROW):
-            end = min(start + dense.NARROW, width)
-            given = self.pivots, int(e.first[s]), times, start, end, False
-            if not dense.eliminate_blocked(*shape, *given, blas):
-                return False
+    with memory.updates.lend() as updates:
+        for tasks in e.tasks.rounds:
+            if not all(map_in_threads(factor_task, tasks.tolist())):
+                return None
+    return SymmetricFactor(e, panels, pivots)
 
-            def update(share: tuple[int, int], end: int = end) -> None:
-                dense.update_rows(*shape, times, end, end + share[0], end + share[1], blas)
 
-            map_in_threads(update, share_units(height - end, dense.TALL, free_threads()))
-        return True
+def _eliminate_together(
+    e: Elimination, pivots: Float[np.ndarray, " n"], s: int, room: Room
+) -> bool:
+    """Eliminate the columns of a front whose rows several threads update."""
+    blas = addresses()
+    front, times, _ = room
+    height, width = int(e.begins[s + 1] - e.begins[s]), int(e.first[s + 1] - e.first[s])
+    shape = front, height, width
+    for start in range(0, width, dense.NARROW):
+        end = min(start + dense.NARROW, width)
+        given = pivots, int(e.first[s]), times, start, end, False
+        if not dense.eliminate_blocked(*shape, *given, blas):
+            return False
+
+        def update(share: tuple[int, int], end: int = end) -> None:
+            dense.update_rows(*shape, times, end, end + share[0], end + share[1], blas)
+
+        map_in_threads(update, share_units(height - end, dense.TALL, free_threads()))
+    return True
 
 
 def factor_matrix(

@@ -194,7 +194,7 @@ def test_torch_tensors_hold_the_same_numbers():
 def test_without_torch_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
     bundle = es.spectral.operator_bundle(BALL, 3)
-    with pytest.raises(es.MissingExtraError, match="torch must be installed for tensors"):
+    with pytest.raises(es.MissingExtraError, match="torch must be installed"):
         es.spectral.export_bundle(bundle)
 
 

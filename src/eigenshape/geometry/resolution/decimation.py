@@ -4,7 +4,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import ReadOnly, as_array, record, whole_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError, MissingExtraError
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._extras import import_extra
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
@@ -165,12 +166,7 @@ def decimate(
         wanted = min(max(FEWEST_FACES, round(ratio * mesh.n_faces)), mesh.n_faces - 1)
     require_sound(mesh)
     require_oriented(mesh)
-    try:
-        from igl import qslim  # noqa: PLC0415
-    except ImportError as err:
-        raise MissingExtraError(
-            "libigl must be installed to decimate; it is not. Run pip install 'eigenshape[decimate]'."
-        ) from err
+    qslim = import_extra("igl", "'eigenshape[decimate]'").qslim
     crowded, touching = edge_table(mesh).n_faces > 2, non_manifold_vertices(mesh)
     report = []
     opened = mesh

@@ -3,6 +3,7 @@
 import numpy as np
 
 from eigenshape._errors import FileFormatError
+from eigenshape.geometry.measure import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import weld
 from eigenshape.io.formats.numbers import coordinates, lines_of, quote_line
@@ -87,9 +88,7 @@ def format_binary(mesh: TriangleMesh) -> bytes:
 
 def _normals(mesh: TriangleMesh) -> np.ndarray:
     edges = np.diff(mesh.vertices[mesh.faces] / (np.abs(mesh.vertices).max() or 1.0), axis=1)
-    normals = np.cross(edges[:, 0], edges[:, 1])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+    return unit_vectors(np.cross(edges[:, 0], edges[:, 1]))
 
 
 def single_precision(mesh: TriangleMesh, name: str) -> np.ndarray:

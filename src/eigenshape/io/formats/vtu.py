@@ -220,27 +220,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
 
 def _parse_piece(data: bytes) -> tuple[ElementTree.Element, _Packing, int, int]:
     """Return the one piece that has cells, its encoding, and its numbers of points and cells."""
-    root, packing = _parse_tags(data)
-    pieces = root.findall("./UnstructuredGrid/Piece")
-    counts = [(piece.get("NumberOfPoints", ""), piece.get("NumberOfCells", "")) for piece in pieces]
-    if not counts or not all(
-        re.fullmatch(r"\s*[0-9]{1,18}\s*", word) for pair in counts for word in pair
-    ):
-        raise FileFormatError(
-            f"A VTU file must hold pieces that count points and cells; the counts are {counts[:9]}."
-        )
-    filled = [piece for piece, (_, n_cells) in zip(pieces, counts, strict=True) if int(n_cells)]
-    if len(filled) > 1:
-        raise FileFormatError(
-            f"A VTU file must hold one piece; it holds {len(filled)} that have cells. Merge them first."
-        )
-    piece = filled[0] if filled else pieces[0]
-    n_points, n_cells = int(piece.get("NumberOfPoints", "")), int(piece.get("NumberOfCells", ""))
-    return piece, packing, n_points, n_cells
-
-
-def _parse_tags(data: bytes) -> tuple[ElementTree.Element, _Packing]:
-    """Parse the tags; raw appended data are not text and are cut out first."""
+    # Raw appended data are not text, and are cut out before the tags are parsed.
     raw = RAW.search(data)
     tags, appended = data, b""
     if raw:
@@ -275,7 +255,23 @@ def _parse_tags(data: bytes) -> tuple[ElementTree.Element, _Packing]:
         )
     compressor = root.get("compressor") or None
     size = np.dtype(ORDERS[order] + HEADER_TYPES[header_type])
-    return root, _Packing(size, ORDERS[order], compressor, appended, raw is not None, len(data))
+    packing = _Packing(size, ORDERS[order], compressor, appended, raw is not None, len(data))
+    pieces = root.findall("./UnstructuredGrid/Piece")
+    counts = [(piece.get("NumberOfPoints", ""), piece.get("NumberOfCells", "")) for piece in pieces]
+    if not counts or not all(
+        re.fullmatch(r"\s*[0-9]{1,18}\s*", word) for pair in counts for word in pair
+    ):
+        raise FileFormatError(
+            f"A VTU file must hold pieces that count points and cells; the counts are {counts[:9]}."
+        )
+    filled = [piece for piece, (_, n_cells) in zip(pieces, counts, strict=True) if int(n_cells)]
+    if len(filled) > 1:
+        raise FileFormatError(
+            f"A VTU file must hold one piece; it holds {len(filled)} that have cells. Merge them first."
+        )
+    piece = filled[0] if filled else pieces[0]
+    n_points, n_cells = int(piece.get("NumberOfPoints", "")), int(piece.get("NumberOfCells", ""))
+    return piece, packing, n_points, n_cells
 
 
 def format_fields(mesh: Mesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:

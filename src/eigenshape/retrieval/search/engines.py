@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float32, Int, Int8
 
-from eigenshape._errors import MissingExtraError
+from eigenshape._extras import import_extra
 from eigenshape._text import html_repr
 from eigenshape.retrieval.search.candidates import Supplier, smallest
 from eigenshape.retrieval.search.coarse import CoarseRows
@@ -88,13 +88,7 @@ class FaissEngine:
     _repr_html_ = html_repr
 
     def __init__(self, coarse: CoarseRows) -> None:
-        try:
-            import faiss  # noqa: PLC0415 - an optional extra
-        except ImportError as err:
-            raise MissingExtraError(
-                "Candidates from FAISS need the extra 'faiss'; faiss is not installed. "
-                "Install eigenshape[faiss]."
-            ) from err
+        faiss = import_extra("faiss", "'eigenshape[faiss]'")
         n_shapes, n_sizes, width = coarse.numbers.shape
         n_lists = max(n_shapes * n_sizes // VECTORS_OF_LIST, 1)
         index: Any = faiss.index_factory(width, f"IVF{n_lists},{CODE}", faiss.METRIC_INNER_PRODUCT)
@@ -143,13 +137,7 @@ class QdrantEngine:
         MissingExtraError
             If the client of Qdrant is not installed.
         """
-        try:
-            from qdrant_client import models  # noqa: PLC0415 - an optional extra
-        except ImportError as err:
-            raise MissingExtraError(
-                "Candidates from Qdrant need the extra 'qdrant'; qdrant_client is not installed. "
-                "Install eigenshape[qdrant]."
-            ) from err
+        models = import_extra("qdrant_client", "'eigenshape[qdrant]'").models
         n_shapes, n_sizes, width = coarse.numbers.shape
         if self.client.collection_exists(self.collection):
             self.client.delete_collection(self.collection)

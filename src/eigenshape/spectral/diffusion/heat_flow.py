@@ -172,7 +172,14 @@ def _flow_by_steps(
     groups = group_times(own_times)
     for number, places in enumerate(groups):
         tau = step_time(own_times[places])
-        factor = _factorize_step(pencil, tau)
+        pattern = pencil.shift_pattern
+        factor = factorize_symmetric(pattern.elimination, pattern.mass + tau * pattern.stiffness)
+        if factor is None or (factor.pivots <= 0).any():
+            raise InvalidParameterError(
+                "The operator must have no negative eigenvalue, or heat grows without limit; B + τW is "
+                f"not positive definite at τ = {tau * 2.0**-pencil.value_exponent:.4g}. "
+                "es.spectral.check_laplacian(laplacian) says more."
+            )
         polynomials = [step_coefficients(time / tau, accuracy) for time in own_times[places]]
         degree = max(map(len, polynomials))
         coefficients = np.array([np.pad(each, (0, degree - len(each))) for each in polynomials])
@@ -208,18 +215,6 @@ def _constants(pencil: Pencil) -> tuple[sp.csr_array, sp.csr_array]:
     weighed = sp.csr_array(pencil.mass @ members)
     averages = weighed.T / weighed.sum(axis=0)[:, None]
     return sp.csr_array(averages), sp.csr_array(members)
-
-
-def _factorize_step(pencil: Pencil, tau: float) -> SymmetricFactor:
-    pattern = pencil.shift_pattern
-    factor = factorize_symmetric(pattern.elimination, pattern.mass + tau * pattern.stiffness)
-    if factor is None or (factor.pivots <= 0).any():
-        raise InvalidParameterError(
-            "The operator must have no negative eigenvalue, or heat grows without limit; B + τW is "
-            f"not positive definite at τ = {tau * 2.0**-pencil.value_exponent:.4g}. "
-            "es.spectral.check_laplacian(laplacian) says more."
-        )
-    return factor
 
 
 def step_time(times: Float[np.ndarray, " q"]) -> float:

@@ -5,7 +5,6 @@ import warnings
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from functools import partial
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
@@ -20,8 +19,8 @@ from eigenshape._errors import (
     FileFormatError,
     InvalidParameterError,
     InvalidShapeError,
-    MissingExtraError,
 )
+from eigenshape._extras import import_extra
 from eigenshape._files import as_path
 from eigenshape._progress import Callback, Progress
 from eigenshape._typing import Integer
@@ -377,13 +376,7 @@ def _convert(part: Any, form: Form) -> Any:
         indices, values = np.stack([entries.row, entries.col]).astype(np.int64), entries.data
     if form == "numpy":
         return indices, values
-    try:
-        torch = import_module("torch")
-    except ImportError as err:
-        raise MissingExtraError(
-            "torch must be installed for tensors; it is not. Run pip install torch, or pass "
-            "form='numpy'."
-        ) from err
+    torch = import_extra("torch", "torch, or pass form='numpy'")
     if not is_sparse:
         return torch.from_numpy(part)
     # torch 2.13 warns if nothing is said about the checks; they cost less than the conversion.

@@ -1,23 +1,18 @@
 """What the formats of brains share: nibabel, if it is installed, and numbers of 32 bits."""
 
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError, MissingExtraError
+from eigenshape._errors import FileFormatError
+from eigenshape._extras import import_extra
 
 Arrays = dict[str, np.ndarray]
 
 
 def require_nibabel(module: str) -> Any:
     """Return a module of nibabel."""
-    try:
-        return import_module(module)
-    except ImportError as err:
-        raise MissingExtraError(
-            "nibabel must be installed; it is not. Run pip install 'eigenshape[neuro]'."
-        ) from err
+    return import_extra(module, "'eigenshape[neuro]'")
 
 
 def narrow(name: str, values: np.ndarray) -> np.ndarray:

@@ -1,0 +1,128 @@
+"""eigenshape collection: specimens of a folder in correspondence, with landmarks and a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import eigenshape as es
+from eigenshape.cli import steps
+from eigenshape.cli.console import (
+    SOME_FAILED,
+    batch_reporter,
+    err,
+    escape_text,
+    out,
+    print_json,
+    print_written,
+    progress_bar,
+)
+
+
+def collection(
+    folder: Path,
+    *,
+    output: Path,
+    landmarks: Path | None = None,
+    template: str | None = None,
+    workers: Annotated[int | None, typer.Option(min=1)] = None,
+    timeout: Annotated[float, typer.Option(min=1)] = 300.0,
+    memory: Annotated[float | None, typer.Option(min=0.1)] = None,
+    scheduler: str | None = None,
+    as_json: bool = False,
+) -> None:
+    """Bring all specimens of a folder into correspondence, and carry the landmarks of some to all.
+
+    The output has the mean shape (mean.ply), the landmarks of all specimens (landmarks.csv) and a
+    page that any browser opens (report.html). A specimen that fails is named, and the others go on.
+    After Ctrl-C or a crash the same command continues where it stopped. The exit code is 3 if some
+    specimens failed.
+
+    For instance: eigenshape collection skulls -o skulls-out
+
+    Parameters
+    ----------
+    folder
+        Folder of surfaces of one form, such as bones. Landmarks beside a surface of the same name
+        (NAME.mrk.json, NAME.fcsv) are taken as known.
+    output
+        Write the collection to this folder, which is created if it does not exist.
+    landmarks
+        Known landmarks, instead of those in the folder: a table (.csv, .tps, .txt of Morphologika)
+        that names specimens, or a folder of files NAME.mrk.json or NAME.fcsv.
+    template
+        Name of the specimen that is fitted to all others first. By default the one with the median
+        area.
+    workers
+        Number of processes that fit specimens at the same time. By default one for each core.
+    timeout
+        Seconds after which a specimen is named as failed.
+    memory
+        Gigabytes that a process may use; a specimen that needs more is named as failed. By default
+        each process has an equal share of the machine's memory.
+    scheduler : ADDRESS
+        Fit on a cluster: the address of a Dask scheduler, such as tcp://10.0.0.5:8786. Needs
+        pip install 'eigenshape[cluster]' on all machines, and files that all of them see.
+    """
+    # Files that cannot be read are found now, and not after hours.
+    labelled = steps.find_landmarks(folder, landmarks, output)
+    with (
+        steps.worker_processes(workers, timeout, memory, scheduler) as processes,
+        progress_bar("collection") as progress,
+    ):
+        built = es.collections.build_collection(
+            folder,
+            output,
+            template=template,
+            workers=processes,
+            callback=batch_reporter(progress, "failed"),
+        )
+    known = {name: points for name, points in labelled.items() if name in built.names}
+    written = [output / "mean.ply"]
+    carried = None
+    warnings = steps.landmarks_outside(built, known)
+    if known:
+        carried = es.collections.carry_landmarks(built, known)
+        carried.save(output / "landmarks.csv")
+        written.append(output / "landmarks.csv")
+    with progress_bar("report") as progress:
+        title = folder.absolute().name
+        steps.write_collection_report(built, carried, output / "report.html", title, progress)
+    written.append(output / "report.html")
+
+    doubtful = {} if carried is None else steps.doubtful_landmarks(carried)
+    if as_json:
+        print_json(
+            {
+                "output": output,
+                "specimens": built.names,
+                "template": built.template,
+                "labelled": list(known),
+                "doubtful": doubtful,
+                "notes": {name: notes for name, notes in built.notes.items() if notes},
+                "warnings": warnings,
+                "failures": built.failures,
+            }
+        )
+    else:
+        for name, notes in built.notes.items():
+            if notes:
+                out.print(f"  {escape_text(name)}: {escape_text('; '.join(notes))}")
+        for name, rows in doubtful.items():
+            out.print(f"  {escape_text(name)}: look at {escape_text(', '.join(rows))}")
+        # On a terminal each specimen was named when it failed.
+        for name, reason in () if out.is_terminal and err.is_terminal else built.failures.items():
+            out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
+        n_landmarks = 0 if carried is None else len(carried.names)
+        out.print(
+            f"{len(built.names)} specimens, {len(built.failures)} failed; {n_landmarks} landmarks "
+            f"of {len(known)} specimens were carried to all."
+        )
+        for path in written:
+            print_written(path)
+    for warning in warnings:
+        err.print(f"[yellow]landmarks:[/] {escape_text(warning)}")
+    if built.failures:
+        raise typer.Exit(SOME_FAILED)

@@ -1,0 +1,146 @@
+"""The report of a collection: one page with its mean, modes, specimens and landmarks."""
+
+import html
+import json
+from base64 import b64encode
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.image import imsave
+
+from eigenshape._files import replace_file
+from eigenshape.collections.alignment import best_similarity
+from eigenshape.collections.carrying import CarriedLandmarks
+from eigenshape.collections.collection import Collection, unreflect
+from eigenshape.geometry.distances.closest import closest_points
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.morphometrics.procrustes import fit_procrustes
+from eigenshape.morphometrics.variation import principal_components
+from eigenshape.plot.camera import Camera, aim_camera
+from eigenshape.plot.render import draw
+
+N_MODES = 5  # sliders
+PICTURE = 160  # pixels of a specimen's picture
+STEPS = 32_000  # of a coordinate, in 16 bits: finer than a pixel of any screen
+GRAY = (0.8, 0.78, 0.74)  # color of a scan, as the page has the mean
+
+
+def write_collection_report(
+    collection: Collection,
+    carried: CarriedLandmarks | None,
+    path: Path,
+    title: str,
+    progress: Callable[[float, str], None],
+) -> None:
+    """Write one page that any browser opens without a server."""
+    together = fit_procrustes(collection.unreflected)
+    size = float(np.median(together.sizes))
+    components = principal_components(together.shapes)
+    deviations = np.sqrt(components.variances[:N_MODES])
+    mean = TriangleMesh(size * components.mean, collection.mean.faces)
+    camera = aim_camera(mean, size=PICTURE)
+    scores = components.scores[:, : len(deviations)] / deviations
+
+    specimens = []
+    for number, name in enumerate(collection.names):
+        progress(number / len(collection.names), name)
+        specimens.append(
+            {
+                "name": name,
+                "notes": collection.notes[name],
+                "picture": _picture(collection, number, mean.vertices, camera),
+                "scores": scores[number].tolist(),
+            }
+        )
+    modes = components.modes[: len(deviations)] * (size * deviations)[:, None, None]
+    data = {
+        "template": collection.template,
+        "specimens": specimens,
+        "failures": collection.failures,
+        "mean": _numbers(mean.vertices),
+        "modes": [_numbers(mode) for mode in modes],
+        "faces": _text(mean.faces.astype("<u4"), None),
+        "shares": components.shares[: len(deviations)].tolist(),
+        "deviations": deviations.tolist(),
+        # The page has the upward direction where pictures have the downward one.
+        "turn": (camera.rotation * [[1], [-1], [1]]).tolist(),
+        "landmarks": [] if carried is None else _landmarks(collection, carried, mean),
+    }
+    page = Path(__file__).with_suffix(".html").read_text(encoding="utf-8")
+    page = page.replace("@TITLE@", html.escape(title))
+    # In a script element only < could begin what ends it.
+    page = page.replace("@DATA@", json.dumps(data).replace("<", "\\u003c"))
+    replace_file(path, page.encode())
+
+
+def _picture(
+    collection: Collection, number: int, mean: Float[np.ndarray, "n 3"], camera: Camera
+) -> str:
+    """Return the picture of a scan, placed like the mean, as the address of an image."""
+    mesh = collection.read_specimen(collection.names[number])
+    reflected = collection.reflected[number]
+    placing = best_similarity(collection.unreflected[number], mean, np.ones(len(mean)))
+    vertices = placing.move(unreflect(mesh.vertices[None], (reflected,))[0])
+    faces = mesh.faces[:, ::-1] if reflected else mesh.faces
+    colors = np.broadcast_to(GRAY, (mesh.n_faces, 3))
+    image = draw(TriangleMesh(vertices, faces), camera, face_colors=colors).image
+    file = BytesIO()
+    imsave(file, image, format="png")
+    return f"data:image/png;base64,{b64encode(file.getvalue()).decode()}"
+
+
+def _landmarks(
+    collection: Collection, carried: CarriedLandmarks, mean: TriangleMesh
+) -> list[dict[str, Any]]:
+    """Return where each landmark lies on the mean, and its spread at the size of the mean."""
+    places, spreads = [], []
+    for points, own, spread in zip(carried.points, collection.points, carried.spread, strict=True):
+        found = closest_points(TriangleMesh(own, mean.faces), points)
+        corners = mean.vertices[mean.faces[found.simplices]]
+        places.append(np.einsum("kc,kcd->kd", found.weights, corners))
+        spreads.append(spread * (_size(mean.vertices) / _size(own)))
+    on_mean = closest_points(mean, np.median(places, axis=0))
+    # Given landmarks have no spread of their own.
+    widths = np.array(spreads)
+    typical = np.nan_to_num(np.nanmedian(np.where(widths > 0, widths, np.nan), axis=0))
+    return [
+        {
+            "name": name,
+            "corners": mean.faces[face].tolist(),
+            "weights": weights.tolist(),
+            "spread": float(width),
+            "radius": float(width),
+            "doubtful": [
+                specimen
+                for specimen, is_one in zip(carried.specimens, doubtful, strict=True)
+                if is_one
+            ],
+        }
+        for name, face, weights, width, doubtful in zip(
+            carried.names,
+            on_mean.simplices,
+            on_mean.weights,
+            typical,
+            carried.doubtful.T,
+            strict=True,
+        )
+    ]
+
+
+def _size(points: Float[np.ndarray, "n 3"]) -> float:
+    return float(np.linalg.norm(points - points.mean(axis=0)))
+
+
+def _numbers(values: np.ndarray) -> dict[str, Any]:
+    """Return numbers as whole multiples of a step."""
+    step = float(np.abs(values).max()) / STEPS or 1.0
+    return _text(np.round(values / step).astype("<i2"), step)
+
+
+def _text(values: np.ndarray, step: float | None) -> dict[str, Any]:
+    kind = "int16" if step is not None else "uint32"
+    return {"kind": kind, "step": step, "text": b64encode(values.tobytes()).decode()}

@@ -1,0 +1,126 @@
+"""eigenshape collection: a folder of specimens, landmarks of some on all, and a report of one page."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from running import run, run_json
+
+import eigenshape as es
+
+CHOSEN = [100, 200, 300, 400]
+NAMES = [f"point {i}" for i in CHOSEN]
+ODD = "hand <3>"
+
+
+def hand(number):
+    """Return a hand with proportions and a bend of its own; vertices of all correspond."""
+    mesh = es.make_creature("hand", n_vertices=600)
+    x, y, z = mesh.vertices.T
+    draw = np.random.default_rng(number).standard_normal(3)
+    bent = np.column_stack(
+        [x * (1 + 0.1 * draw[0]), y, z + 0.1 * draw[1] * y**2 + 0.05 * draw[2] * x]
+    )
+    return es.TriangleMesh(bent + np.array([number, 0, 0]), mesh.faces)
+
+
+def landmarks(number):
+    return es.morphometrics.Landmarks(NAMES, hand(number).vertices[CHOSEN])
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scans")
+    for number, name in enumerate(["hand 0", "hand 1", "hand 2", ODD]):
+        es.write_mesh(hand(number), folder / f"{name}.ply")
+    es.morphometrics.write_landmarks(landmarks(0), folder / "hand 0.mrk.json")
+    es.morphometrics.write_landmarks(landmarks(1), folder / "hand 1.fcsv")
+    (folder / "broken.ply").write_text("ply\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def output(scans):
+    """The collection, within the folder of its specimens."""
+    output = scans / "out"
+    done = run("collection", scans, "-o", output, "--workers", 1, code=3)
+    assert "4 specimens, 1 failed; 4 landmarks of 2 specimens were carried to all." in done.stdout
+    assert "broken: " in done.stdout
+    assert "failed: broken: " in done.stderr
+    assert f"wrote {output / 'report.html'}" in done.stderr
+    return output
+
+
+def page_data(output):
+    page = (output / "report.html").read_text()
+    block = re.search(r'<script id="data" type="application/json">(.*?)</script>', page, re.DOTALL)
+    return page, json.loads(block[1])
+
+
+def test_landmarks_of_all_specimens_are_a_table(output):
+    text = (output / "landmarks.csv").read_text()
+    assert text.startswith("specimen,landmark,x,y,z,spread,doubtful\n")
+    table = es.morphometrics.read_specimens(output / "landmarks.csv")
+    assert sorted(table) == ["hand 0", "hand 1", "hand 2", ODD]
+    assert np.array_equal(table["hand 0"].points, landmarks(0).points)
+    assert np.array_equal(table["hand 1"].spread, np.zeros(4))
+    for number, name in ((2, "hand 2"), (3, ODD)):
+        away = np.linalg.norm(table[name].points - landmarks(number).points, axis=1)
+        assert np.median(away) < 0.05
+        assert (table[name].spread > 0).all()
+    assert es.read_mesh(output / "mean.ply").n_vertices > 500
+
+
+def test_the_page_holds_all_that_it_shows(output):
+    page, data = page_data(output)
+    assert not set(re.findall(r"https?://[^\"'\s]+", page)) - {"http://www.w3.org/2000/svg"}
+    assert page.count("</script>") == 2
+    assert [each["name"] for each in data["specimens"]] == ["hand 0", "hand 1", "hand 2", ODD]
+    assert all(each["picture"].startswith("data:image/png") for each in data["specimens"])
+    assert data["failures"].keys() == {"broken"}
+    assert [mark["name"] for mark in data["landmarks"]] == NAMES
+    assert len(data["modes"]) == 3
+    built = es.collections.open_collection(output)
+    corners = np.array([mark["corners"] for mark in data["landmarks"]])
+    weights = np.array([mark["weights"] for mark in data["landmarks"]])
+    there = np.einsum("kc,kcd->kd", weights, built.points[2][corners])
+    table = es.morphometrics.read_specimens(output / "landmarks.csv")
+    assert np.linalg.norm(there - table["hand 2"].points, axis=1).max() < 0.1
+
+
+def test_the_same_command_goes_on_and_says_the_same(scans, output):
+    before = (output / "landmarks.csv").read_bytes()
+    facts = run_json("collection", scans, "-o", output, "--workers", 1, code=3)
+    assert (output / "landmarks.csv").read_bytes() == before
+    assert facts["specimens"] == ["hand 0", "hand 1", "hand 2", ODD]
+    assert facts["labelled"] == ["hand 0", "hand 1"]
+    assert facts["failures"].keys() == {"broken"}
+    assert facts["warnings"] == []
+
+
+def test_landmarks_in_another_frame_are_noted(scans, output, tmp_path):
+    moved = es.morphometrics.Landmarks(NAMES, landmarks(0).points * [-1, -1, 1] + 5.0)
+    es.morphometrics.write_landmarks({"hand 0": moved}, tmp_path / "table.csv")
+    done = run(
+        "collection", scans, "-o", output, "--landmarks", tmp_path / "table.csv",
+        "--workers", 1, code=3,
+    )  # fmt: skip
+    assert "in another frame or unit than the mesh" in done.stderr
+
+
+def test_landmarks_that_fit_no_specimen_are_refused(scans, tmp_path):
+    def refused(source):
+        options = ("-o", tmp_path / "out", "--landmarks", source)
+        return run("collection", scans, *options, code=2).stderr
+
+    table = tmp_path / "table.csv"
+    es.morphometrics.write_landmarks({"hnad 0": landmarks(0)}, table)
+    assert "Landmarks must be of specimens" in refused(table)
+    (tmp_path / "empty").mkdir()
+    assert "--landmarks takes a table, or a folder" in refused(tmp_path / "empty")
+    (tmp_path / "twice").mkdir()
+    for suffix in (".fcsv", ".mrk.json"):
+        es.morphometrics.write_landmarks(landmarks(0), tmp_path / "twice" / f"hand 0{suffix}")
+    assert "must have one file of landmarks" in refused(tmp_path / "twice")
+    assert not (tmp_path / "out").exists()
