@@ -101,12 +101,16 @@ def test_the_same_command_goes_on_and_says_the_same(scans, output):
 
 def test_landmarks_in_another_frame_are_noted(scans, output, tmp_path):
     moved = es.morphometrics.Landmarks(NAMES, landmarks(0).points * [-1, -1, 1] + 5.0)
-    es.morphometrics.write_landmarks({"hand 0": moved}, tmp_path / "table.csv")
+    es.morphometrics.write_landmarks(
+        {"hand 0": moved, "broken": landmarks(1)}, tmp_path / "table.csv"
+    )
+    # The same table has landmarks of a specimen that failed.
     done = run(
         "collection", scans, "-o", output, "--landmarks", tmp_path / "table.csv",
         "--workers", 1, code=3,
     )  # fmt: skip
     assert "in another frame or unit than the mesh" in done.stderr
+    assert "landmarks: those of broken are not used: it failed" in done.stderr
 
 
 def test_landmarks_that_fit_no_specimen_are_refused(scans, tmp_path):

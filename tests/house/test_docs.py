@@ -4,10 +4,13 @@ import re
 from operator import attrgetter
 from pathlib import Path
 
+import numpy as np
 import pytest
 from public_names import public_things
+from typer.testing import CliRunner
 
 import eigenshape as es
+from eigenshape.cli import app
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -53,3 +56,28 @@ def test_the_page_of_modes_runs():
     exec("\n".join(blocks), names)
     assert 0 < names["p_value"] < 0.5
     assert len(names["modes"])
+
+
+def test_the_page_from_scans_to_figures_runs(tmp_path, monkeypatch):
+    """Its blocks follow one another, with the command between them, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "scans_to_figures.md").read_text()
+    names: dict[str, object] = {}
+    for kind, block in re.findall(r"```(python|sh)\n(.*?)```", page, re.DOTALL):
+        if kind == "python":
+            exec(block, names)
+        else:
+            command, *arguments = block.split()
+            assert command == "eigenshape"
+            done = CliRunner().invoke(app, [*arguments, "--workers", "1"])
+            assert done.exit_code == 0, done.output
+    assert sorted(names["hands"]) == sorted(path.stem for path in Path("hands").glob("*.ply"))
+    for written in ("hands.pdf", "broad-against-slim.png", "scores.csv", "hands-out/report.html"):
+        assert Path(written).stat().st_size > 100
+    # Hands that were made 1.3 times as broad are found to be broader.
+    breadths = []
+    for mesh in (names["broad"], names["slim"]):
+        away = mesh.vertices - mesh.vertices.mean(axis=0)
+        length, breadth, _ = np.linalg.svd(away, compute_uv=False)
+        breadths.append(breadth / length)
+    assert 1.1 < breadths[0] / breadths[1] < 1.3

@@ -340,6 +340,41 @@ def test_every_row_runs(page, tmp_path):
     assert not complaints, "\n".join(complaints)
 
 
+def names_for_alpaca(folder: Path) -> dict[str, Any]:
+    """What our code beside ALPACA's may use, which runs in 3D Slicer only."""
+    mesh = bumpy_ball()
+    other = es.TriangleMesh(mesh.vertices * [1.1, 1.0, 0.9], mesh.faces)
+    (folder / "scans").mkdir()
+    given = {}
+    for name, scan in (("a", mesh), ("b", other), ("c", mesh)):
+        es.write_mesh(scan, folder / "scans" / f"{name}.ply")
+        given[name] = es.morphometrics.Landmarks(["1", "2", "3", "4"], scan.vertices[::50])
+    es.morphometrics.write_landmarks(given["a"], folder / "a.mrk.json")
+    return {
+        "es": es,
+        "folder": folder / "scans",
+        "output": folder / "out",
+        "landmarks_path": folder / "a.mrk.json",
+        "new_path": folder / "new.fcsv",
+        "table_path": folder / "all.csv",
+        "other_landmarks": given["b"],
+        "mesh": mesh,
+        "other": other,
+        "points": mesh.vertices[:5],
+        "rows": [3, 7],
+    }
+
+
+def test_every_row_beside_alpaca_runs(tmp_path):
+    names = names_for_alpaca(tmp_path)
+    n_values = 0
+    for _, cell in rows_of("alpaca"):
+        n_values += len(run(cell, names))
+    assert n_values > 12
+    assert names["new_path"].exists()
+    assert names["table_path"].exists()
+
+
 def test_every_row_beside_geomorph_runs(tmp_path):
     names = names_for_geomorph(tmp_path)
     n_values = 0
@@ -348,7 +383,7 @@ def test_every_row_beside_geomorph_runs(tmp_path):
     assert n_values > 25
 
 
-@pytest.mark.parametrize("page", [*PEERS, "geomorph"])
+@pytest.mark.parametrize("page", [*PEERS, "geomorph", "alpaca"])
 def test_few_rows_have_no_code_and_they_say_what_is_missing(page):
     rows = rows_of(page)
     prose = [cells for cells in rows if "`" not in cells[1]]

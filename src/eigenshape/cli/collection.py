@@ -20,6 +20,8 @@ from eigenshape.cli.console import (
     progress_bar,
 )
 
+MOST_NAMED = 5  # doubtful landmarks that a line names; the report has all
+
 
 def collection(
     folder: Path,
@@ -83,6 +85,9 @@ def collection(
     written = [output / "mean.ply"]
     carried = None
     warnings = steps.landmarks_outside(built, known)
+    warnings += [
+        f"those of {name} are not used: it failed" for name in labelled if name not in known
+    ]
     if known:
         carried = es.collections.carry_landmarks(built, known)
         carried.save(output / "landmarks.csv")
@@ -111,15 +116,21 @@ def collection(
             if notes:
                 out.print(f"  {escape_text(name)}: {escape_text('; '.join(notes))}")
         for name, rows in doubtful.items():
-            out.print(f"  {escape_text(name)}: look at {escape_text(', '.join(rows))}")
+            first = ", ".join(rows[:MOST_NAMED]) + (", ..." if len(rows) > MOST_NAMED else "")
+            out.print(
+                f"  {escape_text(name)}: {len(rows)} landmarks are doubtful: {escape_text(first)}"
+            )
         # On a terminal each specimen was named when it failed.
         for name, reason in () if out.is_terminal and err.is_terminal else built.failures.items():
             out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
-        n_landmarks = 0 if carried is None else len(carried.names)
-        out.print(
-            f"{len(built.names)} specimens, {len(built.failures)} failed; {n_landmarks} landmarks "
-            f"of {len(known)} specimens were carried to all."
-        )
+        counts = f"{len(built.names)} specimens, {len(built.failures)} failed"
+        if carried is None:
+            out.print(f"{counts}; no landmarks were given.")
+        else:
+            out.print(
+                f"{counts}; {len(carried.names)} landmarks of {len(known)} specimens were carried to "
+                "all."
+            )
         for path in written:
             print_written(path)
     for warning in warnings:

@@ -30,7 +30,7 @@ def find_landmarks(folder: Path, landmarks: Path | None, output: Path) -> dict[s
         found = {}
         for path in sorted(source.rglob("*")):
             suffix = next((each for each in OF_ONE if path.name.lower().endswith(each)), None)
-            if suffix is None or output in path.parents:
+            if suffix is None or output.absolute() in path.absolute().parents:
                 continue
             name = path.relative_to(source).as_posix()[: -len(suffix)]
             if name in found:

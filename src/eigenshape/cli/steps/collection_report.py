@@ -37,7 +37,8 @@ def write_collection_report(
     progress: Callable[[float, str], None],
 ) -> None:
     """Write one page that any browser opens without a server."""
-    together = fit_procrustes(collection.unreflected)
+    unreflected = collection.unreflected
+    together = fit_procrustes(unreflected)
     size = float(np.median(together.sizes))
     components = principal_components(together.shapes)
     deviations = np.sqrt(components.variances[:N_MODES])
@@ -52,7 +53,7 @@ def write_collection_report(
             {
                 "name": name,
                 "notes": collection.notes[name],
-                "picture": _picture(collection, number, mean.vertices, camera),
+                "picture": _picture(collection, number, unreflected[number], mean.vertices, camera),
                 "scores": scores[number].tolist(),
             }
         )
@@ -78,12 +79,16 @@ def write_collection_report(
 
 
 def _picture(
-    collection: Collection, number: int, mean: Float[np.ndarray, "n 3"], camera: Camera
+    collection: Collection,
+    number: int,
+    own: Float[np.ndarray, "n 3"],
+    mean: Float[np.ndarray, "n 3"],
+    camera: Camera,
 ) -> str:
-    """Return the picture of a scan, placed like the mean, as the address of an image."""
+    """Return the picture of a scan, placed by its own points on the mean, as the address of an image."""
     mesh = collection.read_specimen(collection.names[number])
     reflected = collection.reflected[number]
-    placing = best_similarity(collection.unreflected[number], mean, np.ones(len(mean)))
+    placing = best_similarity(own, mean, np.ones(len(mean)))
     vertices = placing.move(unreflect(mesh.vertices[None], (reflected,))[0])
     faces = mesh.faces[:, ::-1] if reflected else mesh.faces
     colors = np.broadcast_to(GRAY, (mesh.n_faces, 3))
