@@ -66,9 +66,11 @@ def test_what_is_done_is_kept_and_what_is_damaged_is_done_again(folder, built, m
     monkeypatch.setattr(building, "fit_surface", counted)
     (folder / "out" / "first" / "ball 1.npz").write_bytes(b"PK")
     steps = []
+    # Without a template it keeps that of the folder, which has not the median area.
     again = es.collections.build_collection(
-        folder, folder / "out", template="ball 0", callback=lambda *step: steps.append(step)
+        folder, folder / "out", callback=lambda *step: steps.append(step)
     )
+    assert again.template == "ball 0"
     assert len(fitted) == 1
     assert np.array_equal(again.points, built.points)
     assert steps[-1][:2] == (12, 12)

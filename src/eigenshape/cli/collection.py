@@ -55,8 +55,8 @@ def collection(
         Known landmarks, instead of those in the folder: a table (.csv, .tps, .txt of Morphologika)
         that names specimens, or a folder of files NAME.mrk.json or NAME.fcsv.
     template
-        Name of the specimen that is fitted to all others first. By default the one with the median
-        area.
+        Name of the specimen that is fitted to all others first. By default that of the collection in
+        the output folder, or of a new one the specimen with the median area.
     workers
         Number of processes that fit specimens at the same time. By default one for each core.
     timeout
@@ -117,9 +117,7 @@ def collection(
                 out.print(f"  {escape_text(name)}: {escape_text('; '.join(notes))}")
         for name, rows in doubtful.items():
             first = ", ".join(rows[:MOST_NAMED]) + (", ..." if len(rows) > MOST_NAMED else "")
-            out.print(
-                f"  {escape_text(name)}: {len(rows)} landmarks are doubtful: {escape_text(first)}"
-            )
+            out.print(f"  {escape_text(name)}: doubtful landmarks: {escape_text(first)}")
         # On a terminal each specimen was named when it failed.
         for name, reason in () if out.is_terminal and err.is_terminal else built.failures.items():
             out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")

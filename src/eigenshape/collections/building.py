@@ -1,6 +1,7 @@
 """Build a collection: fit a template to all specimens, then their mean."""
 
 import hashlib
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
@@ -18,6 +19,7 @@ from eigenshape._progress import Callback
 from eigenshape._workers import Item, Outcome, Workers, run_in_workers
 from eigenshape.collections.alignment import MIRROR, Similarity, best_similarity
 from eigenshape.collections.collection import (
+    TABLE,
     Collection,
     fit_file,
     read_fit,
@@ -87,7 +89,8 @@ def build_collection(
     folder : str or Path
         Where the collection is kept; it is made where it is missing.
     template : str, optional
-        Name of a complete specimen. By default the one with the median area.
+        Name of a complete specimen. By default that of the collection in the folder, or of a new
+        one the specimen with the median area.
     workers : Workers, optional
         Processes, or the tasks of a cluster, that fit files side by side. By default all work is
         done by this process; `es.retrieval.Workers()` uses all cores.
@@ -146,7 +149,9 @@ def build_collection(
     run.require_two(found)
     if template is None:
         order = sorted(items, key=lambda item: (found[item.name].area, item.name))
-        template = order[len(order) // 2].name
+        # Another template would discard all fits when a specimen is added.
+        last = _last_template(folder)
+        template = last if last in found else order[len(order) // 2].name
     if template in run.failures:
         raise InvalidShapeError(f"The template must be readable. {run.failures[template]}")
     digests = {name: measured.digest for name, measured in found.items()}
@@ -320,6 +325,13 @@ def _find_specimens(
             write_mesh(as_mesh(value, f"specimens[{name!r}]"), path)
         items.append(Item(str(name), path))
     return items
+
+
+def _last_template(folder: Path) -> str | None:
+    try:
+        return str(json.loads((folder / TABLE).read_bytes())["template"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None  # there is no collection that is whole
 
 
 def _measure_file(path: Path) -> _Measured:
