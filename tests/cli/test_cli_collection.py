@@ -45,7 +45,7 @@ def output(scans):
     """The collection, within the folder of its specimens."""
     output = scans / "out"
     done = run("collection", scans, "-o", output, "--workers", 1, code=3)
-    assert "4 specimens, 1 failed; 4 landmarks of 2 specimens were carried to all." in done.stdout
+    assert "4 specimens, 1 failed, 2 labelled; all have 4 landmarks now." in done.stdout
     assert "broken: " in done.stdout
     assert "failed: broken: " in done.stderr
     assert f"wrote {output / 'report.html'}" in done.stderr

@@ -125,10 +125,8 @@ def collection(
         if carried is None:
             out.print(f"{counts}; no landmarks were given.")
         else:
-            out.print(
-                f"{counts}; {len(carried.names)} landmarks of {len(known)} specimens were carried to "
-                "all."
-            )
+            counts += f", {len(known)} labelled"
+            out.print(f"{counts}; all have {len(carried.names)} landmarks now.")
         for path in written:
             print_written(path)
     for warning in warnings:
