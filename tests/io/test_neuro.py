@@ -554,7 +554,7 @@ def test_what_else_a_file_holds_is_named(tmp_path):
 
 
 def test_without_nibabel_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("eigenshape.io.formats.neuro.shared.import_module", _no_module)
+    monkeypatch.setattr("eigenshape._extras.import_module", _no_module)
     with pytest.raises(es.MissingExtraError, match=r"eigenshape\[neuro\]"):
         es.write_mesh(BALL, tmp_path / "a.gii")
 

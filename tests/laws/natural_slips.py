@@ -316,6 +316,8 @@ NAMED: dict[str, Callable[[], Any]] = {
     "labels": labels,
     "labels_from_votes.labels": lambda: [4, 2, 7],
     "labels_from_votes.votes": lambda: np.eye(body().n_vertices)[:, :3],
+    "LatentBasis.map_between.source": lambda: 0,
+    "LatentBasis.map_between.target": lambda: 1,
     "latent_basis.maps": lambda: {(0, 1): mapping()},
     "level": lambda: 0.1,
     "logarithmic_map.source": lambda: 0,

@@ -133,7 +133,9 @@ def test_a_missing_engine_names_its_extra(source, monkeypatch):
     coarse = coarse_rows(source, RECIPE)
     for module in ("faiss", "qdrant_client"):
         monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(es.MissingExtraError, match=r"FAISS need .* Install eigenshape\[faiss\]"):
+    with pytest.raises(es.MissingExtraError, match=r"faiss must be installed.*eigenshape\[faiss\]"):
         engines.FaissEngine(coarse)
-    with pytest.raises(es.MissingExtraError, match=r"Qdrant need .* Install eigenshape\[qdrant\]"):
+    with pytest.raises(
+        es.MissingExtraError, match=r"qdrant_client must be installed.*eigenshape\[qdrant\]"
+    ):
         engines.QdrantEngine(None, "coarse").fill(coarse)

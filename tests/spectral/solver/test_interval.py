@@ -194,16 +194,16 @@ def test_where_counts_and_finds_never_agree_nothing_is_returned(monkeypatch):
         vectors, factor = slices.walk_on(*arguments)
         return np.delete(vectors, vectors.shape[1] // 2, axis=1), factor
 
-    monkeypatch.setattr(interval, "walk_on", forgetful)
+    monkeypatch.setattr(certified, "walk_on", forgetful)
     _, again = certified.solve_interval(pencil, counted, lambda done: None)
     assert again.count == again.n_found == certificate.count
-    monkeypatch.setattr(interval, "INTERVAL_RUNS", 1)
+    monkeypatch.setattr(certified, "INTERVAL_RUNS", 1)
     with pytest.raises(
         ConvergenceError, match=r"Every eigenvalue that inertia counts .* in the interval were"
     ):
         certified.solve_interval(pencil, counted, lambda done: None)
-    monkeypatch.setattr(interval, "_clear_gaps", lambda values, interval: None)
-    monkeypatch.setattr(interval, "walk_on", lambda pencil, factor, *rest: (pairs.vectors, factor))
+    monkeypatch.setattr(certified, "_clear_gaps", lambda values, interval: None)
+    monkeypatch.setattr(certified, "walk_on", lambda pencil, factor, *rest: (pairs.vectors, factor))
     with pytest.raises(ConvergenceError, match="An interval must end in a gap between eigenvalues"):
         certified.solve_interval(pencil, counted, lambda done: None)
 
