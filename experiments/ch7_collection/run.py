@@ -165,7 +165,7 @@ def main() -> None:
         "spread": dict(enumerate(calibration(carried.spread[rows], several), start=1)),
     }
     if arguments.quick:
-        finish({"quick": rounded(found)}, {}, arguments)
+        finish(rounded(found), {}, arguments)
         return
     found["statistics"] = {
         "landmarks": statistics(carried.points[rows], judged),
@@ -182,7 +182,7 @@ def main() -> None:
     }
     curves = {"one labelled skull": one, f"{len(labelled)} labelled skulls": several}
     pictures = {"errors": figure_errors(curves, calibration(carried.spread[rows], several))}
-    finish({"full": rounded(found)}, pictures, arguments)
+    finish(rounded(found), pictures, arguments)
 
 
 if __name__ == "__main__":
