@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from functools import cache
 from pathlib import Path
-from types import ModuleType, UnionType
+from types import ModuleType, SimpleNamespace, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -187,6 +187,10 @@ def written_parcels() -> Path:
 
 VALUES: dict[Any, Callable[[], Any]] = {
     es.features.Parcellation: parcels,
+    es.compat.lapy.Solver: lambda: es.compat.lapy.Solver(
+        SimpleNamespace(v=body().vertices, t=body().faces)
+    ),
+    es.modes.ParcelTree: lambda: es.modes.nodal_parcels(es.cotangent_laplacian(body()), 5),
     es.TriangleMesh: body,
     es.PointCloud: lambda: es.PointCloud(body().vertices),
     es.Laplacian: lambda: es.cotangent_laplacian(body()),
@@ -258,6 +262,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
 NAMED: dict[str, Callable[[], Any]] = {
     "specimens": skulls,
     "shapes": skulls,
+    "train_codebook.shapes": lambda: [VALUES[es.retrieval.Patches]()],
     "compare_groups.groups": lambda: [0, 0, 1, 1],
     "fit_allometry.sizes": lambda: [1.0, 2.0, 3.0, 5.0],
     "symmetric_components.pairs": lambda: [[0, 1]],

@@ -13,6 +13,8 @@ from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.spectrum import Spectrum
 from eigenshape.spectral.tools.filters import project
 
+MOST_PERMUTATIONS = 100_000  # p values to three digits; a billion would run for weeks
+
 # Statistics that differ by less than this share are equal: permutations that leave the groups as
 # they are sum in another order.
 EQUAL = 1e-9
@@ -82,6 +84,7 @@ def compare_modes(
     spectrum : Spectrum
         k eigenpairs of the template.
     n_permutations : int
+        1..100,000
     rng : numpy.random.Generator
 
     Returns
@@ -111,7 +114,9 @@ def compare_modes(
     """
     require_type(spectrum, Spectrum, "spectrum")
     require_type(rng, np.random.Generator, "rng")
-    rounds = whole_number(n_permutations, "n_permutations", 1)
+    rounds = whole_number(
+        n_permutations, "n_permutations", 1, MOST_PERMUTATIONS, "no p value needs more"
+    )
     n = len(spectrum.eigenvectors)
     groups = []
     for name, given in (("one", one), ("two", two)):

@@ -110,11 +110,14 @@ def require_name(name: object, where: str) -> None:
 
 
 def as_curves(curves: Sequence[Sequence[int]], n_points: int) -> tuple[tuple[int, ...], ...]:
-    """Return curves as tuples of rows; raise an error if a row does not exist."""
-    return tuple(
-        tuple(whole_numbers(list(curve), f"curves[{number}]", 0, n_points - 1).tolist())
-        for number, curve in enumerate(curves)
-    )
+    """Return curves as tuples of rows; raise an error if they are none, or a row does not exist."""
+    require_type(curves, Iterable, "curves")
+    found = []
+    for number, curve in enumerate(curves):
+        require_type(curve, Iterable, f"curves[{number}]")
+        rows = whole_numbers(list(curve), f"curves[{number}]", 0, n_points - 1)
+        found.append(tuple(rows.tolist()))
+    return tuple(found)
 
 
 def as_configurations(specimens: Specimens) -> Float[np.ndarray, "n k 3"]:

@@ -72,6 +72,8 @@ def test_bad_values_on_a_part_are_named():
         unmask([1.0], [0, 1], 4)
     with pytest.raises(InvalidParameterError, match="A vertex must lie in"):
         unmask([1.0], [4], 4)
+    with pytest.raises(es.InvalidParameterError, match="must fit into memory; n_vertices is 1000"):
+        unmask([1.0], [0], 10**15)
 
 
 def test_the_side_of_a_cortex_is_found():

@@ -125,7 +125,8 @@ def unmask(
     Raises
     ------
     InvalidParameterError
-        If `values` does not hold one row for each of `vertices`, or one of these is out of range.
+        If `values` does not hold one row for each of `vertices`, one of these is out of range, or
+        the result would not fit into memory.
 
     See Also
     --------
@@ -143,7 +144,12 @@ def unmask(
         raise InvalidParameterError(
             f"values must hold one row for each of {len(places)} vertices; the shape is {rows.shape}."
         )
-    whole = np.full((int(n_vertices), *rows.shape[1:]), np.nan)
+    try:
+        whole = np.full((int(n_vertices), *rows.shape[1:]), np.nan)
+    except MemoryError as err:
+        raise InvalidParameterError(
+            f"The values of n_vertices vertices must fit into memory; n_vertices is {n_vertices}."
+        ) from err
     whole[places] = rows
     return whole
 
