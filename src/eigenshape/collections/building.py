@@ -16,6 +16,7 @@ from eigenshape._arguments import require_type
 from eigenshape._errors import EigenshapeError, InvalidParameterError, InvalidShapeError
 from eigenshape._files import as_path
 from eigenshape._progress import Callback
+from eigenshape._threads import one_blas_thread
 from eigenshape._workers import Item, Outcome, Workers, run_in_workers
 from eigenshape.collections.alignment import MIRROR, Similarity, best_similarity
 from eigenshape.collections.collection import (
@@ -61,6 +62,7 @@ SURE = 0.25  # confidence of a vertex that determines where the second round sta
 ROUNDS = 20  # of finding the place and the shape of a start in turn
 
 
+@one_blas_thread()
 def build_collection(
     specimens: str | Path | Mapping[str, str | Path | MeshLike],
     folder: str | Path,

@@ -14,6 +14,7 @@ from eigenshape._arrays import ReadOnly
 from eigenshape._errors import InvalidParameterError
 from eigenshape._files import as_path, replace_file
 from eigenshape._text import short_repr
+from eigenshape._threads import one_blas_thread
 from eigenshape.collections.collection import Collection
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.mesh import TriangleMesh
@@ -79,6 +80,7 @@ class CarriedLandmarks(ReadOnly):
         replace_file(as_path(path), text.getvalue().encode())
 
 
+@one_blas_thread()
 def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -> CarriedLandmarks:
     """Carry the landmarks of some specimens to all.
 
