@@ -68,7 +68,9 @@ def test_points_that_do_not_fit_are_named():
         es.InvalidParameterError, match="spectrum has 162 points and reference has 642"
     ):
         es.modes.align_modes(small, SPECTRUM)
-    with pytest.raises(es.InvalidParameterError, match="of 162 points; there are 3"):
+    with pytest.raises(
+        es.InvalidParameterError, match="for each of 162 points of spectrum; there are 3"
+    ):
         es.modes.align_modes(small, SPECTRUM, points=[0, 1, 2])
     with pytest.raises(
         es.InvalidParameterError, match=r"a point of reference must lie in 0\.\.641"

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, whole_numbers
-from eigenshape._errors import InvalidParameterError
+from eigenshape._arrays import ReadOnly
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.comparison.eigenspaces import (
     SEPARATED,
+    corresponding_points,
     orthonormal,
-    outside,
+    principal_angles,
     separated_groups,
 )
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
@@ -135,18 +135,7 @@ def align_modes(
     """
     for name, each in (("spectrum", spectrum), ("reference", reference)):
         require_lowest(each, name)
-    n, n_reference = len(spectrum.eigenvectors), len(reference.eigenvectors)
-    if points is None and n != n_reference:
-        raise InvalidParameterError(
-            f"Spectra on different numbers of points need corresponding points; spectrum has {n} points and "
-            f"reference has {n_reference}. Pass points, the point of reference for each point of spectrum."
-        )
-    given = np.arange(n) if points is None else points
-    partners = whole_numbers(given, "a point of reference", 0, n_reference - 1)
-    if len(partners) != n:
-        raise InvalidParameterError(
-            f"points must hold one point of reference for each of {n} points; there are {len(partners)}."
-        )
+    partners = corresponding_points(points, spectrum, reference, ("spectrum", "reference"))
     k = min(len(spectrum.eigenvalues), len(reference.eigenvalues))
     stops = sorted(
         set.intersection(
@@ -157,7 +146,7 @@ def align_modes(
         )
     )
     starts = [0, *stops[:-1]]
-    modes, turns, angles = np.empty((n, k)), np.zeros((k, k)), np.empty(k)
+    modes, turns, angles = np.empty((len(partners), k)), np.zeros((k, k)), np.empty(k)
     for start, stop in zip(starts, stops, strict=True):
         own = spectrum.eigenvectors[:, start:stop]
         other = reference.eigenvectors[partners, start:stop]
@@ -167,9 +156,5 @@ def align_modes(
         # Modes of another mass or sampling are not orthonormal here, as cosines need them.
         name = f"Eigenvectors {start} to {stop - 1} of reference"
         basis = orthonormal(other, spectrum.mass, name)
-        cosines = np.linalg.svd(own.T @ (spectrum.mass @ basis), compute_uv=False)
-        # A small angle is known by its sine.
-        rest = outside(basis, own, spectrum.mass)
-        squares = np.linalg.eigvalsh(rest.T @ (spectrum.mass @ rest))
-        angles[start:stop] = np.arctan2(np.sqrt(np.maximum(squares, 0.0)), cosines)
+        angles[start:stop] = principal_angles(own, basis, spectrum.mass)
     return ModeAlignment(modes, turns, np.array(starts), np.array(stops), angles)

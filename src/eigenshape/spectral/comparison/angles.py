@@ -4,15 +4,16 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record, whole_numbers
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.comparison.eigenspaces import (
     SEPARATED,
+    corresponding_points,
     orthonormal,
-    outside,
+    principal_angles,
     separated_groups,
 )
 from eigenshape.spectral.solver.certify import quality
@@ -146,18 +147,7 @@ def eigenspace_angles(
     require_lowest(one, "one")
     require_lowest(two, "two")
     require_type(laplacian, Laplacian | None, "laplacian")
-    n_one, n_two = len(one.eigenvectors), len(two.eigenvectors)
-    if points is None and n_one != n_two:
-        raise InvalidParameterError(
-            f"Spectra on different numbers of points need corresponding points; one has {n_one} points and two has "
-            f"{n_two}. Pass points, the point of two that corresponds to each point of one."
-        )
-    given = np.arange(n_one) if points is None else points
-    partners = whole_numbers(given, "a point of two", 0, n_two - 1)
-    if len(partners) != n_one:
-        raise InvalidParameterError(
-            f"points must hold one point of two for each of {n_one} points of one; there are {len(partners)}."
-        )
+    partners = corresponding_points(points, one, two, ("one", "two"))
     groups = [
         group
         for group in separated_groups(one.eigenvalues, ratio=ratio)
@@ -168,12 +158,7 @@ def eigenspace_angles(
     for place, group in enumerate(groups):
         name = f"Eigenvectors {group.start} to {group.stop - 1} of two"
         pulled = orthonormal(two.eigenvectors[partners, group], one.mass, name)
-        # The largest principal angle: a small one by its sine, a large one by its cosine.
-        vectors = one.eigenvectors[:, group]
-        rest = outside(pulled, vectors, one.mass)
-        sine = np.sqrt(max(np.linalg.eigvalsh(rest.T @ (one.mass @ rest))[-1], 0.0))
-        cosine = np.linalg.svd(vectors.T @ (one.mass @ pulled), compute_uv=False)[-1]
-        angles[place] = np.arctan2(sine, cosine)
+        angles[place] = principal_angles(one.eigenvectors[:, group], pulled, one.mass)[-1]
         bounds[place] = np.pi / 2 if exact is None else _bound(*exact, group, pulled)
     steps = np.concatenate([[np.inf], np.diff(one.eigenvalues)])
     starts, stops = (

@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from eigenshape._arrays import finite_values, require_finite_rows
+from eigenshape._arrays import finite_values, require_finite_rows, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -197,6 +197,41 @@ def outside(
 ) -> Float[np.ndarray, "n q"]:
     """Return what the span of a B-orthonormal basis does not hold of some vectors."""
     return vectors - basis @ (basis.T @ (mass @ vectors))
+
+
+def principal_angles(
+    vectors: Float[np.ndarray, "n p"], basis: Float[np.ndarray, "n p"], mass: sp.sparray
+) -> Float[np.ndarray, " p"]:
+    """Return the angles between the spans of two B-orthonormal bases, ascending (Björck and Golub 1973)."""
+    cosines = np.linalg.svd(vectors.T @ (mass @ basis), compute_uv=False)
+    # A small angle is known by its sine, a large one by its cosine.
+    rest = outside(basis, vectors, mass)
+    squares = np.linalg.eigvalsh(rest.T @ (mass @ rest))
+    return np.arctan2(np.sqrt(np.maximum(squares, 0.0)), cosines)
+
+
+def corresponding_points(
+    points: ArrayLike | None, one: Spectrum, two: Spectrum, names: tuple[str, str]
+) -> Int[np.ndarray, " n"]:
+    """Return the point of `two` for each point of `one`: by default that of the same number.
+
+    Raise InvalidParameterError if there is not one for each.
+    """
+    n_one, n_two = len(one.eigenvectors), len(two.eigenvectors)
+    first, second = names
+    if points is None and n_one != n_two:
+        raise InvalidParameterError(
+            f"Spectra on different numbers of points need corresponding points; {first} has {n_one} points and "
+            f"{second} has {n_two}. Pass points, the point of {second} that corresponds to each point of {first}."
+        )
+    given = np.arange(n_one) if points is None else points
+    partners = whole_numbers(given, f"a point of {second}", 0, n_two - 1)
+    if len(partners) != n_one:
+        raise InvalidParameterError(
+            f"points must hold one point of {second} for each of {n_one} points of {first}; there are "
+            f"{len(partners)}."
+        )
+    return partners
 
 
 def norms(vectors: Float[np.ndarray, "n q"], mass: sp.sparray) -> Float[np.ndarray, " q"]:
