@@ -7,8 +7,7 @@ from jaxtyping import Float
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from eigenshape._arrays import ReadOnly, finite_rows
-from eigenshape._text import short_repr
+from eigenshape._arrays import ReadOnly, finite_rows, record
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.collections.spread_points import join_normals, main_pieces, spread_points
@@ -35,7 +34,7 @@ REFLECTED = 0.7
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Similarity(ReadOnly):
     """A motion with a change of size that places one surface on another: x ↦ s R x + t.
 
@@ -71,8 +70,6 @@ class Similarity(ReadOnly):
     rotation: Float[np.ndarray, "3 3"]
     translation: Float[np.ndarray, " 3"]
     gap: float = 0.0
-
-    __repr__ = short_repr
 
     @property
     def reflected(self) -> bool:

@@ -3,17 +3,15 @@
 import csv
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._files import as_path, replace_file
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.collections.collection import Collection
 from eigenshape.geometry.distances.closest import closest_points
@@ -31,7 +29,7 @@ FAR = 0.05  # gap from which a person should look, in root mean square radii
 WRONG_LABEL = 5.0
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class CarriedLandmarks(ReadOnly):
     """Landmarks on all specimens of a collection.
 
@@ -59,8 +57,6 @@ class CarriedLandmarks(ReadOnly):
     points: Float[np.ndarray, "s k 3"]
     spread: Float[np.ndarray, "s k"]
     doubtful: Bool[np.ndarray, "s k"]
-
-    __repr__ = short_repr
 
     def save(self, path: str | Path) -> None:
         """Write a table of comma-separated values: specimen, landmark, x, y, z, spread, doubtful.

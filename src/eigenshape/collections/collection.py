@@ -1,7 +1,6 @@
 """A collection of specimens in dense correspondence, and the folder that it is kept in."""
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -10,10 +9,9 @@ from zipfile import BadZipFile
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, StoreError
 from eigenshape._files import as_path, replace_file, replacing
-from eigenshape._text import short_repr
 from eigenshape.collections.alignment import MIRROR
 from eigenshape.collections.spread_points import main_pieces
 from eigenshape.geometry.mesh import TriangleMesh
@@ -26,7 +24,7 @@ VERSION = 1  # of the folder's layout
 TABLE, MEAN = "collection.json", "mean.ply"
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Collection(ReadOnly):
     """Specimens in dense correspondence with their mean, as `build_collection` makes them.
 
@@ -72,8 +70,6 @@ class Collection(ReadOnly):
     template: str
     notes: dict[str, tuple[str, ...]]
     failures: dict[str, str]
-
-    __repr__ = short_repr
 
     @property
     def unreflected(self) -> Float[np.ndarray, "s n 3"]:

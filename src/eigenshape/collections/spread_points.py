@@ -1,11 +1,10 @@
 """Points spread evenly over a surface, with normals: what alignment and fitting compare."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
+from eigenshape._arrays import record
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.distances.crossing_loops import curve_places
 from eigenshape.geometry.measure import area_vectors, face_areas
@@ -18,7 +17,7 @@ from eigenshape.geometry.topology import vertex_components
 SMALLEST_PIECE = 0.1
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SpreadPoints:
     """Places on a surface with their unit normals."""
 

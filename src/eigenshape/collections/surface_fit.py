@@ -1,6 +1,6 @@
 """One surface bent onto another by stiff, smooth displacements, from coarse to fine."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -8,9 +8,8 @@ from jaxtyping import Float
 from scipy.linalg import solve
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import EigenshapeError, InvalidShapeError
-from eigenshape._text import short_repr
 from eigenshape._threads import one_blas_thread
 from eigenshape.collections.alignment import ON_SURFACE, Similarity, align_surfaces
 from eigenshape.collections.spread_points import join_normals, nearest_both_ways, spread_points
@@ -47,7 +46,7 @@ UNMATCHED = 0.1  # distance from which a point has no counterpart
 POSES_DIFFER, NOT_ALIKE = 0.03, 0.15
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SurfaceFit(ReadOnly):
     """A surface that was bent onto another.
 
@@ -89,8 +88,6 @@ class SurfaceFit(ReadOnly):
     excess: float
     reflected: bool
     method: Literal["position", "intrinsic"]
-
-    __repr__ = short_repr
 
     @property
     def misfit(self) -> float:

@@ -1,11 +1,9 @@
 """Eigenmodes of one shape turned to those of another."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.spectral.comparison.eigenspaces import (
@@ -22,7 +20,7 @@ from eigenshape.spectral.spectrum import Spectrum, require_lowest
 LOST = np.pi / 4
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ModeAlignment(ReadOnly):
     """Modes of a shape, turned within groups towards those of a reference.
 

@@ -1,12 +1,10 @@
 """Differences between two groups of maps or surfaces, mode by mode."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, real_numbers, whole_number
+from eigenshape._arrays import ReadOnly, real_numbers, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
@@ -20,7 +18,7 @@ MOST_PERMUTATIONS = 100_000  # p values to three digits; a billion would run for
 EQUAL = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ModeComparison(ReadOnly):
     """How two groups of shapes differ in each eigenmode.
 

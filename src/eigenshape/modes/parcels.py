@@ -1,7 +1,6 @@
 """Parcels of a surface: halves of halves, cut along the nodal lines of their lowest modes."""
 
 import heapq
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -9,13 +8,13 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, whole_number
+from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._typing import Integer
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 from eigenshape.spectral.solve import solve_spectrum
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ParcelTree(ReadOnly):
     """A tree of parcels, as labels of the finest and the order in which they were cut.
 

@@ -1,14 +1,13 @@
 """Shapes: points of specimens without place, turn and size, and with semilandmarks slid."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import lstsq
 from scipy.stats import iqr
 
-from eigenshape._arrays import ReadOnly, real_numbers
+from eigenshape._arrays import ReadOnly, real_numbers, record
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -24,7 +23,7 @@ FENCE = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class ProcrustesFit(ReadOnly):
     """Specimens laid on their mean shape.
 

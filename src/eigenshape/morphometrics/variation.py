@@ -1,13 +1,19 @@
 """How shapes vary: principal components, groups, growth, and the sides of symmetric shapes."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import permutation_test
 
-from eigenshape._arrays import ReadOnly, as_array, positive_values, real_numbers, whole_numbers
+from eigenshape._arrays import (
+    ReadOnly,
+    as_array,
+    positive_values,
+    real_numbers,
+    record,
+    whole_numbers,
+)
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -20,7 +26,7 @@ NEARLY = 1 - 1e-6  # share of the largest movement from which on a point counts 
 BATCH = 64  # permutations at once: as many times the memory of all scores
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class PrincipalComponents(ReadOnly):
     """The modes in which shapes vary, those with most variance first.
 
@@ -124,7 +130,7 @@ def principal_components(shapes: Specimens) -> PrincipalComponents:
     return PrincipalComponents(mean, modes, variances, scores)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class GroupComparison(ReadOnly):
     """Mean shapes of groups, and how far they are from each other.
 
@@ -211,7 +217,7 @@ def compare_groups(shapes: Specimens, groups: ArrayLike) -> GroupComparison:
     return GroupComparison(tuple(names.tolist()), means, distances, p_values)
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class Allometry(ReadOnly):
     """How shape changes with size: shape = mean + slope · (log size - mean log size).
 
@@ -311,7 +317,7 @@ def fit_allometry(shapes: Specimens, sizes: ArrayLike) -> Allometry:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class SymmetricComponents(ReadOnly):
     """Shapes of two-sided specimens, divided into what their sides share and how they differ.
 

@@ -1,7 +1,6 @@
 """The functions that all shapes of a collection share, and how the shapes differ in them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
@@ -10,7 +9,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arguments import describe_value, require_type
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, whole_number
+from eigenshape._arrays import ReadOnly, finite_rows, freeze, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
 from eigenshape._threads import one_blas_thread
@@ -22,7 +21,7 @@ KINDS = ("area", "conformal")  # of shape differences
 COPIES = 4  # of the matrix of the network while its eigenvectors are computed
 
 
-@dataclass(frozen=True, eq=False)
+@record
 class LatentBasis(ReadOnly):
     """Functions that s shapes share, as modes of their limit shape (Huang and others 2019).
 
