@@ -16,8 +16,8 @@ from eigenshape._threads import one_blas_thread
 from eigenshape.collections.collection import Collection
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.samples.surface_points import SurfacePoints
-from eigenshape.morphometrics.landmarks import Landmarks
+from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
+from eigenshape.morphometrics.landmarks import Landmarks, require_same_names
 
 # Expected error of a landmark from a single labelled specimen, where there is no second one to
 # judge by, in root mean square radii: that of the tuning half of experiments/ch7_collection.
@@ -120,14 +120,15 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     """
     require_type(collection, Collection, "collection")
     require_type(labelled, Mapping, "labelled")
-    names, given = _given_points(collection, labelled)
+    names, given = _points_to_carry(collection, labelled)
     mean, faces = collection.mean, collection.mean.faces
     rows = [collection.number(name) for name in labelled]
     on_mean = np.full_like(given, np.nan)
     for number, row in enumerate(rows):
         known = np.isfinite(given[number]).all(axis=1)
         own = TriangleMesh(collection.points[row], faces)
-        on_mean[number, known] = _corresponding(mean, closest_points(own, given[number, known]))
+        there = closest_points(own, given[number, known])
+        on_mean[number, known] = place_points(mean, there.simplices, there.weights).points
 
     places = closest_points(mean, np.nanmean(on_mean, axis=0))
     points = np.empty((len(collection.names), len(names), 3))
@@ -162,22 +163,16 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     return CarriedLandmarks(collection.names, names, points, spread, doubtful)
 
 
-def _given_points(
+def _points_to_carry(
     collection: Collection, labelled: Mapping[str, Landmarks]
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "m k 3"]]:
     """Return the names of the landmarks, and the points of each labelled specimen."""
     if not labelled:
         raise InvalidParameterError("At least one specimen must have landmarks; there are none.")
-    for specimen, landmarks in labelled.items():
-        require_type(landmarks, Landmarks, f"labelled[{specimen!r}]")
-    names = next(iter(labelled.values())).names
-    for specimen, landmarks in labelled.items():
+    require_same_names(labelled, "labelled")
+    for specimen in labelled:
         collection.number(specimen)
-        if landmarks.names != names:
-            raise InvalidParameterError(
-                f"All specimens must have the same landmarks; those of {specimen!r} are "
-                f"{landmarks.names}, and the first ones {names}."
-            )
+    names = next(iter(labelled.values())).names
     given = np.stack([landmarks.points for landmarks in labelled.values()])
     missing = ~np.isfinite(given).all(axis=2).any(axis=0)
     if missing.any():
@@ -188,18 +183,13 @@ def _given_points(
     return names, given
 
 
-def _corresponding(mesh: TriangleMesh, places: SurfacePoints) -> Float[np.ndarray, "k 3"]:
-    """Return the points of a mesh in the same faces, at the same weights."""
-    corners = mesh.vertices[mesh.faces[places.simplices]]
-    return np.einsum("kc,kcd->kd", places.weights, corners)
-
-
 def _carry(
     collection: Collection, row: int, surface: TriangleMesh, places: SurfacePoints
 ) -> Float[np.ndarray, "k 3"]:
     """Return the points of a specimen's surface that correspond to places on the mean."""
     bent = TriangleMesh(collection.points[row], collection.mean.faces)
-    return closest_points(surface, _corresponding(bent, places)).points
+    there = place_points(bent, places.simplices, places.weights).points
+    return closest_points(surface, there).points
 
 
 def _radius(points: Float[np.ndarray, "n 3"]) -> float:

@@ -139,11 +139,14 @@ def as_configurations(specimens: Specimens) -> Float[np.ndarray, "n k 3"]:
     return points
 
 
-def require_same_names(specimens: Mapping[Any, Landmarks]) -> None:
-    """Raise an error if there is no specimen, or two differ in the names or the order of landmarks."""
+def require_same_names(specimens: Mapping[Any, Landmarks], name: str = "specimens") -> None:
+    """Raise an error if there is no specimen, or two differ in the names or the order of landmarks.
+
+    `name` is that of the argument.
+    """
     names: tuple[str, ...] | None = None
     for specimen, landmarks in specimens.items():
-        require_type(landmarks, Landmarks, f"specimens[{specimen!r}]")
+        require_type(landmarks, Landmarks, f"{name}[{specimen!r}]")
         names = landmarks.names if names is None else names
         if landmarks.names != names:
             other = next(
