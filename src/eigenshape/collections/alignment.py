@@ -10,7 +10,12 @@ from scipy.spatial.transform import Rotation
 from eigenshape._arrays import ReadOnly, finite_rows, record
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.collections.spread_points import join_normals, main_pieces, spread_points
+from eigenshape.collections.spread_points import (
+    join_normals,
+    main_pieces,
+    mean_radius,
+    spread_points,
+)
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -186,9 +191,12 @@ def _points_in_own_size(
     """Return points with normals about their middle, in units of their size; the middle; the size."""
     spread = spread_points(main_pieces(mesh), n_points)
     middle = spread.points.mean(axis=0)
-    away = spread.points - middle
-    size = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
-    return join_normals(away / size, spread.normals, NORMAL_WEIGHT), middle, size
+    size = mean_radius(spread.points)
+    return (
+        join_normals((spread.points - middle) / size, spread.normals, NORMAL_WEIGHT),
+        middle,
+        size,
+    )
 
 
 @dataclass

@@ -14,6 +14,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._files import as_path, replace_file
 from eigenshape._threads import one_blas_thread
 from eigenshape.collections.collection import Collection
+from eigenshape.collections.spread_points import mean_radius
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
@@ -132,7 +133,7 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
 
     places = closest_points(mean, np.nanmean(on_mean, axis=0))
     points = np.empty((len(collection.names), len(names), 3))
-    radii = np.array([_radius(own) for own in collection.points])
+    radii = np.array([mean_radius(own) for own in collection.points])
     carried = np.full_like(given, np.nan)  # to each labelled specimen, from all others
     for row, name in enumerate(collection.names):
         surface = collection.read_specimen(name)  # one at a time: together they may fill the memory
@@ -190,7 +191,3 @@ def _carry(
     bent = TriangleMesh(collection.points[row], collection.mean.faces)
     there = place_points(bent, places.simplices, places.weights).points
     return closest_points(surface, there).points
-
-
-def _radius(points: Float[np.ndarray, "n 3"]) -> float:
-    return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))

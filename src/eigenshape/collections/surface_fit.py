@@ -12,10 +12,15 @@ from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import EigenshapeError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.collections.alignment import ON_SURFACE, Similarity, align_surfaces
-from eigenshape.collections.spread_points import join_normals, nearest_both_ways, spread_points
+from eigenshape.collections.spread_points import (
+    join_normals,
+    mean_radius,
+    nearest_both_ways,
+    spread_points,
+)
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.measure import area_vectors, mean_normals
+from eigenshape.geometry.measure import area_vectors, mean_normals, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, edge_table
@@ -178,7 +183,7 @@ def bend_onto(
     placed = TriangleMesh(start, source.faces)
     ours = spread_points(placed, N_POINTS)
     middle = ours.points.mean(axis=0)
-    size = float(np.sqrt(np.mean(np.sum((ours.points - middle) ** 2, axis=1))))
+    size = mean_radius(ours.points)
     theirs = spread_points(target, N_POINTS)
     ends, end_normals = (theirs.points - middle) / size, theirs.normals
     ends_with_normals = join_normals(ends, end_normals, NORMAL_WEIGHT)
@@ -192,7 +197,7 @@ def bend_onto(
         cells = np.floor(points / (SPACING * width)).astype(np.int64)
         centers = points[np.unique(cells, axis=0, return_index=True)[1]]
         for _ in range(n_rounds):
-            normals = _unit_normals(vertices[faces])
+            normals = unit_vectors(area_vectors(vertices[faces]))
             with_normals = join_normals(points, normals, NORMAL_WEIGHT)
             start, end, distances = nearest_both_ways(with_normals, ends_with_normals, tree)
             facing = end_normals[end]
@@ -219,7 +224,7 @@ def bend_onto(
     moved = middle + size * vertices
     nearest = closest_points(target, moved)
     gaps = np.linalg.norm(nearest.points - moved, axis=1)
-    normals = _unit_normals(target.vertices[target.faces[nearest.simplices]])
+    normals = unit_vectors(area_vectors(target.vertices[target.faces[nearest.simplices]]))
     cosines = np.einsum("ni,ni->n", mean_normals(bent), normals)
     # What is nearest to a rim is beyond it.
     inside = ~np.isin(np.arange(target.n_vertices), boundary_vertices(target))
@@ -245,11 +250,6 @@ def bend_onto(
         reflected=False,
         method="position",
     )
-
-
-def _unit_normals(corners: Float[np.ndarray, "f 3 3"]) -> Float[np.ndarray, "f 3"]:
-    vectors = area_vectors(corners)
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
 
 
 def _kernel(

@@ -8,6 +8,7 @@ import numpy as np
 from eigenshape._errors import InvalidParameterError
 from eigenshape.collections.carrying import CarriedLandmarks
 from eigenshape.collections.collection import Collection
+from eigenshape.collections.spread_points import mean_radius
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.folders import find_items
@@ -65,8 +66,7 @@ def landmarks_outside(collection: Collection, labelled: Mapping[str, Landmarks])
             continue
         nearest = closest_points(TriangleMesh(own, collection.mean.faces), known).points
         away = float(np.median(np.linalg.norm(nearest - known, axis=1)))
-        radius = float(np.sqrt(np.mean(np.sum((own - own.mean(axis=0)) ** 2, axis=1))))
-        if away > OUTSIDE * radius:
+        if away > OUTSIDE * mean_radius(own):
             found.append(
                 f"those of {name} lie {away:.3g} from its surface (median), so they are in another "
                 "frame or unit than the mesh"

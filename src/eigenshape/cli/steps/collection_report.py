@@ -18,6 +18,7 @@ from eigenshape.collections.carrying import CarriedLandmarks
 from eigenshape.collections.collection import Collection, unreflect
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.samples.surface_points import place_points
 from eigenshape.morphometrics.procrustes import fit_procrustes
 from eigenshape.morphometrics.variation import principal_components
 from eigenshape.plot.camera import Camera, aim_camera
@@ -105,8 +106,7 @@ def _landmarks(
     places, spreads = [], []
     for points, own, spread in zip(carried.points, collection.points, carried.spread, strict=True):
         found = closest_points(TriangleMesh(own, mean.faces), points)
-        corners = mean.vertices[mean.faces[found.simplices]]
-        places.append(np.einsum("kc,kcd->kd", found.weights, corners))
+        places.append(place_points(mean, found.simplices, found.weights).points)
         spreads.append(spread * (_size(mean.vertices) / _size(own)))
     on_mean = closest_points(mean, np.median(places, axis=0))
     # Given landmarks have no spread of their own.
@@ -118,7 +118,6 @@ def _landmarks(
             "corners": mean.faces[face].tolist(),
             "weights": weights.tolist(),
             "spread": float(width),
-            "radius": float(width),
             "doubtful": [
                 specimen
                 for specimen, is_one in zip(carried.specimens, doubtful, strict=True)
