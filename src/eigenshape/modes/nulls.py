@@ -1,11 +1,11 @@
 """Random maps with the power of a given one on every scale: eigenmodes rotated within groups."""
 
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import require_choice, require_type
 from eigenshape._arrays import point_functions, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
@@ -84,12 +84,8 @@ def rotation_nulls(
     require_lowest(spectrum, "spectrum")
     require_type(rng, np.random.Generator, "rng")
     count = whole_number(n_nulls, "n_nulls", 1)
-    for name, option, kinds in (
-        ("residual", residual, get_args(Residual)),
-        ("resample", resample, get_args(Resample)),
-    ):
-        if option not in kinds:
-            raise InvalidParameterError(f"{name} must be one of {kinds}; it is {option!r}.")
+    require_choice(residual, Residual, "residual")
+    require_choice(resample, Resample, "resample")
     n = len(spectrum.eigenvectors)
     maps = point_functions(values, "values", n)
     columns = maps.reshape(n, -1)

@@ -282,7 +282,9 @@ def test_numbers_and_kinds_out_of_range_are_refused(all_pairs):
         lambda: es.spectral.shape_difference(all_pairs[0, 1], "size"),
         lambda: es.spectral.difference_regions(latent, 0, np.eye(18), "size"),
     ):
-        with pytest.raises(es.InvalidParameterError, match='kind must be "area" or "conformal"'):
+        with pytest.raises(
+            es.InvalidParameterError, match="kind must be 'area' or 'conformal'; it is 'size'"
+        ):
             call()
     with pytest.raises(es.InvalidParameterError, match=r"shape must lie in 0\.\.3; it is 4"):
         es.spectral.difference_regions(latent, 4, np.eye(18))

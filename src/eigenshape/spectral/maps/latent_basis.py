@@ -1,6 +1,7 @@
 """The functions that all shapes of a collection share, and how the shapes differ in them."""
 
 from collections.abc import Mapping
+from typing import Literal
 
 import numpy as np
 import scipy.linalg as sl
@@ -8,7 +9,7 @@ from jaxtyping import Float
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arguments import describe_value, require_type
+from eigenshape._arguments import describe_value, require_choice, require_type
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
@@ -17,7 +18,7 @@ from eigenshape._typing import ArrayLike, Integer
 from eigenshape.spectral.maps.functional_map import LOST, FunctionalMap, point_areas, unit_modes
 from eigenshape.spectral.spectrum import Spectrum
 
-KINDS = ("area", "conformal")  # of shape differences
+Kind = Literal["area", "conformal"]  # of shape differences
 COPIES = 4  # of the matrix of the network while its eigenvectors are computed
 
 
@@ -320,7 +321,7 @@ def _difference(
     kind: str,
 ) -> Float[np.ndarray, "... k1 k1"]:
     """Return the difference from a shape with these eigenvalues to one, or some, with others."""
-    _require_kind(kind)
+    require_choice(kind, Kind, "kind")
     if kind == "area":
         return np.einsum("...ia,...ib->...ab", matrix, matrix)
     scaled = matrix[..., 1:] / np.sqrt(before[1:])
@@ -328,11 +329,6 @@ def _difference(
     found[..., 0, 0] = 1
     found[..., 1:, 1:] = np.einsum("...ia,...i,...ib->...ab", scaled, after, scaled)
     return found
-
-
-def _require_kind(kind: str) -> None:
-    if kind not in KINDS:
-        raise InvalidParameterError(f'kind must be "area" or "conformal"; it is {kind!r}.')
 
 
 @one_blas_thread()
@@ -393,7 +389,7 @@ def difference_regions(
         raise InvalidParameterError(
             f"difference must have {m} rows, one for each latent function; it has {len(operator)}."
         )
-    _require_kind(kind)
+    require_choice(kind, Kind, "kind")
     k = latent.matrices.shape[1]
     bumps = unit_modes(latent.spectra[number], k) @ latent.matrices[number]
     if kind == "conformal":
