@@ -9,9 +9,10 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.deformation.distortion import require_poses
-from eigenshape.deformation.rigidity import edge_weights, fit_turns, free_part, nearest_rotations
+from eigenshape.deformation.rigidity import edge_weights, fit_turns, free_part
 from eigenshape.deformation.rigidity_loops import turn_edges
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes, size_one
 from eigenshape.operators.cotangent import cotangent_laplacian

@@ -12,6 +12,7 @@ from eigenshape._arrays import record
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
+from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 from eigenshape.sparse.symmetric_factor import SymmetricFactor, factor_matrix
@@ -241,11 +242,3 @@ def fit_turns(edges: EdgeWeights, rest: Points, posed: Points) -> Float[np.ndarr
         "e,ei,ej->eij", edges.weights, posed[two] - posed[one], rest[two] - rest[one]
     )
     return nearest_rotations(np.add.reduceat(products, edges.starts[:-1]))
-
-
-def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k 3 3"]:
-    """Return the rotation nearest to each matrix in the Frobenius norm."""
-    left, _, right = np.linalg.svd(matrices)
-    # A reflection becomes a rotation by a change of sign along the smallest singular value.
-    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
-    return left @ right

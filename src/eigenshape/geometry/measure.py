@@ -1,4 +1,4 @@
-"""Lengths, areas, volumes and normals, accurate at any scale of the coordinates."""
+"""Lengths, areas, volumes, normals and turns, accurate at any scale of the coordinates."""
 
 import numpy as np
 from jaxtyping import Float
@@ -232,3 +232,11 @@ def edge_lengths(mesh: MeshLike) -> Float[np.ndarray, " e"]:
 def bounding_box(shape: Shape) -> tuple[Float[np.ndarray, " d"], Float[np.ndarray, " d"]]:
     """Return the lowest and the highest corner of the box around all points."""
     return shape.points.min(axis=0), shape.points.max(axis=0)
+
+
+def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k 3 3"]:
+    """Return the rotation nearest to each matrix in the Frobenius norm (Kabsch 1976)."""
+    left, _, right = np.linalg.svd(matrices)
+    # A reflection becomes a rotation by a change of sign along the smallest singular value.
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    return left @ right

@@ -15,6 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import record
+from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.matching.fitting_loops import add_pulls, add_tensions, turn_frames
 from eigenshape.matching.match_loops import nearest_rows
 from eigenshape.matching.surface import Surface
@@ -174,9 +175,8 @@ def _fit(
     # Start with the rigid motion that brings samples nearest to their targets (Kabsch 1976).
     samples, frames = part.mesh.vertices[plan.samples], part.mesh.vertices[plan.frames]
     middle, target = pull @ samples, pull @ targets
-    left, _, right = np.linalg.svd(((targets - target) * pull[:, None]).T @ (samples - middle))
-    left[:, 2] *= np.sign(np.linalg.det(left @ right))
-    turn = left @ right
+    products = ((targets - target) * pull[:, None]).T @ (samples - middle)
+    turn = nearest_rotations(products[None])[0]
     turns = np.repeat(turn[None], len(frames), axis=0)
     places = target + (frames - middle) @ turn.T
     m = len(frames)

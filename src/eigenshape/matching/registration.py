@@ -13,7 +13,7 @@ from eigenshape._arrays import ReadOnly, finite_rows, record
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import mean_normals
+from eigenshape.geometry.measure import mean_normals, nearest_rotations
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.simplices import dual_volumes
@@ -287,9 +287,8 @@ def _find_motions(first: Scan, second: Scan, unit: float) -> list[Registration]:
 def _fit_motion(starts: Float[np.ndarray, "p 3"], ends: Float[np.ndarray, "p 3"]) -> Registration:
     """Return the motion with the least squares of distances (Kabsch 1976)."""
     middle, target = starts.mean(axis=0), ends.mean(axis=0)
-    left, _, right = np.linalg.svd((starts - middle).T @ (ends - target))
-    side = np.sign(np.linalg.det(left @ right))
-    rotation = (left @ np.diag([1.0, 1.0, side]) @ right).T
+    products = (starts - middle).T @ (ends - target)
+    rotation = nearest_rotations(products[None])[0].T
     return Registration(rotation.copy(), target - rotation @ middle, 0.0)
 
 

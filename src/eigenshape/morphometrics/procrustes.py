@@ -11,6 +11,7 @@ from eigenshape._arrays import ReadOnly, real_numbers, record
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
+from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.morphometrics.landmarks import Specimens, as_configurations, as_curves
 from eigenshape.morphometrics.splines import bending_matrix
 
@@ -143,9 +144,7 @@ def fit_procrustes(
         shapes = centered / sizes[:, None, None]
         last = shapes[0] if mean is None else mean
         # The best turn of each (Kabsch 1976), without reflection
-        left, _, right = np.linalg.svd(np.einsum("nki,kj->nij", shapes, last))
-        left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-        shapes = shapes @ (left @ right)
+        shapes = shapes @ nearest_rotations(np.einsum("nki,kj->nij", shapes, last))
         mean = shapes.mean(axis=0)
         mean /= np.linalg.norm(mean)
         if np.linalg.norm(mean - last) < TOLERANCE and not is_sliding:

@@ -12,9 +12,8 @@ from eigenshape._errors import EigenshapeError, StoreError
 from eigenshape._text import literal
 from eigenshape.cli.console import err, escape_text, progress_bar
 from eigenshape.cli.steps.writing import Side
-from eigenshape.deformation.rigidity import nearest_rotations
 from eigenshape.geometry.distances.geodesic import geodesic_distances
-from eigenshape.geometry.measure import surface_area
+from eigenshape.geometry.measure import nearest_rotations, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.simplices import size_one
