@@ -2,7 +2,7 @@
 
 python check.py            all of it but the long tests; two minutes on two cores
 python check.py --all      the long tests, the docs site and the studio in a browser, too; twelve minutes
-python check.py --nightly  as --all, with every part of the broad sweeps; a commit runs a fifth of these
+python check.py --nightly  as --all, with every part of the broad sweeps; a commit runs a tenth of these
 python check.py --fast     without the tests
 """
 

@@ -10,7 +10,7 @@ from zlib import crc32
 import pytest
 
 ROOT = Path(__file__).resolve().parent
-TURNS = 5  # commits until every part of every sweep has been run
+TURNS = 10  # commits until every part of every sweep has been run
 TURN = pytest.StashKey[int | None]()
 COST = "CPU seconds"
 
