@@ -48,7 +48,7 @@ WARM = 120.0  # seconds of work after which memory may no longer grow
 BEAST = "giraffe"
 # Resolves with the seconds from the end of the next stroke of the pointer until regions can be moved.
 WATCH = """() => {
-    const { root } = PANEL;
+    const { root } = PANEL.form;
     let begin = 0;
     const end = { once: true, capture: true };
     eigenshape.viewer.canvas.addEventListener("pointerup", () => (begin = performance.now()), end);
@@ -115,7 +115,9 @@ def wait_until_ready(page: Page) -> None:
 def stroke_box(page: Page, share: float) -> float:
     """Drag the lower side of the box to a share of the height; return the seconds until ready."""
     studio.find(page, "tool-box").click()
-    low, high = page.evaluate(f"[{studio.PANEL}.box.low, {studio.PANEL}.box.high]")
+    low, high = page.evaluate(
+        f"[{studio.PANEL}.selection.box.low, {studio.PANEL}.selection.box.high]"
+    )
     box = page.evaluate(
         "[eigenshape.viewer.box.min.toArray(), eigenshape.viewer.box.max.toArray()]"
     )

@@ -210,12 +210,14 @@ def positions(page: Page) -> np.ndarray:
 
 def region(page: Page, number: int = 0) -> np.ndarray:
     """Return the vertices of a region, ascending."""
-    return np.array(page.evaluate(f"Array.from({PANEL}.regions.vertices({number}))"), dtype=int)
+    return np.array(
+        page.evaluate(f"Array.from({PANEL}.selection.regions.vertices({number}))"), dtype=int
+    )
 
 
 def wait_until_bound(page: Page) -> None:
     """Wait until the regions can be moved."""
-    wait_until(page, f"{PANEL}.root.dataset.ready === 'true'")
+    wait_until(page, f"{PANEL}.form.root.dataset.ready === 'true'")
 
 
 def wait_for_edits(page: Page, count: int) -> None:

@@ -78,7 +78,7 @@ def show_deform(page):
     """Put a box around neck and head, and turn it by numbers."""
     find(page, "tool-box").click()
     wait_until_bound(page)
-    low, high = page.evaluate(f"[{PANEL}.box.low, {PANEL}.box.high]")
+    low, high = page.evaluate(f"[{PANEL}.selection.box.low, {PANEL}.selection.box.high]")
     x, z = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
     page.mouse.move(*place_of(page, [x, low[1], z]))
     page.mouse.down()
@@ -126,7 +126,7 @@ def drag_sides(page, sides):
     """Drag sides of the box by the mouse, each to a place on its axis."""
     find(page, "tool-box").click()
     for (axis, upper), place in sides.items():
-        low, high = page.evaluate(f"[{PANEL}.box.low, {PANEL}.box.high]")
+        low, high = page.evaluate(f"[{PANEL}.selection.box.low, {PANEL}.selection.box.high]")
         middle = [(one + other) / 2 for one, other in zip(low, high, strict=True)]
         start, end = (
             [*middle[:axis], at, *middle[axis + 1 :]] for at in ((low, high)[upper][axis], place)
@@ -157,7 +157,7 @@ def drag_handle(page, handle, axis, amount):
 
 def find_handle(page, axis):
     """Return where the handle of an axis is, and in which direction of the screen to drag it."""
-    pivot = page.evaluate(f"{PANEL}.mover.anchor.position.toArray()")
+    pivot = page.evaluate(f"{PANEL}.motion.mover.anchor.position.toArray()")
     x, y = place_of(page, pivot)
     ahead_x, ahead_y = place_of(page, [one + 0.1 * (i == axis) for i, one in enumerate(pivot)])
     size = math.hypot(ahead_x - x, ahead_y - y)
@@ -168,16 +168,16 @@ def find_handle(page, axis):
         for away in range(25, 110, 3):
             place = (x + away * right, y + away * down)
             page.mouse.move(*place)
-            if page.evaluate(f"{PANEL}.mover.gizmo.axis") == "XYZ"[axis]:
+            if page.evaluate(f"{PANEL}.motion.mover.gizmo.axis") == "XYZ"[axis]:
                 # An arrow is dragged along its axis, a ring across it.
-                turns = page.evaluate(f"{PANEL}.mover.gizmo.mode") == "rotate"
+                turns = page.evaluate(f"{PANEL}.motion.mover.gizmo.mode") == "rotate"
                 return *place, across if turns else along
     raise AssertionError("A handle of the gizmo must be in sight.")
 
 
 def motion_of(page, axis):
     """Return by how many degrees the region is turned, or how far it is moved along an axis."""
-    (handle,) = page.evaluate(f"{PANEL}.rowHandles()")
+    (handle,) = page.evaluate(f"{PANEL}.motion.rowHandles()")
     if handle is None:
         return 0.0
     if handle["type"] == "translation":

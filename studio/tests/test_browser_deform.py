@@ -61,7 +61,7 @@ def test_box_and_brush_select_what_numpy_selects(page, mesh):
     find(page, "clear").click()
     find(page, "tool-box").click()
     wait_until_bound(page)
-    low, high = page.evaluate(f"[{PANEL}.box.low, {PANEL}.box.high]")
+    low, high = page.evaluate(f"[{PANEL}.selection.box.low, {PANEL}.selection.box.high]")
     np.testing.assert_array_equal(
         region(page), np.flatnonzero(region_mask(mesh, BoxRegion(low, high)))
     )
@@ -73,7 +73,7 @@ def test_box_and_brush_select_what_numpy_selects(page, mesh):
     move_pointer(page, x, y - 60, steps=3)
     page.mouse.up()
     wait_until_bound(page)
-    moved = page.evaluate(f"{PANEL}.box.low")
+    moved = page.evaluate(f"{PANEL}.selection.box.low")
     assert moved[1] > low[1]
     assert (moved[0], moved[2]) == (low[0], low[2])
     np.testing.assert_array_equal(
@@ -87,7 +87,7 @@ def test_a_mouse_drag_moves_the_shape_as_numpy_does(page, mesh, rig):
     move_pointer(page, x, y)
     page.mouse.down()
     move_pointer(page, x + 40, y - 50, steps=5)
-    handles = page.evaluate(f"{PANEL}.rowHandles()")
+    handles = page.evaluate(f"{PANEL}.motion.rowHandles()")
     bent, moved = bend_by(mesh, rig, region(page), handles)
     assert np.linalg.norm(handles[0]["vector"]) > 0.02
     wait_until(page, "eigenshape.viewer.motion.blend.value === 1")  # the pointer rests
@@ -132,19 +132,19 @@ def test_the_rings_turn_about_the_middle_of_the_rim(page, mesh, rig):
     chosen = region(page)
     mask = np.isin(np.arange(mesh.n_vertices), chosen)
     pivot = mesh.vertices[es.deformation.region_boundary(mesh, mask)].mean(axis=0)
-    np.testing.assert_allclose(page.evaluate(f"{PANEL}.pivotOf(0)"), pivot, atol=1e-6)
+    np.testing.assert_allclose(page.evaluate(f"{PANEL}.motion.pivotOf(0)"), pivot, atol=1e-6)
 
     x, y = place_of(page, pivot)
     aside = np.array([0.6, -0.8])
     for radius in range(40, 160, 3):  # the outer ring turns about the direction of the view
         move_pointer(page, *(aside * radius + [x, y]))
-        if page.evaluate(f"{PANEL}.mover.gizmo.axis") == "E":
+        if page.evaluate(f"{PANEL}.motion.mover.gizmo.axis") == "E":
             break
     page.mouse.down()
     for angle in np.linspace(0.1, 0.5, 4):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         move_pointer(page, *(turn @ aside * radius + [x, y]))
-    handles = page.evaluate(f"{PANEL}.rowHandles()")
+    handles = page.evaluate(f"{PANEL}.motion.rowHandles()")
     assert abs(handles[0]["angle"]) == pytest.approx(0.5, abs=0.02)
     bent, moved = bend_by(mesh, rig, chosen, handles)
     wait_until(page, "eigenshape.viewer.motion.blend.value === 1")  # the pointer rests

@@ -220,7 +220,7 @@ def test_each_method_shows_its_exact_result_at_rest(page, mesh, rig, mode):
     move_pointer(page, x, y)
     page.mouse.down()
     move_pointer(page, x - 50, y - 20, steps=3)
-    (handle,) = page.evaluate(f"{PANEL}.rowHandles()")
+    (handle,) = page.evaluate(f"{PANEL}.motion.rowHandles()")
     wait_until(page, "eigenshape.viewer.motion.blend.value === 1")
     bent = bend(bind(rig, [chosen]), [es.Translation(handle["vector"])], mode=mode).vertices
     np.testing.assert_allclose(positions(page), bent, atol=SHADER)
@@ -231,13 +231,13 @@ def test_each_method_shows_its_exact_result_at_rest(page, mesh, rig, mode):
 
 def drag_arrow(page, axis, pixels):
     """Drag the arrow of the gizmo that belongs to an axis; the pointer stays down."""
-    pivot = page.evaluate(f"{PANEL}.mover.anchor.position.toArray()")
+    pivot = page.evaluate(f"{PANEL}.motion.mover.anchor.position.toArray()")
     x, y = place_of(page, pivot)
     aside = np.subtract(place_of(page, np.add(pivot, 0.1 * np.eye(3)[axis])), [x, y])
     aside /= np.linalg.norm(aside)
     for away in range(20, 120, 4):
         move_pointer(page, *(aside * away + [x, y]))
-        if page.evaluate(f"{PANEL}.mover.gizmo.axis") == "XYZ"[axis]:
+        if page.evaluate(f"{PANEL}.motion.mover.gizmo.axis") == "XYZ"[axis]:
             break
     page.mouse.down()
     for step in (0.3, 0.7, 1.0):
@@ -248,7 +248,7 @@ def test_an_arrow_moves_the_region_along_its_axis(page, mesh, rig):
     chosen = choose_above(page, HEAD)
     find(page, "tool-move").click()
     drag_arrow(page, axis=1, pixels=60)
-    (handle,) = page.evaluate(f"{PANEL}.rowHandles()")
+    (handle,) = page.evaluate(f"{PANEL}.motion.rowHandles()")
     assert handle["vector"][1] > 0.1
     assert handle["vector"][0] == handle["vector"][2] == 0
     # At rest the exact result replaces the motion by shares, which is what is compared here.
@@ -267,10 +267,10 @@ def test_an_arrow_moves_the_region_along_its_axis(page, mesh, rig):
 def test_the_region_turns_about_the_pivot_that_was_moved(page, mesh, rig):
     chosen = choose_above(page, HEAD)
     find(page, "tool-pivot").click()
-    before = page.evaluate(f"{PANEL}.pivotOf(0)")
+    before = page.evaluate(f"{PANEL}.motion.pivotOf(0)")
     drag_arrow(page, axis=2, pixels=50)
     page.mouse.up()
-    pivot = page.evaluate(f"{PANEL}.pivotOf(0)")
+    pivot = page.evaluate(f"{PANEL}.motion.pivotOf(0)")
     assert pivot[2] - before[2] > 0.1
     assert pivot[:2] == pytest.approx(before[:2], abs=1e-6)
     np.testing.assert_array_equal(positions(page), mesh.vertices.astype("f4"))
@@ -281,14 +281,14 @@ def test_the_region_turns_about_the_pivot_that_was_moved(page, mesh, rig):
     on_ring = []
     for radius in range(30, 110, 4):
         move_pointer(page, x, y + radius)
-        if page.evaluate(f"{PANEL}.mover.gizmo.axis") == "X":
+        if page.evaluate(f"{PANEL}.motion.mover.gizmo.axis") == "X":
             on_ring.append(radius)
     radius = on_ring[len(on_ring) // 2]
     move_pointer(page, x, y + radius)
     page.mouse.down()
     for away in (40, 80, 120):
         move_pointer(page, x + away, y + radius)
-    (handle,) = page.evaluate(f"{PANEL}.rowHandles()")
+    (handle,) = page.evaluate(f"{PANEL}.motion.rowHandles()")
     assert handle["pivot"] == pytest.approx(pivot)
     assert np.abs(handle["axis"]) == pytest.approx([1, 0, 0], abs=1e-9)
     assert abs(handle["angle"]) > 0.2
@@ -317,7 +317,7 @@ def test_keys_alone_choose_bend_and_undo(page, mesh, rig):
     page.keyboard.type(str(HEAD))  # what has the focus by Tab is selected, so this replaces it
     page.keyboard.press("Enter")
     wait_until_bound(page)
-    low, high = page.evaluate(f"[{PANEL}.box.low, {PANEL}.box.high]")
+    low, high = page.evaluate(f"[{PANEL}.selection.box.low, {PANEL}.selection.box.high]")
     assert low[1] == HEAD
     chosen = np.flatnonzero(region_mask(mesh, BoxRegion(low, high)))
     np.testing.assert_array_equal(region(page), chosen)

@@ -6,7 +6,7 @@ import { h } from "./core/dom";
 import { httpBackend } from "./hosts/http";
 import { inlineBackend } from "./hosts/inline";
 import { widgetBackend, type WidgetModel } from "./hosts/widget";
-import { DeformPanel } from "./panels/deform";
+import { DeformPanel } from "./panels/deform/deform";
 import { HeatPanel } from "./panels/heat";
 import { PartsPanel } from "./panels/parts";
 import { SearchPanel } from "./panels/search";

@@ -1,0 +1,155 @@
+/** Deform: choose regions, move them, and let the shape follow (chapter 6 of the thesis). */
+
+import type { Panel, Studio } from "../../app";
+import type { State } from "../../core/backend";
+import { Form } from "../../core/dom";
+import type { MotionKind } from "../../core/tools";
+import markup from "./deform.html?raw";
+import { replayFile, transferToFile } from "./files";
+import { Motion } from "./motion";
+import { Selection, type Selector } from "./selection";
+
+const SELECTORS = ["box", "brush", "part"]; // the other tools move
+
+type Tool = Selector | MotionKind;
+
+export class DeformPanel implements Panel {
+  readonly id = "deform";
+  readonly title = "Deform";
+  readonly needs = ["rig", "finish"];
+  private readonly form = new Form(markup);
+  private app!: Studio;
+  private selection!: Selection;
+  private motion!: Motion;
+  private tool: Tool = "brush";
+  private pose = "";
+  private active = false;
+
+  build(app: Studio): HTMLElement {
+    const { form } = this;
+    this.app = app;
+    this.tool = app.settings.get<Tool>("tool", "brush");
+    this.selection = new Selection(app, form, {
+      changing: () => (this.motion.ready = false),
+      selected: () => {
+        this.showSteps();
+        this.motion.bind();
+      },
+    });
+    this.motion = new Motion(app, form, this.selection, {
+      bound: () => this.showTools(),
+      chooseRegion: (region) => this.chooseRegion(region),
+    });
+    form.onChoice("region", (id) => this.chooseRegion(Number(id)));
+    form.onChoice("tool", (id) => this.chooseTool(id as Tool));
+    form.on({
+      clear: () => this.clear(),
+      several: () => this.showTools(),
+      undo: () => app.step("undo"),
+      redo: () => app.step("redo"),
+      reset: () => app.change({ kind: "reset" }, "Undoing all"),
+      "save-edits": () => app.save("edits", "json"),
+      "load-edits": () => replayFile(app),
+      skeleton: () => this.showSkeleton(),
+      "skeleton-modes": () => this.showSkeleton(),
+      crossings: () => this.showCrossings(),
+      transfer: () => transferToFile(app),
+    });
+    app.addExports(form);
+    for (const [tool, { dataset, textContent }] of form.choice("tool"))
+      app.shortcut(dataset.key!, `Deform: ${textContent!.toLowerCase()}`, () => {
+        app.open(this.id);
+        this.chooseTool(tool as Tool);
+      });
+    app.shortcut("Enter", "Apply the motions", () => this.motion.commit());
+    app.shortcut("Escape", "Drop the motion", () => this.motion.drop());
+    return form.root;
+  }
+
+  refresh(state: State): void {
+    const { form, selection, motion } = this;
+    const { deformation } = state;
+    form.progress("rig-progress", deformation);
+    form.get("reset").disabled = !deformation.n_edits;
+    this.showSteps();
+    const pose = `${state.shape} ${state.pose} ${deformation.status}`;
+    if (pose === this.pose) return selection.showFoundParts();
+    if (!this.pose.startsWith(`${state.shape} `)) {
+      selection.startShape(state);
+      motion.startShape();
+    }
+    this.pose = pose;
+    selection.crossing = [];
+    motion.startPose();
+    selection.paint();
+    motion.bind();
+    if (form.get("skeleton").checked) this.showSkeleton();
+    if (form.get("crossings").checked) this.showCrossings();
+  }
+
+  shown(): void {
+    this.active = true;
+    this.showTools();
+    this.selection.paint();
+  }
+
+  hidden(): void {
+    this.active = false;
+    this.motion.drop();
+    this.selection.paint();
+  }
+
+  private chooseRegion(region: number): void {
+    this.selection.chooseRegion(region);
+    this.showTools();
+  }
+
+  private chooseTool(tool: Tool): void {
+    this.tool = tool;
+    this.app.settings.set("tool", tool);
+    this.showTools();
+    if (tool === "box") this.selection.startBox();
+  }
+
+  /** Show what belongs to the tool: its options, its handles, the cursor. */
+  private showTools(): void {
+    const { active, form, tool } = this;
+    form.press("tool", tool);
+    form.text("hint", form.get(`tool-${tool}`).dataset.hint!);
+    const selects = SELECTORS.includes(tool);
+    if (!active) this.app.viewer.setPointer();
+    this.motion.show(selects ? null : (tool as MotionKind), active);
+    this.selection.show(selects ? (tool as Selector) : null, active);
+  }
+
+  private showSteps(): void {
+    for (const kind of ["undo", "redo"] as const)
+      this.form.get(kind).disabled = !this.app.can(kind);
+  }
+
+  private clear(): void {
+    this.motion.forgetPivot();
+    this.selection.clear();
+  }
+
+  private async showSkeleton(): Promise<void> {
+    const name = `skeleton/${this.form.number("skeleton-modes")}`;
+    const checked = this.form.get("skeleton").checked;
+    const loading = checked ? this.app.load<Float32Array>(name, "Computing the skeleton") : null;
+    this.app.viewer.setSkeleton(await loading);
+  }
+
+  private async showCrossings(): Promise<void> {
+    const checked = this.form.get("crossings").checked;
+    const pairs = checked ? await this.app.load("crossings", "Looking for crossing faces") : null;
+    const { faces } = this.app.viewer;
+    const crossing = [...new Set<number>(pairs ?? [])];
+    const corners = crossing.flatMap((face) => [...faces.subarray(3 * face, 3 * face + 3)]);
+    this.selection.crossing = corners;
+    this.selection.paint();
+    const found = crossing.length
+      ? `${pairs!.length / 2} pairs of faces cross.`
+      : "No faces cross.";
+    if (pairs) this.app.say(found);
+  }
+}

@@ -1,0 +1,181 @@
+/** How the regions move: by the pointer or by numbers, shown at once, and committed as an edit. */
+
+import type { Studio } from "../../app";
+import type { Change, Handle, Vec3 } from "../../core/backend";
+import type { Form } from "../../core/dom";
+import { FIXED } from "../../core/regions";
+import { MotionTool, type MotionKind } from "../../core/tools";
+import type { Selection } from "./selection";
+
+const REST = 80; // ms without motion, beside two frames, after which the exact result is requested
+const AXES = [0, 1, 2];
+const nextFrame = () => new Promise(requestAnimationFrame);
+
+export class Motion {
+  readonly mover: MotionTool;
+  private rows: number[] = []; // the region of each row of the shares
+  private handles: Handle[] = []; // of each region
+  private rims: Vec3[] = []; // middle of the rim of each region
+  private pivots: (Vec3 | undefined)[] = []; // that the person chose instead
+  private bindings = 0; // counts requests, so that only the last answer is used
+  private motions = 0;
+
+  constructor(
+    private readonly app: Studio,
+    private readonly form: Form,
+    private readonly selection: Selection,
+    private readonly events: { bound(): void; chooseRegion(region: number): void },
+  ) {
+    this.mover = new MotionTool(app.viewer, {
+      canDrag: (vertex) => this.canDrag(vertex),
+      moved: (handle) => this.moved(handle),
+      released: () => this.several || this.commit(),
+      pivoted: (pivot) => (this.pivots[this.selection.region] = pivot),
+    });
+    form.on({
+      "exact-go": () => this.moveExactly(),
+      "n-modes": () => this.bind(),
+      apply: () => this.commit(),
+    });
+    form.get("exact-amount").addEventListener("keydown", ({ key }) => {
+      if (key === "Enter") this.moveExactly();
+    });
+  }
+
+  startShape(): void {
+    this.pivots = [];
+  }
+
+  startPose(): void {
+    this.handles = [];
+  }
+
+  forgetPivot(): void {
+    this.pivots[this.selection.region] = undefined;
+  }
+
+  private get several(): boolean {
+    return this.form.get("several").checked;
+  }
+
+  get ready(): boolean {
+    return this.form.root.dataset.ready === "true";
+  }
+
+  set ready(ready: boolean) {
+    this.form.root.dataset.ready = String(ready);
+  }
+
+  /** Show the handles of a motion, and give it the pointer if the panel is seen. */
+  show(kind: MotionKind | null, visible: boolean): void {
+    this.form.get("apply").hidden = !this.several;
+    const { region } = this.selection;
+    if (kind && visible && this.ready && this.rows.includes(region))
+      this.mover.show(this.pivotOf(region), kind);
+    else this.mover.hide();
+    if (kind && visible) this.app.viewer.setPointer("grab", null, this.mover);
+  }
+
+  /** Ask by how much each vertex follows each region; then the regions can be moved. */
+  async bind(): Promise<void> {
+    const { app, form } = this;
+    const { regions } = this.selection;
+    const turn = ++this.bindings;
+    const chosen = [0, 1, 2, 3].map((region) => regions.vertices(region));
+    const fixed = regions.vertices(FIXED);
+    this.ready = false;
+    form.text("bound", "");
+    this.rows = [0, 1, 2, 3].filter((region) => chosen[region]!.length);
+    if (this.rows.length && app.state.deformation.status === "ready") {
+      const request = {
+        n_modes: form.number("n-modes") || null,
+        regions: this.rows.map((region) => chosen[region]!),
+        fixed: fixed.length ? fixed : null,
+      };
+      const answer = await app.run("Binding the regions", app.backend.rig(request));
+      if (turn !== this.bindings) return;
+      if (answer) {
+        app.viewer.setShares(answer.shares);
+        this.rows.forEach((region, row) => (this.rims[region] = answer.pivots[row]!));
+        form.text("bound", `Ready: the motion is spread by ${answer.n_modes.join(", ")} modes.`);
+        this.ready = true;
+      }
+    }
+    this.events.bound();
+  }
+
+  pivotOf(region: number): Vec3 {
+    return this.pivots[region] ?? this.rims[region]!;
+  }
+
+  /** A drag may begin on any region that is bound; it becomes the chosen one. */
+  private canDrag(vertex: number): boolean {
+    const region = this.selection.regions.of(vertex);
+    if (region === null || region === FIXED || !this.ready) return false;
+    if (region !== this.selection.region) this.events.chooseRegion(region);
+    return true;
+  }
+
+  rowHandles(): Handle[] {
+    return this.rows.map((region) => this.handles[region] ?? null);
+  }
+
+  private change(kind: "preview" | "commit"): Change {
+    return { kind, handles: this.rowHandles(), mode: this.form.get("mode").value };
+  }
+
+  /** Show a motion by shares at once, and the exact result when the pointer rests. */
+  private async moved(handle: Handle): Promise<void> {
+    const { app } = this;
+    this.handles[this.selection.region] = handle;
+    app.viewer.setHandles(this.rowHandles());
+    const turn = ++this.motions;
+    // A slow frame is no rest: a pointer that moves is heard of at the latest before the next one.
+    await nextFrame();
+    await nextFrame();
+    await new Promise((done) => setTimeout(done, REST));
+    if (turn !== this.motions) return;
+    const done = await app.backend.finish(this.change("preview")).catch((error) => app.fail(error));
+    if (done && turn === this.motions) app.viewer.setExact(done.vertices!);
+  }
+
+  async commit(): Promise<void> {
+    const handles = this.rowHandles();
+    if (!this.ready || !handles.some((handle) => handle)) return;
+    this.endMotion();
+    this.ready = false;
+    this.rows.forEach((region, row) => {
+      const [pivot, handle] = [this.pivots[region], handles[row]];
+      if (pivot && handle?.type === "translation")
+        this.pivots[region] = pivot.map((value, axis) => value + handle.vector[axis]!) as Vec3;
+    });
+    if (!(await this.app.change(this.change("commit"), "Bending the shape"))) this.drop();
+  }
+
+  private endMotion(): void {
+    this.motions++;
+    this.mover.hide();
+  }
+
+  /** Forget the motion that was not committed. */
+  drop(): void {
+    this.endMotion();
+    this.handles = [];
+    this.app.viewer.setHandles([]);
+    this.events.bound();
+  }
+
+  private async moveExactly(): Promise<void> {
+    const kind = this.form.get<HTMLSelectElement>("exact-kind").selectedIndex;
+    const amount = this.form.number("exact-amount");
+    const { region } = this.selection;
+    if (!this.ready || !this.rows.includes(region))
+      return this.app.say("Choose a region first: paint on the shape, or draw a box around it.");
+    if (!amount) return this.app.say("Write by how much it should move.");
+    const axis = AXES.map((each) => Number(each === kind % 3)) as Vec3;
+    const pivot = this.pivotOf(region);
+    if (kind < 3) this.moved({ type: "rotation", pivot, axis, angle: (amount * Math.PI) / 180 });
+    else this.moved({ type: "translation", vector: axis.map((one) => one * amount) as Vec3 });
+    if (!this.several) await this.commit();
+  }
+}

@@ -1,0 +1,275 @@
+/** Which vertices belong to which region: chosen by a box, a brush or parts. */
+
+import type { Studio } from "../../app";
+import type { State, Vec3 } from "../../core/backend";
+import { partColors, rgbOf } from "../../core/colors";
+import { h, type Form } from "../../core/dom";
+import { cutParts } from "../../core/parts";
+import { FIXED, Regions } from "../../core/regions";
+import { BoxTool } from "../../core/tools";
+import type { Hit, PointerTool } from "../../core/viewer";
+
+const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#4f6072"]; // of the regions, and fixed
+const CROSSING = "#d8301f";
+const TINT = 190; // of 255: how strongly a region covers the colors below
+const AXES = [0, 1, 2];
+
+export type Selector = "box" | "brush" | "part";
+
+/** What of the selection survives a reload, for the shape of this number. */
+interface Kept {
+  shape: number;
+  text: string; // of the regions
+  region: number;
+}
+
+export interface SelectionEvents {
+  changing(): void; // the regions are no longer those that are bound
+  selected(): void; // a selection has ended
+}
+
+export class Selection {
+  regions = new Regions(0);
+  region = 0; // that the tools change
+  crossing: number[] = []; // vertices of faces that cross
+  readonly box: BoxTool;
+  private readonly ring = h("div", { class: "ring", hidden: true });
+  private tool: Selector | null = null; // that has the pointer
+  private visible = false;
+  private kept = ""; // the regions after the last selection, as text
+  private labels: Int32Array | null = null; // part of each vertex
+  private painting: Promise<void> = Promise.resolve(); // discs of the brush, one after the other
+
+  constructor(
+    private readonly app: Studio,
+    private readonly form: Form,
+    private readonly events: SelectionEvents,
+  ) {
+    const { viewer, settings } = app;
+    this.box = new BoxTool(
+      viewer,
+      () => this.boxMoved(),
+      () => this.selected(),
+    );
+    viewer.stage.append(this.ring);
+    viewer.canvas.addEventListener("pointermove", (event) => this.moveRing(event));
+    COLORS.forEach((color, region) => {
+      form.get(`region-${region}`).style.setProperty("--swatch", color);
+    });
+    for (const name of ["low", "high"])
+      form.get("corners").append(name, ...AXES.map((axis) => this.buildCorner(name, axis)));
+    form.get("brush-radius").valueAsNumber = settings.get("radius", 0.1);
+    form.on({
+      "brush-radius": () => this.showRadius(),
+      "region-parts": () => this.showParts(form.number("region-parts")),
+    });
+  }
+
+  /** Return the input for a coordinate of a corner of the box. */
+  private buildCorner(name: string, axis: number): HTMLElement {
+    const title = `${name} ${"xyz"[axis]}`;
+    const labels = { "data-test": `box-${name}-${axis}`, title, "aria-label": title };
+    return h("input", { type: "number", step: "any", ...labels, change: () => this.readBox() });
+  }
+
+  /** Begin with a new shape: without regions, or with those of before a reload. */
+  startShape({ shape, n_vertices, up }: State): void {
+    this.regions = new Regions(n_vertices);
+    this.labels = null;
+    const kept = this.app.settings.get<Kept | null>("regions", null);
+    if (kept?.shape === shape) {
+      this.regions.read(kept.text);
+      this.region = kept.region;
+    }
+    this.kept = this.regions.write();
+    this.form.press("region", String(this.region));
+    // The first box holds what is above the middle, and nothing touches its other sides.
+    const { box, extent } = this.app.viewer;
+    const around = box.clone().expandByScalar(0.02 * extent);
+    const [low, high] = [around.min.toArray(), around.max.toArray()];
+    const upward = up.map(Math.abs).indexOf(1);
+    if (upward >= 0) low[upward] = (low[upward]! + high[upward]! - 0.02 * extent) / 2;
+    this.box.set(low, high);
+    this.writeBox();
+  }
+
+  /** Show the parts if they were awaited, and are ready now. */
+  showFoundParts(): void {
+    const ready = this.app.state.parts.status === "ready";
+    if (this.tool === "part" && !this.labels && ready) this.loadParts();
+  }
+
+  chooseRegion(region: number): void {
+    this.region = region;
+    this.form.press("region", String(region));
+    this.remember();
+  }
+
+  /** A box that has just been chosen selects what is in it. */
+  startBox(): void {
+    if (!this.regions.vertices(this.region).length) this.boxMoved();
+    this.selected();
+  }
+
+  /** Show the options of a selector, and give it the pointer if the panel is seen. */
+  show(tool: Selector | null, visible: boolean): void {
+    const { form, labels } = this;
+    const { viewer } = this.app;
+    [this.tool, this.visible] = [visible ? tool : null, visible];
+    form.get("corners").hidden = tool !== "box";
+    form.get("radius").hidden = tool !== "brush";
+    form.get("parts-slider").hidden = tool !== "part" || !labels;
+    this.showRadius();
+    this.ring.hidden = true;
+    this.box.show(this.tool === "box");
+    if (this.tool === "box") viewer.setPointer("grab", null, this.box);
+    else if (this.tool === "brush") viewer.setPointer("crosshair", null, this.brush);
+    else if (this.tool === "part")
+      viewer.setPointer("crosshair", (hit, event) => this.pickPart(hit, event));
+    if (this.tool === "part") this.loadParts();
+    else if (labels && viewer.labels === labels) viewer.setLabels(null);
+  }
+
+  /** Tint the regions and the faces that cross, and say how many vertices the region has. */
+  paint(): void {
+    const { regions, region, app } = this;
+    const tints = COLORS.map((color) => [...rgbOf(color), TINT]);
+    const marks = new Uint8Array(4 * app.state.n_vertices);
+    for (let vertex = 0; this.visible && vertex < app.state.n_vertices; vertex++) {
+      const owner = regions.of(vertex);
+      if (owner !== null) marks.set(tints[owner]!, 4 * vertex);
+    }
+    for (const vertex of this.crossing) marks.set([...rgbOf(CROSSING), TINT], 4 * vertex);
+    app.viewer.setMarks(marks);
+    const count = regions.vertices(region).length.toLocaleString("en");
+    const place = region === FIXED ? "the fixed part" : `region ${region + 1}`;
+    this.form.text("region-count", `${count} vertices in ${place}`);
+  }
+
+  clear(): void {
+    this.regions.clear(this.region);
+    this.selected();
+  }
+
+  private remember(): void {
+    const text = this.regions.write();
+    const kept: Kept = { shape: this.app.state.shape, text, region: this.region };
+    this.app.settings.set("regions", kept);
+    this.paint();
+  }
+
+  /** A selection has ended: keep it, and let the regions be bound. */
+  private selected(): void {
+    const [before, after] = [this.kept, this.regions.write()];
+    if (after !== before)
+      this.app.history.did({ undo: () => this.select(before), redo: () => this.select(after) });
+    this.select(after);
+  }
+
+  private select(kept: string): void {
+    this.kept = kept;
+    this.regions.read(kept);
+    this.remember();
+    this.events.selected();
+  }
+
+  private boxMoved(): void {
+    const { app, box, regions, region } = this;
+    regions.clear(region);
+    // A box that passes over another region leaves that region as it is.
+    const free = (vertex: number) => regions.of(vertex) === null;
+    regions.add(region, box.select(app.viewer.vertices).filter(free));
+    this.writeBox();
+    this.paint();
+    this.events.changing();
+  }
+
+  private writeBox(): void {
+    for (const name of ["low", "high"] as const)
+      this.box[name].forEach((value, i) => {
+        this.form.get(`box-${name}-${i}`).value = String(Number(value.toPrecision(5)));
+      });
+  }
+
+  private readBox(): void {
+    const read = (name: string) =>
+      AXES.map((axis) => this.form.number(`box-${name}-${axis}`)) as Vec3;
+    const [low, high] = [read("low"), read("high")];
+    if (!low.every((value, axis) => value <= high[axis]!)) return;
+    this.box.set(low, high);
+    this.boxMoved();
+    this.selected();
+  }
+
+  private showRadius(): void {
+    const share = this.form.number("brush-radius");
+    this.form.slide("brush-radius", share, `${(100 * share).toFixed(1)} %`);
+    this.app.settings.set("radius", share);
+  }
+
+  /** Return the radius of the brush, in length. */
+  private get radius(): number {
+    return this.form.number("brush-radius") * this.app.viewer.extent;
+  }
+
+  private moveRing(event: PointerEvent): void {
+    const reach = this.app.viewer.pixelsOf(this.radius);
+    const { style } = this.ring;
+    this.ring.hidden = this.tool !== "brush";
+    style.width = style.height = `${2 * reach}px`;
+    style.left = `${event.offsetX - reach}px`;
+    style.top = `${event.offsetY - reach}px`;
+  }
+
+  /** A stroke adds the disc along the surface around each vertex that it meets. */
+  private readonly brush: PointerTool = {
+    down: (event) => this.stroke(event),
+    move: (event) => void this.stroke(event),
+    up: () => this.painting.then(() => this.selected()),
+  };
+
+  private stroke(event: PointerEvent): boolean {
+    const { app, region, regions } = this;
+    const hit = app.viewer.pick(event.offsetX, event.offsetY);
+    if (!hit) return false;
+    this.events.changing();
+    const name = `disc/${hit.vertex}/${this.radius}`;
+    // One request at a time: a quick stroke sends more than the server takes at once.
+    const add = async () => {
+      const disc = await app.backend.array<Uint32Array>(name);
+      if (event.shiftKey) regions.remove(region, disc);
+      else regions.add(region, disc);
+      this.paint();
+    };
+    this.painting = this.painting.then(add).catch((error) => app.fail(error));
+    return true;
+  }
+
+  private async loadParts(): Promise<void> {
+    const { status, n_regions } = this.app.state.parts;
+    if (status === "none") await this.app.change({ kind: "parts" }, "Finding the parts");
+    else if (status === "ready")
+      await this.showParts(this.labels ? this.form.number("region-parts") : n_regions);
+  }
+
+  private async showParts(count: number): Promise<void> {
+    const { backend, state, viewer } = this.app;
+    const { levels } = state.parts;
+    const names = ["parts/labels", "parts/cuts"];
+    const arrays = await Promise.all(names.map((name) => backend.array<Int32Array>(name)));
+    this.labels = cutParts(arrays[0]!, arrays[1]!, levels.length, count);
+    this.form.slide("region-parts", count, String(count));
+    if (this.tool !== "part") return;
+    this.form.get("parts-slider").hidden = false;
+    viewer.setLabels(this.labels, partColors(levels.length));
+  }
+
+  private pickPart({ vertex }: Hit, { shiftKey }: PointerEvent): void {
+    if (!this.labels) return this.app.say("The parts are still being found …");
+    const part = this.labels[vertex];
+    const vertices = [...this.labels.keys()].filter((each) => this.labels![each] === part);
+    if (shiftKey) this.regions.remove(this.region, vertices);
+    else this.regions.add(this.region, vertices);
+    this.selected();
+  }
+}
