@@ -18,7 +18,7 @@ STATIC = HERE / "src" / "eigenshape_studio" / "static"
 BUNDLE = STATIC / "studio.js"
 # What the bundle is made of; tests and installed packages are not.
 SOURCES = ("src/**/*", "*.html", "*.json", "*.ts")
-MOST_BYTES = 700_000  # of the bundle, with three.js
+MOST_BYTES = 900_000  # of the bundle, with three.js
 
 try:
     from hatchling.builders.hooks.plugin.interface import BuildHookInterface

@@ -27,7 +27,7 @@ export default defineConfig({
     outDir: "../src/eigenshape_studio/static",
     emptyOutDir: true,
     target: "es2022",
-    chunkSizeWarningLimit: 700,
+    chunkSizeWarningLimit: 900,
     modulePreload: false,
     rollupOptions: {
       input: "src/main.ts",

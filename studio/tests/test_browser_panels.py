@@ -27,6 +27,7 @@ from eigenshape_studio.report import write_report
 pytestmark = pytest.mark.long
 
 FRONT, BOTH_SIDES = 0, 2  # of faces, in three.js
+SIDE = "eigenshape.viewer.surface.material.side"
 SINGLE = 2e-5  # relative error of sums of 300 products in single precision
 
 
@@ -106,6 +107,21 @@ def test_colors_of_the_picture_follow_the_slider(page):
     assert 0.05 < shape.mean() < 0.9
     assert np.array_equal(shape, late[..., 3] > 0)
     assert np.abs(early[shape].astype(int) - late[shape]).mean() > 10
+
+
+def test_daylight_comes_from_above(page, mesh):
+    wait_until(page, "eigenshape.viewer.ambient.ground.visible")
+    up = np.array(page.evaluate("eigenshape.state.up"))
+    height = es.geometry.vertex_normals(mesh) @ up
+    seen = vertex_values(page, "ambient")
+    assert seen[height > 0.8].mean() > 1.5 * seen[height < -0.8].mean()
+    # Between the legs less is seen of the sky than beside them, with the same slope.
+    sideways = np.abs(height) < 0.2
+    assert np.ptp(seen[sideways]) > 60
+    # Below the shape the ground is darker than at its rim.
+    code = "Array.from(eigenshape.viewer.ambient.sky.image.data)"
+    ground = np.array(page.evaluate(code)).reshape(96, 96)
+    assert ground[44:52, 44:52].mean() < ground[:8].mean() - 20
 
 
 def test_heat_starts_where_the_shape_is_clicked(page, spectrum):
@@ -192,6 +208,7 @@ def test_shape_of_few_modes_is_the_eigen_skeleton(page, mesh, spectrum):
     modes = spectrum.eigenvectors[:, :12]
     smooth = modes @ (modes.T @ (spectrum.mass @ mesh.vertices))
     assert_close(vertex_values(page, "position").reshape(-1, 3), smooth)
+    assert page.evaluate(SIDE) == BOTH_SIDES  # the smooth shape may show its inside
     open_panel(page, "shape")
     assert_close(vertex_values(page, "position").reshape(-1, 3), mesh.vertices, 1e-6)
 
@@ -332,12 +349,11 @@ def test_shape_panel_opens_repairs_and_saves(page, folder, mesh):
     chooser.value.set_files(folder / "turned.obj")
     find(page, "repair-orient").wait_for()
     assert find(page, "name").inner_text() == "turned.obj"
-    side = "eigenshape.viewer.surface.material.side"
-    assert page.evaluate(side) == BOTH_SIDES  # faces inward
+    assert page.evaluate(SIDE) == BOTH_SIDES  # faces inward
     find(page, "repair-orient").click()
     find(page, "repair-orient").wait_for(state="detached")
     page.get_by_text("No repair is needed.").wait_for()
-    assert page.evaluate(side) == FRONT
+    assert page.evaluate(SIDE) == FRONT
 
     es.write_mesh(es.icosphere(2), folder / "dropped.obj")
     drop_file(page, "stage", folder / "dropped.obj")

@@ -76,7 +76,7 @@ export class SpectrumPanel extends ColoringPanel {
     const mode = this.get<Float32Array>("modes", i, i + 1);
     const shape = this.view === "lowpass" ? this.smoothShape(i + 1) : this.unbend();
     const [values, points] = await this.latest(Promise.all([mode, shape]));
-    if (points) viewer.setVertices(points);
+    if (points) viewer.setVertices(points, this.view === "lowpass");
     const [low, high] = findRange(values);
     const size = Math.max(-low, high);
     const nodal = this.form.get("nodal").checked && high - low > FLAT * size;

@@ -1,6 +1,7 @@
 precision highp float;
 in vec3 v_normal;
 in vec3 v_view;
+in float v_ambient; // share of the sky that is seen
 // COLORING is 0: plain, 1: values through the table, 2: paint. Without a graphics card a branch
 // that is not taken costs a sixth of a frame, so the shader is compiled for each of them.
 #if COLORING == 1
@@ -8,6 +9,7 @@ in float v_value;
 uniform sampler2D table; // 256 colors
 uniform vec2 range;
 uniform bool nodal;
+uniform float line; // pixels of the picture for each of the page
 #elif COLORING == 2
 flat in vec3 v_paint;
 #else
@@ -26,7 +28,7 @@ void main() {
   // Where it is zero all over, as on a component of its own, there is none: slope is rounding.
   float slope = fwidth(v_value);
   float distance_to_zero = abs(v_value) / max(slope, 1e-30);
-  if (nodal && slope > 1e-9 * range.y) base = mix(vec3(0.12), base, smoothstep(0.7, 1.5, distance_to_zero));
+  if (nodal && slope > 1e-9 * range.y) base = mix(vec3(0.12), base, smoothstep(0.7 * line, 1.5 * line, distance_to_zero));
 #elif COLORING == 2
   vec3 base = v_paint;
 #else
@@ -38,10 +40,12 @@ void main() {
   vec3 eye = normalize(v_view);
   vec3 n = normalize(v_normal);
   if (dot(n, eye) < 0.0) n = -n; // both sides of an open surface are lit
-  // A large soft lamp at the upper left of the camera, a faint one at the lower right, and air.
+  // A large soft lamp at the upper left of the camera, a faint one at the lower right, and daylight,
+  // of which creases see little. Light changes how bright a color is, never its hue.
   float key = 0.5 + 0.5 * dot(n, vec3(-0.448, 0.647, 0.617));
   float fill = max(dot(n, vec3(0.781, -0.279, 0.558)), 0.0);
   float rim = 1.0 - max(dot(n, eye), 0.0);
   float light = 0.36 + 0.68 * key * key + 0.1 * fill - 0.12 * rim * rim * rim;
+  light *= mix(0.4, 1.3, v_ambient);
   color = vec4(min(base * light, 1.0), opacity);
 }

@@ -1,4 +1,6 @@
 in vec3 exact_normal;
+in float ambient;
+out float v_ambient;
 #if COLORING == 1
 in float value;
 out float v_value;
@@ -17,6 +19,7 @@ void main() {
   vec4 seen = modelViewMatrix * vec4(moved(turn), 1.0);
   v_normal = normalMatrix * mix(turned(normal, turn), exact_normal, blend);
   v_view = -seen.xyz;
+  v_ambient = ambient;
 #if COLORING == 1
   v_value = value;
 #elif COLORING == 2

@@ -1,0 +1,111 @@
+/** The eye: from where the shape is seen, and how mouse, fingers and keys move it. */
+
+import * as three from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import type { Vec3 } from "./backend";
+
+const FIELD_OF_VIEW = 26; // degrees: almost parallel, as in the library's pictures
+const TANGENT = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
+const MARGIN = 0.84; // share of the window that the shape fills
+
+export class Eye {
+  readonly camera = new three.PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
+  controls: OrbitControls;
+  private up: Vec3 = [0, 1, 0];
+  private towards: Vec3 = [0, 0, 1]; // from the shape to the viewer
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly onMove: () => void,
+    private readonly onEnd: () => void,
+  ) {
+    this.controls = this.startControls();
+    canvas.addEventListener("keydown", (event) => this.turnByKey(event));
+  }
+
+  /** Take the upward direction of a shape, and its front. */
+  face(up: Vec3, towards: Vec3): void {
+    Object.assign(this, { up, towards });
+    this.camera.up.set(...up);
+    this.controls.dispose();
+    this.controls = this.startControls(); // they read the upward direction only once
+  }
+
+  private startControls(): OrbitControls {
+    const controls = new OrbitControls(this.camera, this.canvas);
+    controls.zoomToCursor = true;
+    controls.addEventListener("change", this.onMove);
+    controls.addEventListener("end", this.onEnd);
+    return controls;
+  }
+
+  /** Show all vertices upright, from the front; `world` brings them into the scene. */
+  fit(vertices: Float32Array, world: three.Matrix4): void {
+    const up = new three.Vector3(...this.up);
+    const towards = new three.Vector3(...this.towards);
+    const right = up.clone().cross(towards).normalize();
+    const above = towards.clone().cross(right);
+    const turn = new three.Matrix4().makeBasis(right, above, towards).transpose();
+    turn.multiply(world);
+    const tangent = MARGIN * TANGENT;
+    const halves = new three.Vector3(tangent * this.camera.aspect, tangent, 0);
+    // A vertex (x, y, z), z towards the camera, is in the picture if the camera stands at least
+    // x / tan away from it in z, and so on each of the four sides. Opposite sides are balanced.
+    const sides = new three.Box3();
+    const [point, reach] = [new three.Vector3(), new three.Vector3()];
+    for (let place = 0; place < vertices.length; place += 3) {
+      point.fromArray(vertices, place).applyMatrix4(turn);
+      sides.expandByPoint(reach.copy(point).addScaledVector(halves, point.z));
+      sides.expandByPoint(reach.copy(point).addScaledVector(halves, -point.z));
+    }
+    const middle = sides.getCenter(new three.Vector3());
+    const size = sides.getSize(new three.Vector3()).divideScalar(2);
+    const distance = Math.max(size.x / halves.x, size.y / halves.y);
+    const target = right.multiplyScalar(middle.x).addScaledVector(above, middle.y);
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).addScaledVector(towards, distance);
+    this.controls.update();
+  }
+
+  get view(): { position: Vec3; target: Vec3 } {
+    return { position: this.camera.position.toArray(), target: this.controls.target.toArray() };
+  }
+
+  set view({ position, target }) {
+    this.camera.position.set(...position);
+    this.controls.target.set(...target);
+    this.controls.update();
+  }
+
+  /** Return the height of the scene that is seen at the point about which the camera turns. */
+  get height(): number {
+    return 2 * TANGENT * this.camera.position.distanceTo(this.controls.target);
+  }
+
+  /** Return the ray through a place of the canvas, in the coordinates of the scene. */
+  rayAt(x: number, y: number): three.Ray {
+    const { clientWidth, clientHeight } = this.canvas;
+    const caster = new three.Raycaster();
+    this.camera.updateMatrixWorld();
+    const place = new three.Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight);
+    caster.setFromCamera(place, this.camera);
+    return caster.ray;
+  }
+
+  private turnByKey(event: KeyboardEvent): void {
+    const { controls } = this;
+    const actions: Record<string, () => void> = {
+      ArrowLeft: () => controls.rotateLeft(0.1),
+      ArrowRight: () => controls.rotateLeft(-0.1),
+      ArrowUp: () => controls.rotateUp(0.1),
+      ArrowDown: () => controls.rotateUp(-0.1),
+      "+": () => controls.dollyIn(0.9),
+      "-": () => controls.dollyOut(0.9),
+    };
+    const action = actions[event.key];
+    if (!action) return;
+    event.preventDefault();
+    action();
+    controls.dispatchEvent({ type: "end" });
+  }
+}

@@ -1,0 +1,142 @@
+/** The surface in the graphics card: its buffers, and how the shader colors it. */
+
+import * as three from "three";
+import { colorMap, rgbOf, type Scale } from "./colors";
+import type { Motion } from "./motion";
+import { MAX_REGIONS } from "./regions";
+import surfaceFragment from "../shaders/surface.frag.glsl?raw";
+import surfaceVertex from "../shaders/surface.vert.glsl?raw";
+
+const PLAIN = "#cdc8c0";
+const [UNCOLORED, BY_VALUE, BY_PAINT] = [0, 1, 2]; // COLORING of the shader
+
+export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMaterial> {
+  vertices = new Float32Array(0);
+  faces = new Uint32Array(0);
+  labels: Int32Array | null = null;
+
+  constructor(motion: Motion, plain = PLAIN) {
+    const material = motion.material(surfaceVertex, surfaceFragment, {
+      table: { value: null },
+      range: { value: new three.Vector2(0, 1) },
+      nodal: { value: false },
+      line: { value: 1 },
+      plain: { value: new three.Vector3(...rgbOf(plain)).divideScalar(255) },
+      opacity: { value: 1 },
+    });
+    material.side = three.DoubleSide;
+    material.defines = { COLORING: UNCOLORED };
+    super(new three.BufferGeometry(), material);
+    this.frustumCulled = false; // the shader moves vertices out of the box of the geometry
+  }
+
+  setMesh(vertices: Float32Array, faces: Uint32Array): void {
+    const count = vertices.length / 3;
+    Object.assign(this, { vertices, faces });
+    const attributes = {
+      position: [vertices, 3],
+      normal: [vertexNormals(vertices, faces), 3],
+      exact: [vertices.slice(), 3],
+      exact_normal: [new Float32Array(3 * count), 3],
+      shares: [new Float32Array(MAX_REGIONS * count), MAX_REGIONS],
+      value: [new Float32Array(count), 1],
+      paint: [new Uint8Array(3 * count), 3],
+      mark: [new Uint8Array(4 * count), 4],
+      ambient: [new Uint8Array(count).fill(255), 1],
+    } as const;
+    this.geometry.dispose();
+    this.geometry.setIndex(new three.BufferAttribute(faces, 1));
+    for (const [name, [array, size]] of Object.entries(attributes)) {
+      const normalized = array instanceof Uint8Array;
+      this.geometry.setAttribute(name, new three.BufferAttribute(array, size, normalized));
+    }
+  }
+
+  setVertices(vertices: Float32Array<ArrayBuffer>): void {
+    this.vertices = vertices;
+    this.replace("position", vertices);
+    this.replace("normal", vertexNormals(vertices, this.faces));
+  }
+
+  setExact(vertices: Float32Array): void {
+    this.replace("exact", vertices);
+    this.replace("exact_normal", vertexNormals(vertices, this.faces));
+  }
+
+  /** Color by a function; nodal lines mark where it is zero. */
+  setScalars(values: Float32Array | null, scale?: Scale): void {
+    const { table, range, nodal } = this.material.uniforms;
+    this.labels = null;
+    this.define("COLORING", values ? BY_VALUE : UNCOLORED);
+    if (!values || !scale) return;
+    this.replace("value", values);
+    table!.value?.dispose();
+    table!.value = new three.DataTexture(colorMap(scale.map), 256, 1);
+    table!.value.needsUpdate = true;
+    range!.value.set(...scale.range);
+    nodal!.value = scale.nodal ?? false;
+  }
+
+  /** Color by parts; `palette` has three bytes a label. Labels below 0 stay plain. */
+  setLabels(labels: Int32Array, palette: Uint8Array): void {
+    this.labels = labels;
+    const paint = new Uint8Array(3 * labels.length).fill(209);
+    labels.forEach((label, vertex) => {
+      if (label >= 0) paint.set(palette.subarray(3 * label, 3 * label + 3), 3 * vertex);
+    });
+    this.replace("paint", paint);
+    this.turnCorners(labels);
+    this.define("COLORING", BY_PAINT);
+  }
+
+  /** Let each face end with a corner of its most frequent label: the shader takes that color. */
+  private turnCorners(labels: Int32Array): void {
+    const { faces } = this;
+    for (let place = 0; place < faces.length; place += 3) {
+      const [a, b, c] = faces.subarray(place, place + 3) as unknown as [number, number, number];
+      if (labels[a] === labels[b] && labels[b] !== labels[c]) faces.set([c, a, b], place);
+    }
+    this.geometry.index!.needsUpdate = true;
+  }
+
+  /** Tint vertices: red, green, blue and strength of each, in bytes. */
+  setMarks(marks: Uint8Array): void {
+    this.define("MARKED", marks.some((byte) => byte > 0));
+    this.replace("mark", marks);
+  }
+
+  /** Let what lies behind be seen, or not. */
+  setVeil(veil: boolean): void {
+    this.material.transparent = veil;
+    this.material.depthWrite = !veil;
+    this.material.uniforms.opacity!.value = veil ? 0.28 : 1;
+  }
+
+  replace(name: string, values: ArrayLike<number>): void {
+    const attribute = this.geometry.getAttribute(name) as three.BufferAttribute;
+    attribute.array.set(values);
+    attribute.needsUpdate = true;
+  }
+
+  /** Return a geometry that uses the buffers of this one with corners of its own. */
+  shareBuffers(geometry: three.BufferGeometry, corners: Uint32Array): void {
+    geometry.setIndex(new three.BufferAttribute(corners, 1));
+    for (const [name, attribute] of Object.entries(this.geometry.attributes))
+      geometry.setAttribute(name, attribute);
+  }
+
+  /** Compile the shader anew if a constant of it changes. */
+  private define(name: string, value: unknown): void {
+    const { material } = this;
+    if (material.defines[name] !== value) material.needsUpdate = true;
+    material.defines[name] = value;
+  }
+}
+
+/** Return unit normals at the vertices, weighted by the areas of the faces. */
+export function vertexNormals(points: Float32Array, faces: Uint32Array): Float32Array {
+  const surface = new three.BufferGeometry();
+  surface.setAttribute("position", new three.BufferAttribute(points, 3));
+  surface.setIndex(new three.BufferAttribute(faces, 1)).computeVertexNormals();
+  return surface.getAttribute("normal").array as Float32Array;
+}
