@@ -19,7 +19,6 @@ from eigenshape.io.formats.registry import (
     FIELD_FORMATS,
     MAP_FORMATS,
     format_of,
-    suffix_in,
     suffix_of,
 )
 
@@ -76,17 +75,17 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     """
     mesh, path = as_simplicial(mesh), as_path(path)
     suffix = suffix_of(path, None, FIELD_FORMATS)
-    replace_file(path, format_fields(mesh, suffix, fields, structure_named(mesh, path)))
+    replace_file(path, format_fields(mesh, suffix, fields, structure_named(mesh, path, suffix)))
 
 
-def structure_named(mesh: Mesh, path: Path, source: SourceFile | None = None) -> str:
+def structure_named(mesh: Mesh, path: Path, suffix: str, source: SourceFile | None = None) -> str:
     """Return the structure that a GIFTI source names, or CortexLeft or CortexRight by the name of the new file.
 
     Raise FileFormatError if the surface lies on the other side than the name says.
     """
     if source is not None and source.suffix == ".gii":
         return str(format_of(".gii").load().structure_of(source.data))
-    if suffix_in(path.name) not in (".gii", *MAP_FORMATS) or not isinstance(mesh, TriangleMesh):
+    if suffix not in (".gii", *MAP_FORMATS) or not isinstance(mesh, TriangleMesh):
         return ""
     side = side_of_file(mesh, path.name)
     return f"Cortex{side.capitalize()}" if side else ""

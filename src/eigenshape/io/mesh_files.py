@@ -379,7 +379,7 @@ def save_mesh(
             files = known.load("_attributes").write(job)
         elif "fields" in known.traits:
             job.lose([kind for kind in held.contents if kind != "fields"])
-            structure = structure_named(mesh, path, held.source)
+            structure = structure_named(mesh, path, suffix, held.source)
             files = {path: format_fields(mesh, suffix, held.fields, structure)}
         else:
             job.lose(held.contents)

@@ -115,7 +115,7 @@ def write_parcellation(mesh: MeshLike, path: str | Path, parcellation: Parcellat
     mesh, path = as_mesh(mesh), as_path(path)
     require_parcels(parcellation, mesh.n_vertices)
     suffix = suffix_of(path, None, PARCEL_FORMATS)
-    structure = structure_named(mesh, path)
+    structure = structure_named(mesh, path, ".gii")
     named = {"structure": structure} if suffix.endswith(".gii") else {}
     module = format_of(suffix).load()
     replace_file(path, module.format_parcels(mesh, parcellation, suffix, **named))
