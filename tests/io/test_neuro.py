@@ -166,7 +166,7 @@ def test_functions_are_what_nibabel_reads(path):
     assert np.array_equal(values.reshape(len(values), -1), np.column_stack(arrays), equal_nan=True)
 
 
-@pytest.mark.parametrize("name", ["lh.thickness", "a.curv", "a.mgh", "a.mgz"])
+@pytest.mark.parametrize("name", ["rh.thickness", "a.curv", "a.mgh", "a.mgz"])
 def test_one_function_in_files_of_freesurfer(tmp_path, name):
     path = tmp_path / name
     write_fields(TETRAHEDRON, path, {"thickness": FOUR})
