@@ -198,4 +198,4 @@ def read_field_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttribu
         if len(values) in (mesh.n_vertices, mesh.n_faces)
     }
     others = tuple(f"the field {name!r}" for name in fields if name not in fitting)
-    return replace(plain_attributes(mesh), fields=fitting, others=others)
+    return replace(plain_attributes(mesh), fields=fitting, others=others, source=source)
