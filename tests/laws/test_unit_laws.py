@@ -249,6 +249,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "geodesic_balls": (1, lambda s: geometry.geodesic_balls(s.mesh, 0.4 * s.u)),
     "geodesic_waves": (1, lambda s: geometry.geodesic_waves(s.mesh)(0, s.u)[1]),
     "mask_surface": (1, lambda s: geometry.mask_surface(s.mesh, s.f > s.f.mean()).mesh),
+    "brain_print": (0, lambda s: es.modes.brain_print({"lh": s.mesh}, 8).values),
     "condense": (2, lambda s: es.features.condense(s.mesh, s.f).areas),
     "parcellate": (
         0,

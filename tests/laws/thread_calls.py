@@ -328,6 +328,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "find_duplicates": lambda v: es.retrieval.find_duplicates(es.ShapeIndex.open(v.index.folder)),
     "read_fields": lambda v: es.io.read_fields(v.folder / "fields.vtu"),
     "mask_surface": lambda v: es.geometry.mask_surface(v.animal, v.animal.vertices[:, 1] > 0),
+    "brain_print": lambda v: es.modes.brain_print({"lh": v.animal, "rh": v.ball}, 9).asymmetry(),
     "condense": lambda v: es.features.condense(v.animal, v.heat),
     "parcellate": lambda v: es.features.parcellate(v.animal, v.heat, v.halves),
     "read_parcellation": lambda v: es.io.read_parcellation(v.folder / "halves.annot", v.animal),
