@@ -354,6 +354,19 @@ def test_values_are_shown_with_their_unit():
         Workspace(mesh, values={"height": [1, 2]})
 
 
+def test_vertices_without_a_value_stay_without():
+    mesh = es.icosphere(2)
+    masked = np.where(mesh.vertices[:, 2] > 0.5, np.nan, mesh.vertices[:, 2])
+    page = Page(Workspace(mesh, values={"height": masked}))
+    (facts,) = page.call("meta")[0]["values"]
+    assert (facts["min"], facts["max"]) == (-1, np.nanmax(masked))
+    np.testing.assert_array_equal(page.array("values/height"), masked.astype("<f4"))
+    nothing, endless = np.full(162, np.nan), np.where(np.isnan(masked), np.inf, masked)
+    for bad, said in ((nothing, "0 finite"), (endless, "and 43 infinite")):
+        with pytest.raises(es.InvalidParameterError, match=said):
+            Workspace(mesh, values={"height": bad})
+
+
 def test_an_index_is_searched(tmp_path):
     fish, bird = (es.make_creature(kind, n_vertices=500) for kind in ("fish", "bird"))
     index = es.ShapeIndex.create(tmp_path / "index")

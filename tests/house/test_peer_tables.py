@@ -10,7 +10,7 @@ import pytest
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "coming_from"
 # Modules of command lines and of reports on the machine, which are no functions of shapes.
-NO_SHAPES = {"lapy.commands", "lapy.utils"}
+NO_SHAPES = {"lapy.commands", "lapy.utils", "brainprint.cli", "brainprint.commands"}
 
 
 def public_names(package: str) -> set[str]:
@@ -50,6 +50,7 @@ def named_in(page: str) -> set[str]:
     [
         ("lapy", "lapy.md"),
         ("neuromodes", "neuromodes.md"),
+        ("brainprint", "brainprint.md"),
         ("potpourri3d", "potpourri3d.md"),
         ("robust_laplacian", "potpourri3d.md"),
     ],

@@ -105,6 +105,8 @@ def test_an_operator_is_documented_by_its_entry(halved):
 DEFAULTS = {
     "collection timeout": (es.retrieval.Workers, "timeout"),
     "compress bits": (es.spectral.compress_mesh, "bits"),
+    "condense timeout": (es.retrieval.Workers, "timeout"),
+    "condense tolerance": (es.features.condense, "tolerance"),
     "deform mode": (es.deform, "mode"),
     "features n_parts": (es.retrieval.HeatRecipe, "n_features"),
     "index add timeout": (es.retrieval.Workers, "timeout"),
@@ -129,6 +131,7 @@ SHARED = {
 OF_THE_COMMAND_LINE = {
     "demo kind",
     "demo output",
+    "condense n_modes",
     "features method",
     "index add method",
     "report n_modes",

@@ -2,6 +2,7 @@
 
 import pytest
 
+import eigenshape as es
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape.io.folders import find_items
 from eigenshape.retrieval.store.damage import StoreWarning
@@ -31,6 +32,18 @@ def test_files_that_differ_only_in_their_suffix_keep_it(folder):
     (folder / "cats" / "felix.obj").touch()
     names = {item.name for item in find_items([folder / "cats"])}
     assert names == {"felix.ply", "felix.obj", "old/tom"}
+
+
+def test_surfaces_of_freesurfer_without_a_suffix_are_found(tmp_path):
+    es.write_mesh(es.icosphere(0), tmp_path / "lh.pial")
+    es.io.write_fields(es.icosphere(0), tmp_path / "lh.sulc", {"a": range(12)})
+    (tmp_path / "lh.cortex").write_text("no surface")
+    es.write_mesh(es.icosphere(0), tmp_path / "rh.white")
+    es.write_mesh(es.icosphere(0), tmp_path / "other.ply")
+    assert [item.name for item in find_items(tmp_path)] == ["lh.pial", "other", "rh.white"]
+    (item,) = find_items(tmp_path / "lh.pial")
+    assert item.name == "lh.pial"
+    assert es.io.read_surface(item.path).mesh.n_vertices == 12
 
 
 def test_landmarks_beside_a_mesh_are_no_shape(tmp_path):

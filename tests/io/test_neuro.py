@@ -115,7 +115,11 @@ def test_the_command_line_takes_them(tmp_path):
     done = CliRunner().invoke(app, ["repair", arguments[0], "-o", arguments[1]])
     assert done.exit_code == 0, done.output
     assert es.read_mesh(arguments[1]).n_faces == 320
-    assert [item.name for item in es.io.find_items(tmp_path)] == ["ball.surf"]
+    assert [item.name for item in es.io.find_items(tmp_path)] == [
+        "ball.surf",
+        "lh.pial",
+        "lh.white",
+    ]
     done = CliRunner().invoke(app, ["info", str(tmp_path / "ball.func.gii")])
     assert done.exit_code == 1
     assert "read_fields reads the functions" in " ".join(done.output.split())
@@ -162,7 +166,7 @@ def test_functions_are_what_nibabel_reads(path):
     assert np.array_equal(values.reshape(len(values), -1), np.column_stack(arrays), equal_nan=True)
 
 
-@pytest.mark.parametrize("name", ["lh.thickness", "a.curv", "a.mgh", "a.mgz"])
+@pytest.mark.parametrize("name", ["rh.thickness", "a.curv", "a.mgh", "a.mgz"])
 def test_one_function_in_files_of_freesurfer(tmp_path, name):
     path = tmp_path / name
     write_fields(TETRAHEDRON, path, {"thickness": FOUR})
@@ -226,7 +230,24 @@ def test_dense_scalars_of_voxels(tmp_path):
     assert np.array_equal(found["cortex_right:a"], [np.nan, 1, 2, np.nan], equal_nan=True)
 
 
+def test_a_series_of_cifti_is_a_table(tmp_path):
+    voxels = cifti2_axes.BrainModelAxis.from_mask(np.ones((2, 1, 1)), "thalamus_left", np.eye(4))
+    surface = cifti2_axes.BrainModelAxis.from_surface([1, 2], 4, "cortex_right")
+    table = np.arange(12, dtype=np.float32).reshape(3, 4)
+    axes = (cifti2_axes.SeriesAxis(0, 0.72, 3), surface + voxels)
+    nib.save(nib.Cifti2Image(table, axes), tmp_path / "a.dtseries.nii")
+    found = read_fields(tmp_path / "a.dtseries.nii")
+    assert list(found) == ["cortex_right:series", "thalamus_left:series"]
+    assert found["thalamus_left:series"].tolist() == table[:, 2:].T.tolist()
+    right = found["cortex_right:series"]
+    assert right[1:3].tolist() == table[:, :2].T.tolist()
+    assert np.isnan(right[[0, 3]]).all()
+
+
 # Parcels.
+
+
+SIDES = (("left", -3), ("right", 3))
 
 
 @pytest.mark.parametrize("name", ["lh.aparc.annot", "ball.label.gii"])
@@ -251,12 +272,49 @@ def test_nibabel_reads_our_annotation_and_we_read_its(tmp_path):
     assert found.names == PARCELS.names
 
 
+def test_dense_labels_of_cifti(tmp_path):
+    path = tmp_path / "a.dlabel.nii"
+    sides = {
+        side: es.TriangleMesh(BALL.vertices + np.array([x, 0, 0]), BALL.faces) for side, x in SIDES
+    }
+    write_parcellation(sides["left"], path, PARCELS)
+    found = read_parcellation(path, sides["left"])
+    assert np.array_equal(found.labels, PARCELS.labels)
+    assert found.names == PARCELS.names
+    np.testing.assert_allclose(found.colors, PARCELS.colors)
+    with pytest.raises(
+        FileFormatError, match=r"lies on the right; it has \['cortex_left:parcels'\]"
+    ):
+        read_parcellation(path, sides["right"])
+    # Both hemispheres, as files of the Human Connectome Project have them, without the medial wall.
+    axes = [
+        cifti2_axes.BrainModelAxis.from_mask(BALL.vertices[:, 2] > z, name=f"cortex_{side}")
+        for side, z in (("left", -0.5), ("right", 0))
+    ]
+    rows = [np.where(BALL.vertices[axis.vertex, 0] > 0, 7, 3) for axis in axes]
+    table = {0: ("???", (0, 0, 0, 0)), 3: ("back", (1, 0, 0, 1)), 7: ("front", (0, 1, 0, 1))}
+    header = cifti2_axes.LabelAxis(["atlas"], [table]), axes[0] + axes[1]
+    nib.save(nib.Cifti2Image(np.concatenate(rows)[None].astype(np.int32), header), path)
+    for side, z in (("left", -0.5), ("right", 0)):
+        found = read_parcellation(path, sides[side])
+        front = BALL.vertices[:, 0] > 0
+        wanted = np.where(BALL.vertices[:, 2] > z, front.astype(int), -1)
+        assert found.labels.tolist() == wanted.tolist()
+        assert found.names == ("back", "front")
+    with pytest.raises(FileFormatError, match="which lies on the left and right"):
+        read_parcellation(path, BALL)
+    rows[0][5] = 9
+    nib.save(nib.Cifti2Image(np.concatenate(rows)[None].astype(np.int32), header), path)
+    with pytest.raises(FileFormatError, match=r"stand in its table; that of vertex \d+ is 9"):
+        read_parcellation(path, sides["left"])
+
+
 def test_an_annotation_of_the_first_version_is_read():
     def numbers(*values):
         return np.array(values, ">i4").tobytes()
 
     data = numbers(2, 0, 255, 1, 0, 1, 1, 2) + b"a\0" + numbers(2) + b"x\0" + numbers(255, 0, 0, 0)
-    found = annotations.parse_parcels(data, 2)
+    found = annotations.parse_parcels(data, TETRAHEDRON)
     assert found.labels.tolist() == [0, -1]
     assert found.names == ("x",)
 
@@ -268,7 +326,7 @@ def test_nibabel_reads_our_labels_and_we_read_its(tmp_path):
     assert image.labeltable.get_labels_as_dict() == dict(enumerate(("???", *PARCELS.names)))
     path = OF_NIBABEL / "rh.aparc.annot.gii"
     image = nib.load(path)
-    found = gifti.parse_parcels(path.read_bytes(), 0)
+    found = gifti.parse_parcels(path.read_bytes(), TETRAHEDRON)
     names = image.labeltable.get_labels_as_dict()
     keys = [label.key for label in image.labeltable.labels]
     assert found.names == tuple(names.values())
@@ -276,7 +334,7 @@ def test_nibabel_reads_our_labels_and_we_read_its(tmp_path):
     colors = [label.rgba for label in image.labeltable.labels]
     assert np.array_equal(found.colors, colors)
     with pytest.raises(FileFormatError, match=r"must have a key and a color; '[?]{3}' has"):
-        gifti.parse_parcels((OF_NIBABEL / "label.gii").read_bytes(), 0)
+        gifti.parse_parcels((OF_NIBABEL / "label.gii").read_bytes(), TETRAHEDRON)
 
 
 def test_a_label_file_is_one_parcel(tmp_path):
@@ -286,7 +344,8 @@ def test_a_label_file_is_one_parcel(tmp_path):
         freesurfer.read_label(tmp_path / "a.label"), np.flatnonzero(cap.labels == 0)
     )
     assert np.array_equal(read_parcellation(tmp_path / "a.label", BALL).labels, cap.labels)
-    assert annotations.parse_parcels(b"#!ascii none\n0\n", 3).labels.tolist() == [-1] * 3
+    found = annotations.parse_parcels(b"#!ascii none\n0\n", TETRAHEDRON)
+    assert found.labels.tolist() == [-1] * 4
 
 
 def test_parcels_of_another_surface_or_hemisphere_are_named(tmp_path):
@@ -307,12 +366,7 @@ def test_parcels_of_another_surface_or_hemisphere_are_named(tmp_path):
     left = es.TriangleMesh(BALL.vertices - 3.0, BALL.faces)
     with pytest.raises(FileFormatError, match="hemisphere of the surface; it is of the right one"):
         read_parcellation(path, left)
-    text = path.read_bytes().replace(
-        b"<MetaData />",
-        b"<MetaData><MD><Name>AnatomicalStructurePrimary</Name><Value>CortexLeft</Value></MD></MetaData>",
-        1,
-    )
-    path.write_bytes(text)
+    path.write_bytes(path.read_bytes().replace(b"CortexRight", b"CortexLeft"))
     with pytest.raises(FileFormatError, match=r"the left one \(CortexLeft\)"):
         read_parcellation(path, right)
     with pytest.raises(FileFormatError, match="table of names and colors; it has none"):
@@ -347,11 +401,13 @@ SURFACE = gifti.format_fields(TETRAHEDRON, {}, {})
 MAPS = gifti.format_maps(TETRAHEDRON, {"a": FOUR, "b": FOUR}, ".func.gii")
 CURVATURE = fs.format_maps(TETRAHEDRON, {"a": FOUR}, ".curv")
 MGH = fs.format_maps(TETRAHEDRON, {"a": FOUR}, ".mgh")
+ON_THE_LEFT = es.TriangleMesh(TETRAHEDRON.vertices - [9, 0, 0], TETRAHEDRON.faces)
+CIFTI_LABELS = cifti.format_parcels(ON_THE_LEFT, Parcellation([0, 1, 0, -1]), ".dlabel.nii")
 CIFTI = cifti.format_maps(TETRAHEDRON, {"cortex_left:a": FOUR}, ".dscalar.nii")
 
 
 def parcels(parse):
-    return lambda data: parse(data, 4)
+    return lambda data: parse(data, TETRAHEDRON)
 
 
 def words(start, *values):
@@ -516,6 +572,7 @@ def test_a_surface_is_checked_as_any_other(tmp_path):
         ("a.dscalar.nii", {"a": HEIGHT}, "must begin with cortex_left: or cortex_right:"),
         ("a.dscalar.nii", {"cortex_left:a": HEIGHT, "cortex_right:b": HEIGHT}, "same functions"),
         ("a.dscalar.nii", {}, "same functions, and at least one"),
+        ("a.dtseries.nii", {"cortex_left:a": HEIGHT}, "in .dtseries.nii are only read"),
     ],
 )
 def test_errors_of_writing_functions(tmp_path, name, fields, message):
@@ -532,6 +589,7 @@ def test_errors_of_writing_functions(tmp_path, name, fields, message):
             np.ones((3, 4)),
             "must differ in their colors, and none is black; that of 'low'",
         ),
+        ("a.dlabel.nii", None, "lies on both sides of x = 0. Write .label.gii"),
         ("a.annot", [[1, 0, 0, 1], [0, 0, 0, 1], [0, 1, 0, 1]], "none is black; that of 'middle'"),
     ],
 )
@@ -540,6 +598,27 @@ def test_errors_of_writing_parcels(tmp_path, name, colors, message):
         write_parcellation(
             BALL, tmp_path / name, Parcellation(PARCELS.labels, PARCELS.names, colors)
         )
+
+
+def test_gifti_names_the_structure(tmp_path):
+    left = es.TriangleMesh(BALL.vertices - [3, 0, 0], BALL.faces)
+    path = tmp_path / "sub-01_hemi-L.surf.gii"
+    es.write_mesh(left, path)
+    assert gifti.structure_of(path.read_bytes()) == "CortexLeft"
+    assert nib.load(path).darrays[0].meta["AnatomicalStructurePrimary"] == "CortexLeft"
+    for name, write in (("lh.a.func.gii", write_fields), ("lh.a.label.gii", write_parcellation)):
+        write(left, tmp_path / name, {"a": HEIGHT} if write is write_fields else PARCELS)
+        assert gifti.structure_of((tmp_path / name).read_bytes()) == "CortexLeft"
+    right = es.TriangleMesh(BALL.vertices + np.array([3, 0, 0]), BALL.faces)
+    for name in ("lh.a.func.gii", "lh.sulc", "x_hemi-L.surf.gii"):
+        with pytest.raises(
+            FileFormatError, match=r"the left one \(.*\), and the surface lies on the r"
+        ):
+            write_fields(right, tmp_path / name, {"a": HEIGHT})
+    # What the file says is carried over, whatever the name of the new one.
+    mesh, attributes = es.read_mesh(path, attributes=True)
+    es.write_mesh(mesh, tmp_path / "other.gii", attributes=attributes)
+    assert gifti.structure_of((tmp_path / "other.gii").read_bytes()) == "CortexLeft"
 
 
 def test_what_else_a_file_holds_is_named(tmp_path):
@@ -574,6 +653,7 @@ FILES = {
     "annotation": (parcels(annotations.parse_parcels), ANNOTATION),
     "label": (parcels(annotations.parse_parcels), b"#!ascii label\n2\n0 0 0 0 0\n3 0 0 1 0\n"),
     "cifti": (cifti.parse_fields, CIFTI),
+    "cifti labels": (lambda data: cifti.parse_parcels(data, ON_THE_LEFT), CIFTI_LABELS),
     "skeleton": (swc.parse, SKELETON),
 }
 

@@ -249,6 +249,8 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "geodesic_balls": (1, lambda s: geometry.geodesic_balls(s.mesh, 0.4 * s.u)),
     "geodesic_waves": (1, lambda s: geometry.geodesic_waves(s.mesh)(0, s.u)[1]),
     "mask_surface": (1, lambda s: geometry.mask_surface(s.mesh, s.f > s.f.mean()).mesh),
+    "brain_print": (0, lambda s: es.modes.brain_print({"lh": s.mesh}, 8).values),
+    "condense": (2, lambda s: es.features.condense(s.mesh, s.f).areas),
     "parcellate": (
         0,
         lambda s: es.features.parcellate(
@@ -262,6 +264,7 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         lambda s: es.scans.random_planes(s.mesh, np.random.default_rng(0))[:, 3],
     ),
     "decimate": (1, lambda s: es.geometry.decimate(s.mesh, ratio=0.5).mesh),
+    "tetrahedralize": (1, lambda s: geometry.tetrahedralize(s.mesh).points),
     "repair": (
         1,
         lambda s: np.concatenate(

@@ -48,6 +48,20 @@ def test_steady_activity_ends_at_the_gain_of_the_model():
     assert signal == pytest.approx(expected, rel=1e-6)
 
 
+def test_little_activity_is_as_linear_and_much_of_it_saturates():
+    activity = np.zeros((2, 150))
+    activity[:, :20] = [[1e-4], [1.0]]
+    linear = es.modes.blood_response(activity, 0.1)
+    found = es.modes.blood_response(activity, 0.1, linear=False)
+    np.testing.assert_allclose(found[0], linear[0], atol=1e-3 * linear[0].max())
+    assert found[1].max() < 0.8 * linear[1].max()
+    fine = np.zeros((1, 299))
+    fine[:, :39] = 1.0
+    fine[:, 39] = 0.5
+    twice = es.modes.blood_response(fine, 0.05, linear=False)[:, ::2]
+    np.testing.assert_allclose(twice[0], found[1], atol=1e-5 * found[1].max())
+
+
 def test_bad_input_is_named():
     with pytest.raises(
         es.InvalidParameterError, match=r"one row per mode, 1 to 9, .* shape is \(10, 4\)"
@@ -61,5 +75,11 @@ def test_bad_input_is_named():
         es.modes.wave_response(np.ones((2, 4)), SPECTRUM, 0.1, damping=0.0)
     with pytest.raises(es.InvalidParameterError, match=r"dt must be positive"):
         es.modes.blood_response(np.ones((2, 4)), -0.1)
+    strong = np.zeros((3, 50))
+    strong[1] = -5.0
+    with pytest.raises(
+        es.InvalidParameterError, match=r"row 1 do not, at time \d+, with an activity of -5"
+    ):
+        es.modes.blood_response(strong, 0.1, linear=False)
     with pytest.raises(es.InvalidParameterError, match=r"drive must be finite"):
         es.modes.wave_response(np.full((2, 4), np.nan), SPECTRUM, 0.1)

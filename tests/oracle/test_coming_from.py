@@ -51,6 +51,7 @@ def shared_names(folder: Path) -> dict[str, Any]:
     mesh, sheet, solid = bumpy_ball(), es.shapes.grid(8, 6), es.shapes.box(3, 3, 3)
     es.write_mesh(mesh, folder / "shape.off")
     es.io.write_points(es.PointCloud(mesh.vertices), folder / "points.ply")
+    es.write_mesh(mesh, folder / "lh.white")
     rim = es.geometry.boundary_loops(sheet)[0]
     loop = [*mesh.faces[10], mesh.faces[10][0]]
     angles = np.linspace(0, 2 * np.pi, len(rim), endpoint=False)
@@ -75,6 +76,8 @@ def shared_names(folder: Path) -> dict[str, Any]:
         "circle": np.column_stack([np.cos(angles), np.sin(angles)]),
         "points": 0.9 * mesh.vertices[:7],
         "path": str(folder / "shape.off"),
+        "surfaces": {name: folder / f"{name}.vtk" for name in ("lh-white-2d", "rh-white-2d")},
+        "fs_path": folder / "lh.white",
         "points_path": str(folder / "points.ply"),
         "field_path": str(folder / "height.vtu"),
         "new_path": str(folder / "new.obj"),
@@ -206,7 +209,22 @@ def names_of_neuromodes(shared: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def names_of_brainprint(shared: dict[str, Any]) -> dict[str, Any]:
+    """What code beside brainprint may use: surfaces that its steps before made of a subject."""
+    pytest.importorskip("brainprint")
+    lapy = import_module("lapy")
+    for path, factor in zip(shared["surfaces"].values(), (1.0, 1.1), strict=True):
+        lapy.TriaMesh(shared["V"] * [1, 1, factor], shared["F"]).write_vtk(str(path))
+    names: dict[str, Any] = {}
+    for module in ("brainprint", "asymmetry", "surfaces", "utils.utils"):
+        names |= vars(import_module(f"brainprint.{module}"))
+    kind = names["Brainprint"]
+    checks = {"environment_validation": False, "freesurfer_validation": False}
+    return names | {"Brainprint": Instance(kind, lambda: kind(Path(), **checks))}
+
+
 PEERS = {
+    "brainprint": names_of_brainprint,
     "lapy": names_of_lapy,
     "neuromodes": names_of_neuromodes,
     "libigl": names_of_libigl,

@@ -69,3 +69,6 @@ def test_the_blood_signal_is_the_limit_of_theirs_for_small_activity():
     expected = waves._model_balloon_ode(1e-3 * activity, 0.1) / 1e-3
     found = es.modes.blood_response(activity, 0.1)
     np.testing.assert_allclose(found, expected, atol=1e-2 * abs(expected).max())
+    theirs = waves._model_balloon_ode(activity, 0.1)
+    nonlinear = es.modes.blood_response(activity, 0.1, linear=False)
+    np.testing.assert_allclose(nonlinear, theirs, atol=1e-5 * abs(theirs).max())

@@ -1,4 +1,4 @@
-"""eigenshape info, repair and decimate: what a mesh is, what it needs, and the same surface by fewer faces."""
+"""eigenshape info, repair, decimate and tetrahedralize: what a mesh is, what it needs, fewer faces, and its inside."""
 
 from pathlib import Path
 from typing import Any
@@ -136,3 +136,34 @@ def decimate(
     else:
         for sentence in done.report:
             out.print(escape_text(sentence))
+
+
+def tetrahedralize(
+    mesh: Path,
+    *,
+    output: Path,
+    side_length: float | None = None,
+    repair: str = "none",
+    as_json: bool = False,
+) -> None:
+    """Fill a closed surface with tetrahedra, and write them to a .vtu file.
+
+    For instance: eigenshape tetrahedralize thalamus.gii --side-length 2 -o thalamus.vtu
+
+    Parameters
+    ----------
+    output
+        Write the tetrahedra to this file (.vtu).
+    side_length
+        Largest length of sides to aim at inside, in the unit of the file. By default sides grow
+        from those of the surface inward.
+    """
+    steps.require_output(output, (".vtu",), "A mesh of tetrahedra")
+    solid = es.geometry.tetrahedralize(steps.load_surface(mesh, repair), side_length)
+    es.io.write_fields(solid, output, {})
+    print_written(output)
+    facts = {"n_points": solid.n_points, "n_tetrahedra": solid.n_simplices}
+    if as_json:
+        print_json({"path": mesh, "output": output, **facts})
+    else:
+        out.print(f"{solid.n_simplices:,} tetrahedra of {solid.n_points:,} points")

@@ -24,9 +24,9 @@ from eigenshape.cli.inputs import SHARED_PARAMETERS, option_spellings, read_para
 
 # In the order in which help lists them. What each does is the first line of its docstring.
 VERBS = (
-    "info", "repair", "decimate",
+    "info", "repair", "decimate", "tetrahedralize",
     "spectrum", "operators",
-    "features", "segment", "label",
+    "features", "condense", "segment", "label",
     "match", "collection", "deform", "pose", "stability",
     "index", "query",
     "fuse", "compress", "decompress",
@@ -37,8 +37,9 @@ INDEX_VERBS = (
 )  # fmt: skip
 # Verbs that stand in the module of another one; each of the others has a module of its name.
 TOGETHER = {
-    "info": "repair", "decimate": "repair",
+    "info": "repair", "decimate": "repair", "tetrahedralize": "repair",
     "operators": "spectrum",
+    "condense": "features",
     "pose": "match", "fuse": "match",
     "decompress": "compress",
     "serve": "studio", "report": "studio",

@@ -1,4 +1,6 @@
 from .boundaries import smooth_boundaries as smooth_boundaries
+from .condensed import CondensedFeatures as CondensedFeatures
+from .condensed import condense as condense
 from .contrast import PART_CONTRAST as PART_CONTRAST
 from .diagram import PersistenceDiagram as PersistenceDiagram
 from .diagram import PersistencePairs as PersistencePairs

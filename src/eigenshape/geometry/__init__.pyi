@@ -38,6 +38,7 @@ from .repairs.repair_report import RepairedMesh as RepairedMesh
 from .resolution.decimation import DecimatedMesh as DecimatedMesh
 from .resolution.decimation import decimate as decimate
 from .resolution.subdivision import subdivide as subdivide
+from .resolution.tetrahedralization import tetrahedralize as tetrahedralize
 from .samples.quadrature import Quadrature as Quadrature
 from .samples.quadrature import shape_quadrature as shape_quadrature
 from .samples.surface_points import SurfacePoints as SurfacePoints

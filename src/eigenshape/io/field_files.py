@@ -14,7 +14,13 @@ from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io.attributes import MeshAttributes, SourceFile, naming, open_file, plain_attributes
-from eigenshape.io.formats.registry import FIELD_FORMATS, format_of, suffix_of
+from eigenshape.io.formats.neuro.shared import side_of_file
+from eigenshape.io.formats.registry import (
+    FIELD_FORMATS,
+    MAP_FORMATS,
+    format_of,
+    suffix_of,
+)
 
 WRITABLE = ("f8", "f4", "i8", "i4", "u1")  # numpy's types of fields that are written as they are
 Fields = dict[str, np.ndarray]
@@ -27,7 +33,9 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     .curv, .mgh and .mgz hold functions on vertices alone, as Connectome Workbench and FreeSurfer
     keep them; a path such as lh.thickness is a file in .curv. Those and .gii hold numbers of 32
     bits. In .dscalar.nii, the name of a function begins with its hemisphere, as in
-    "cortex_left:thickness", and vertices with NaN in all functions are left out.
+    "cortex_left:thickness", and vertices with NaN in all functions are left out. GIFTI files name
+    the structure CortexLeft or CortexRight if their name does, as lh.modes.func.gii or
+    sub-01_hemi-L_modes.func.gii.
 
     Parameters
     ----------
@@ -43,7 +51,7 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     ------
     FileFormatError
         If the suffix is another one, or another one than .vtu for tetrahedra or segments, or the
-        format cannot hold the functions.
+        format cannot hold the functions, or its name names the hemisphere on the other side.
     InvalidParameterError
         If a field has another number of rows, or is not of numbers.
     MissingExtraError
@@ -67,11 +75,28 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     """
     mesh, path = as_simplicial(mesh), as_path(path)
     suffix = suffix_of(path, None, FIELD_FORMATS)
-    replace_file(path, format_fields(mesh, suffix, fields))
+    replace_file(path, format_fields(mesh, suffix, fields, structure_named(mesh, path, suffix)))
 
 
-def format_fields(mesh: Mesh, suffix: str, fields: Mapping[str, ArrayLike]) -> bytes:
+def structure_named(mesh: Mesh, path: Path, suffix: str, source: SourceFile | None = None) -> str:
+    """Return the structure that a GIFTI source names, or CortexLeft or CortexRight by the name of the new file.
+
+    Raise FileFormatError if the surface lies on the other side than the name says.
+    """
+    if source is not None and source.suffix == ".gii":
+        return str(format_of(".gii").load().structure_of(source.data))
+    if suffix not in (".gii", *MAP_FORMATS) or not isinstance(mesh, TriangleMesh):
+        return ""
+    side = side_of_file(mesh, path.name)
+    return f"Cortex{side.capitalize()}" if side else ""
+
+
+def format_fields(
+    mesh: Mesh, suffix: str, fields: Mapping[str, ArrayLike], structure: str = ""
+) -> bytes:
     """Write a mesh and its fields; each has a row for every vertex, or for every face.
+
+    GIFTI files name the structure.
 
     Raise FileFormatError if the format holds triangles only, and the mesh has other cells, and
     InvalidParameterError if a field has another number of rows, or is not of numbers.
@@ -98,14 +123,15 @@ def format_fields(mesh: Mesh, suffix: str, fields: Mapping[str, ArrayLike]) -> b
             f"Files in {suffix} hold triangles in R^3; the mesh is {mesh!r}. Write it to .vtu."
         )
     known = format_of(suffix)
+    named = {"structure": structure} if suffix.endswith(".gii") else {}
     if "fields" in known.traits:
-        data: bytes = known.load().format_fields(mesh, of_vertices, of_faces)
+        data: bytes = known.load().format_fields(mesh, of_vertices, of_faces, **named)
         return data
     if of_faces:
         raise FileFormatError(
             f"Files in {suffix} hold functions on vertices; {next(iter(of_faces))!r} is on faces."
         )
-    maps: bytes = known.load().format_maps(mesh, of_vertices, suffix)
+    maps: bytes = known.load().format_maps(mesh, of_vertices, suffix, **named)
     return maps
 
 
@@ -124,8 +150,9 @@ def read_fields(path: str | Path) -> Fields:
         By name; each has a row for every vertex or for every face. If a function on faces has the
         name of one on vertices, it comes under ``face_`` and its name. A function without a name is
         called "values", and those of one name in a GIFTI file are columns of one table. Functions
-        in .dscalar.nii are named as in "cortex_left:thickness", and are NaN at vertices that the
-        file leaves out.
+        in .dscalar.nii, .dtseries.nii and .dlabel.nii are named as in "cortex_left:thickness", and
+        are NaN at vertices that the file leaves out; a series is a table of (n, times), named as in
+        "cortex_left:series".
 
     Raises
     ------
@@ -171,4 +198,4 @@ def read_field_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttribu
         if len(values) in (mesh.n_vertices, mesh.n_faces)
     }
     others = tuple(f"the field {name!r}" for name in fields if name not in fitting)
-    return replace(plain_attributes(mesh), fields=fitting, others=others)
+    return replace(plain_attributes(mesh), fields=fitting, others=others, source=source)

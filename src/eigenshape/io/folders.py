@@ -15,7 +15,13 @@ from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape._workers import Item
-from eigenshape.io.formats.registry import POINT_FORMATS, SHAPE_FORMATS, suffix_in
+from eigenshape.io.formats.registry import (
+    HEMISPHERES,
+    POINT_FORMATS,
+    SHAPE_FORMATS,
+    signed_suffix,
+    suffix_in,
+)
 from eigenshape.retrieval.store.damage import StoreWarning
 
 NAME, LABEL, TAGS = "name", "label", "tags"  # columns of a table of labels; others are attributes
@@ -31,7 +37,8 @@ def find_items(
 
     Links to folders are followed, and each folder is searched once.
     A shape is named by its path below the given folder, without the suffix of the file unless two
-    files differ only in the suffix. Points beside a mesh of the same name, such as its landmarks,
+    files differ only in the suffix. Surfaces of FreeSurfer without one, such as lh.pial, are found
+    by their first bytes. Points beside a mesh of the same name, such as its landmarks,
     are left out. The class of a shape is the name of the folder that holds it; a file that lies
     directly in the given folder, or is given itself, has none.
 
@@ -108,18 +115,25 @@ def _items_of(source: Path) -> Iterator[Item]:
     if not source.is_dir():
         # raises OSError for a folder that is misspelled, before anything is described
         source.stat()
-        yield Item(source.stem, source)
+        known = suffix_in(source.name) in SHAPE_FORMATS
+        yield Item(source.stem if known else source.name, source)
         return
-    known = sorted(path for path in _files_below(source) if suffix_in(path.name) in SHAPE_FORMATS)
-    meshes = {path.with_suffix("") for path in known if path.suffix.lower() not in POINT_FORMATS}
+    # The whole name of a surface of FreeSurfer, such as lh.pial, says what it is.
+    stem_of = {
+        path: path.with_suffix("") if suffix_in(path.name) in SHAPE_FORMATS else path
+        for path in sorted(_files_below(source))
+        if suffix_in(path.name) in SHAPE_FORMATS
+        or (path.name.startswith(HEMISPHERES) and signed_suffix(path) in SHAPE_FORMATS)
+    }
+    meshes = {stem for path, stem in stem_of.items() if path.suffix.lower() not in POINT_FORMATS}
     paths = [
         path
-        for path in known
-        if path.suffix.lower() not in POINT_FORMATS or path.with_suffix("") not in meshes
+        for path, stem in stem_of.items()
+        if path.suffix.lower() not in POINT_FORMATS or stem not in meshes
     ]
-    stems = Counter(path.with_suffix("") for path in paths)
+    stems = Counter(stem_of[path] for path in paths)
     for path in paths:
-        named = path if stems[path.with_suffix("")] > 1 else path.with_suffix("")
+        named = path if stems[stem_of[path]] > 1 else stem_of[path]
         below = named.relative_to(source)
         yield Item(below.as_posix(), path, below.parent.name or None)
 

@@ -23,7 +23,7 @@ from eigenshape.io.attributes import (
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.field_files import format_fields, read_field_attributes
+from eigenshape.io.field_files import format_fields, read_field_attributes, structure_named
 from eigenshape.io.formats.cells import SEGMENTS, require_kind, select_cells, split_sentence
 from eigenshape.io.formats.registry import (
     MESH_FORMATS,
@@ -379,7 +379,8 @@ def save_mesh(
             files = known.load("_attributes").write(job)
         elif "fields" in known.traits:
             job.lose([kind for kind in held.contents if kind != "fields"])
-            files = {path: format_fields(mesh, suffix, held.fields)}
+            structure = structure_named(mesh, path, suffix, held.source)
+            files = {path: format_fields(mesh, suffix, held.fields, structure)}
         else:
             job.lose(held.contents)
             module = known.load()

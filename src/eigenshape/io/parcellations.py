@@ -1,21 +1,15 @@
-"""Read and write parcels of a surface: annotation, label and GIFTI files."""
+"""Read and write parcels of a surface: annotation, label, GIFTI and CIFTI files."""
 
-import re
 from pathlib import Path
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import as_path, replace_file
 from eigenshape.features.parcellation import Parcellation, require_parcels
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.repairs.masks import hemisphere_of
 from eigenshape.io.attributes import naming, open_file
+from eigenshape.io.field_files import structure_named
+from eigenshape.io.formats.neuro.shared import side_of_file
 from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, suffix_of
-
-# Names of files that name a hemisphere: lh.aparc.annot, sub-01_hemi-L.label.gii, S1.L.aparc.label.gii
-LEFT, RIGHT = (
-    re.compile(rf"^{hemisphere}\.|hemi-{letter}\b|hemi-{letter}_|[._]{letter}\.")
-    for hemisphere, letter in (("lh", "L"), ("rh", "R"))
-)
 
 
 def read_parcellation(path: str | Path, mesh: MeshLike) -> Parcellation:
@@ -24,8 +18,9 @@ def read_parcellation(path: str | Path, mesh: MeshLike) -> Parcellation:
     Parameters
     ----------
     path : str or Path
-        An annotation (.annot) or label file (.label) of FreeSurfer, or a GIFTI file (.label.gii). A
-        label file lists the vertices of one parcel.
+        An annotation (.annot) or label file (.label) of FreeSurfer, a GIFTI file (.label.gii), or a
+        CIFTI file (.dlabel.nii), of which the hemisphere is taken that the surface is of. A label
+        file lists the vertices of one parcel.
     mesh : MeshLike
         The surface that the file belongs to.
 
@@ -38,7 +33,9 @@ def read_parcellation(path: str | Path, mesh: MeshLike) -> Parcellation:
     ------
     FileFormatError
         If the file is of another surface or hemisphere, has no names and colors, or does not hold
-        what it declares.
+        what it declares, or the surface lies on both sides of x = 0 and the file is of both.
+    MissingExtraError
+        If nibabel is not installed, which reads .nii.
     OSError
         If the system cannot open the file.
 
@@ -62,24 +59,16 @@ def read_parcellation(path: str | Path, mesh: MeshLike) -> Parcellation:
     source = open_file(path, None, PARCEL_FORMATS)
     with naming(source.path):
         module = format_of(source.suffix).load()
-        parcellation: Parcellation = module.parse_parcels(source.data, mesh.n_vertices)
+        parcellation: Parcellation = module.parse_parcels(source.data, mesh)
         n_labels = len(parcellation.labels)
         if n_labels != mesh.n_vertices:
             raise FileFormatError(
                 f"A parcellation must have a label for each of {mesh.n_vertices} vertices; it has "
                 f"{n_labels}, so it belongs to another surface."
             )
-        name = source.path.name
-        of_structure = module.structure_of(source.data) if source.suffix == ".label.gii" else ""
-        for side, pattern in (("left", LEFT), ("right", RIGHT)):
-            is_of_side = side in of_structure.lower() if of_structure else pattern.search(name)
-            found = hemisphere_of(mesh)
-            if is_of_side and found not in (side, ""):
-                raise FileFormatError(
-                    f"A parcellation must belong to the hemisphere of the surface; it is of the {side} "
-                    f"one ({of_structure or name}), and the surface lies on the {found}, x "
-                    f"{'<' if found == 'left' else '>'} 0."
-                )
+        structure = module.structure_of(source.data) if source.suffix == ".label.gii" else ""
+        if source.suffix != ".dlabel.nii":  # which holds both
+            side_of_file(mesh, source.path.name, structure)
     return parcellation
 
 
@@ -91,8 +80,8 @@ def write_parcellation(mesh: MeshLike, path: str | Path, parcellation: Parcellat
     mesh : MeshLike
         With n vertices.
     path : str or Path
-        Must end in .annot, .label or .label.gii. Annotations keep colors in bytes, and a label file
-        keeps one parcel without its name. In GIFTI, parcel i has the label i + 1.
+        Must end in .annot, .label, .label.gii or .dlabel.nii. Annotations keep colors in bytes, and a label file
+        keeps one parcel without its name. In GIFTI and CIFTI, parcel i has the label i + 1.
     parcellation : Parcellation
         Of the n vertices.
 
@@ -104,7 +93,7 @@ def write_parcellation(mesh: MeshLike, path: str | Path, parcellation: Parcellat
     InvalidParameterError
         If the parcellation is of another number of vertices.
     MissingExtraError
-        If nibabel is not installed, which writes GIFTI.
+        If nibabel is not installed, which writes GIFTI and CIFTI.
     OSError
         If the system cannot write the file.
 
@@ -126,4 +115,7 @@ def write_parcellation(mesh: MeshLike, path: str | Path, parcellation: Parcellat
     mesh, path = as_mesh(mesh), as_path(path)
     require_parcels(parcellation, mesh.n_vertices)
     suffix = suffix_of(path, None, PARCEL_FORMATS)
-    replace_file(path, format_of(suffix).load().format_parcels(mesh, parcellation, suffix))
+    structure = structure_named(mesh, path, ".gii")
+    named = {"structure": structure} if suffix.endswith(".gii") else {}
+    module = format_of(suffix).load()
+    replace_file(path, module.format_parcels(mesh, parcellation, suffix, **named))

@@ -8,5 +8,7 @@ from .morphometry import compare_modes as compare_modes
 from .nulls import rotation_nulls as rotation_nulls
 from .parcels import ParcelTree as ParcelTree
 from .parcels import nodal_parcels as nodal_parcels
+from .prints import BrainPrint as BrainPrint
+from .prints import brain_print as brain_print
 from .waves import blood_response as blood_response
 from .waves import wave_response as wave_response

@@ -9,7 +9,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import anyio.to_thread
-import numpy as np
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
@@ -27,7 +26,7 @@ from eigenshape_studio.listening import (
     shown_address,
 )
 from eigenshape_studio.memory import share_one_arena, trim_memory
-from eigenshape_studio.workspace import Answer, Workspace, error_message
+from eigenshape_studio.workspace import Answer, Workspace, error_message, is_field
 
 FILES = {"index.html": "text/html; charset=utf-8", "studio.js": "text/javascript; charset=utf-8"}
 TAB = re.compile(r"[A-Za-z0-9_-]{8,64}")
@@ -208,7 +207,7 @@ def _first_workspace(
             values = {
                 title: field
                 for title, field in attributes.fields.items()
-                if field.shape == (surface.n_vertices,) and np.isfinite(field).all()
+                if is_field(field, surface.n_vertices)
             }
         first = Workspace(surface, path.name, values=values, index=index, shared=True)
         first.attributes = attributes

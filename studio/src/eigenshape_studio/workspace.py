@@ -644,15 +644,24 @@ def _bytes(arrays: Arrays, name: str) -> bytes:
     return arrays[name].tobytes()
 
 
+def is_field(values: np.ndarray, n_vertices: int) -> bool:
+    """Tell whether the page can draw a function: a number or NaN at each vertex, and not NaN at all."""
+    return (
+        values.shape == (n_vertices,) and not np.isinf(values).any() and not np.isnan(values).all()
+    )
+
+
 def _fields(values: Mapping[str, Any], n_vertices: int) -> dict[str, Field]:
     """Return the functions that were passed, checked."""
     fields = {}
     for title, given in values.items():
         numbers = np.asarray(given, dtype=np.float64)
-        if numbers.shape != (n_vertices,) or not np.isfinite(numbers).all():
+        if not is_field(numbers, n_vertices):
             raise es.InvalidParameterError(
-                f"values must hold one finite number for each of the {n_vertices} vertices; "
-                f"{title!r} has the shape {numbers.shape}."
+                f"values must hold one finite number for each of the {n_vertices} vertices, or NaN "
+                f"where there is none, and at least one number; {title!r} has the shape "
+                f"{numbers.shape}, {np.isfinite(numbers).sum()} finite numbers and "
+                f"{np.isinf(numbers).sum()} infinite ones."
             )
         # "height (m)" is a title with its unit.
         text, _, unit = str(title).removesuffix(")").partition(" (")
@@ -661,5 +670,5 @@ def _fields(values: Mapping[str, Any], n_vertices: int) -> dict[str, Field]:
 
 
 def _field_facts(name: str, field: Field) -> dict[str, Any]:
-    low, high = float(field.values.min()), float(field.values.max())
+    low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
     return {"name": name, "title": field.title, "unit": field.unit, "min": low, "max": high}

@@ -2,6 +2,10 @@ from .collecting import doubtful_landmarks as doubtful_landmarks
 from .collecting import find_landmarks as find_landmarks
 from .collecting import landmarks_outside as landmarks_outside
 from .collection_report import write_collection_report as write_collection_report
+from .condensing import TABLES as TABLES
+from .condensing import condense_file as condense_file
+from .condensing import join_tables as join_tables
+from .condensing import write_table as write_table
 from .facts import shape_facts as shape_facts
 from .indexing import choose_shapes as choose_shapes
 from .indexing import convert_index as convert_index

@@ -54,7 +54,7 @@ class Format:
           `format_fields(mesh, of_points, of_cells)` writes them with the mesh.
         - "maps": the file holds functions on vertices and no mesh. `parse_fields(data)` returns them and
           an empty dictionary; `format_maps(mesh, of_points, suffix)` writes those of a mesh.
-        - "parcels": the file holds a parcellation and no mesh. `parse_parcels(data, n_points)` returns
+        - "parcels": the file holds a parcellation and no mesh. `parse_parcels(data, mesh)` returns
           it; `format_parcels(mesh, parcellation)` writes that of a mesh.
         - "colors": colors of vertices can be written.
         - "labels": labels of faces can be written. Other formats with colors get a material for each.
@@ -93,6 +93,8 @@ FORMATS = (
     Format(".shape.gii", "neuro.gifti", ("maps",)),
     Format(".label.gii", "neuro.gifti", ("maps", "parcels")),
     Format(".dscalar.nii", "neuro.cifti", ("maps",)),
+    Format(".dtseries.nii", "neuro.cifti", ("maps",)),
+    Format(".dlabel.nii", "neuro.cifti", ("maps", "parcels")),
     Format(".curv", "neuro.freesurfer", ("maps",)),
     Format(".mgh", "neuro.freesurfer", ("maps",)),
     Format(".mgz", "neuro.freesurfer", ("maps",)),
@@ -134,6 +136,12 @@ def suffix_in(name: str) -> str:
     return max(fitting, key=len, default=Path(name).suffix)
 
 
+def signed_suffix(path: Path) -> str:
+    """Return the suffix of a file that is known by its first bytes, otherwise an empty text."""
+    with path.open("rb") as file:
+        return SIGNATURES.get(file.read(3), "")
+
+
 def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> str:
     """Return the suffix that names the format, in lower case.
 
@@ -142,8 +150,7 @@ def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> st
     suffix = suffix_in(path.name if file_format is None else f"a.{file_format.removeprefix('.')}")
     if suffix not in [each.suffix for each in FORMATS]:
         if path.is_file():
-            with path.open("rb") as file:
-                suffix = SIGNATURES.get(file.read(3), suffix)
+            suffix = signed_suffix(path) or suffix
         elif path.name.startswith(HEMISPHERES):
             written = [each for each in SIGNATURES.values() if each in known]
             suffix = written[0] if written else suffix

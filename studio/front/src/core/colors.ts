@@ -10,6 +10,7 @@ export interface Scale {
   title: string;
   unit?: string;
   nodal?: boolean; // whether a line marks where the function is zero
+  partial?: boolean; // whether some vertices have no value, and are gray
 }
 
 const bytesOf = (base64: string) =>
@@ -52,7 +53,8 @@ export function findRange(values: Float32Array): [number, number] {
 }
 
 /** Return the bar of a color map with its title and unit, and the numbers below it. */
-export function buildLegend({ title, unit, map, range: [low, high] }: Scale): HTMLElement {
+export function buildLegend(drawn: Scale): HTMLElement {
+  const { title, unit, map, range: [low, high], partial } = drawn;
   const bar = h("canvas", { class: "bar", width: 256, height: 1 });
   const image = new ImageData(new Uint8ClampedArray(colorMap(map)), 256, 1);
   bar.getContext("2d")!.putImageData(image, 0, 0);
@@ -62,5 +64,5 @@ export function buildLegend({ title, unit, map, range: [low, high] }: Scale): HT
   );
   const heading = h("div", {}, unit ? `${title}, ${unit}` : title);
   const scale = h("div", { class: "numbers" }, ...numbers);
-  return h("div", { class: "legend", "data-test": "legend" }, heading, bar, scale);
+  return h("div", { class: "legend", "data-test": "legend" }, heading, bar, scale, partial && h("div", {}, "gray: no value"));
 }

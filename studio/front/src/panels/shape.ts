@@ -70,7 +70,9 @@ export class ShapePanel extends ColoringPanel {
     const chosen = state.values.find((each) => each.name === name);
     if (!chosen) return viewer.setScalars(null);
     const values = await this.latest(this.get<Float32Array>(`values/${name}`));
-    viewer.setScalars(values, { ...chosen, map: "viridis", range: [chosen.min, chosen.max] });
+    const partial = values.some(Number.isNaN);
+    const range: [number, number] = [chosen.min, chosen.max];
+    viewer.setScalars(values, { ...chosen, map: "viridis", range, partial });
   }
 
   private async savePicture(): Promise<void> {

@@ -28,7 +28,8 @@ void main() {
   // Where it is zero all over, as on a component of its own, there is none: slope is rounding.
   float slope = fwidth(v_value);
   float distance_to_zero = abs(v_value) / max(slope, 1e-30);
-  if (nodal && slope > 1e-9 * range.y) base = mix(vec3(0.12), base, smoothstep(0.7 * line, 1.5 * line, distance_to_zero));
+  if (isnan(v_value)) base = vec3(0.72); // no value, such as on a medial wall
+  else if (nodal && slope > 1e-9 * range.y) base = mix(vec3(0.12), base, smoothstep(0.7 * line, 1.5 * line, distance_to_zero));
 #elif COLORING == 2
   vec3 base = v_paint;
 #else

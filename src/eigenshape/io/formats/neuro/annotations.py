@@ -13,10 +13,10 @@ PACKING = np.array([1, 2**8, 2**16])  # of red, green and blue into the number o
 OPAQUE = 255.0  # full opacity of a color in bytes
 
 
-def parse_parcels(data: bytes, n_points: int) -> Parcellation:
-    """Return the parcels of an annotation, or the one of a label file on `n_points` vertices."""
+def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
+    """Return the parcels of an annotation, or the one of a label file of a mesh."""
     if data.startswith(b"#!ascii"):
-        return _parse_label(data, n_points)
+        return _parse_label(data, mesh.n_vertices)
     cursor = Cursor(data, WHAT)
 
     def take_whole() -> int:

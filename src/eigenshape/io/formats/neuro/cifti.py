@@ -1,26 +1,44 @@
-"""CIFTI files of dense scalars: functions on the vertices of both hemispheres, and on voxels below them."""
+"""CIFTI files: functions, series and parcels on the vertices of both hemispheres, and on voxels below them."""
+
+from typing import Any
 
 import numpy as np
 
 from eigenshape._errors import FileFormatError
+from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.neuro.shared import Arrays, narrow, require_nibabel
+from eigenshape.geometry.repairs.masks import hemisphere_of
+from eigenshape.io.formats.neuro.shared import (
+    NO_PARCEL,
+    Arrays,
+    find_keys,
+    narrow,
+    require_nibabel,
+)
 from eigenshape.io.formats.numbers import require_reasonable
 
 PREFIX = "CIFTI_STRUCTURE_"
 NIFTI_HEADER = 540  # bytes
 MAGIC = b"n+2\0\r\n\x1a\n"
 SURFACES = ("cortex_left", "cortex_right")  # structures that files are written for
+SERIES = "series"
 
 
 def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     """Return each function on each structure, named as in "cortex_left:thickness".
 
-    On a surface there is a row for every vertex, with NaN where the file has none, as on the medial
-    wall; other structures have a row for each voxel.
+    A series of functions is one table of the name "series". On a surface there is a row for every
+    vertex, with NaN where the file has none, as on the medial wall; other structures have a row for
+    each voxel.
 
     Raise FileFormatError if the file does not hold what it declares.
     """
+    _, found = _parse(data)
+    return found, {}
+
+
+def _parse(data: bytes) -> tuple[Any, Arrays]:
+    """Return the axis of the functions, and the functions."""
     nibabel = require_nibabel("nibabel")
     _require_size(data)
     try:
@@ -32,24 +50,78 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
             (name.removeprefix(PREFIX).lower(), place, part)
             for name, place, part in models.iter_structures()
         ]
-        found: Arrays = {}
-        for map_name, row in zip(maps.name.tolist(), values, strict=True):
-            for structure, place, part in structures:
-                held = row[place]
-                is_surface = bool(part.surface_mask.all())
-                if is_surface:
-                    n_vertices = next(iter(part.nvertices.values()))
-                    require_reasonable(8 * n_vertices, len(data))
-                    held = np.full(n_vertices, np.nan, values.dtype)
-                    held[part.vertex] = row[place]
-                found[f"{structure}:{map_name}"] = held
+        tables: Arrays = {}
+        for structure, place, part in structures:
+            table = held = values[:, place].T
+            if part.surface_mask.all():
+                n_vertices = next(iter(part.nvertices.values()))
+                require_reasonable(8 * n_vertices * len(values), len(data))
+                table = np.full((n_vertices, len(values)), np.nan, values.dtype)
+                table[part.vertex] = held
+            tables[structure] = table
+        if not hasattr(maps, "name"):
+            return maps, {f"{structure}:{SERIES}": table for structure, table in tables.items()}
+        found = {
+            f"{structure}:{name}": np.ascontiguousarray(table[:, number])
+            for number, name in enumerate(maps.name.tolist())
+            for structure, table in tables.items()
+        }
     except FileFormatError:
         raise
     except Exception as err:  # nibabel and its parser of XML each raise their own
         raise FileFormatError(
             f"A CIFTI file must hold functions on brain models; {type(err).__name__}: {err}."
         ) from err
-    return found, {}
+    return maps, found
+
+
+def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
+    """Return the parcellation of the hemisphere that a mesh is of; the label named ??? is no parcel.
+
+    Raise FileFormatError if the file does not hold one function of labels on that hemisphere.
+    """
+    maps, found = _parse(data)
+    side = hemisphere_of(mesh)
+    held = {name: labels for name, labels in found.items() if name.startswith(SURFACES)}
+    of_side = [labels for name, labels in held.items() if name.startswith(f"cortex_{side}")]
+    tables = getattr(maps, "label", [])
+    if len(of_side) != 1 or len(tables) != 1:
+        raise FileFormatError(
+            f"A CIFTI file of parcels must have one function of labels on the hemisphere of the surface, "
+            f"which lies on the {side or 'left and right'}; it has {list(held)}, {len(tables)} with names. "
+            "Move the surface to its side of x = 0 if that is not known."
+        )
+    labels = np.nan_to_num(of_side[0])
+    rows = [(key, *row) for key, row in tables[0].items() if row[0] != NO_PARCEL]
+    places = find_keys(np.array([key for key, *_ in rows]), labels)
+    nameless = {key for key, row in tables[0].items() if row[0] == NO_PARCEL} | {0}
+    odd = np.flatnonzero((places < 0) & ~np.isin(labels, list(nameless)))
+    if odd.size:
+        raise FileFormatError(
+            f"Labels of a CIFTI file must stand in its table; that of vertex {odd[0]} is "
+            f"{labels[odd[0]]:g} ({odd.size} such)."
+        )
+    return Parcellation(places, tuple(name for _, name, _ in rows), [color for *_, color in rows])
+
+
+def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) -> bytes:
+    """Write the parcels of one hemisphere; parcel i has the label i + 1, since 0 is for none."""
+    side = hemisphere_of(mesh)
+    if not side:
+        raise FileFormatError(
+            "A CIFTI file holds parcels of a hemisphere; the surface lies on both sides of x = 0. "
+            "Write .label.gii."
+        )
+    nibabel = require_nibabel("nibabel")
+    axes = require_nibabel("nibabel.cifti2.cifti2_axes")
+    rows = zip((NO_PARCEL, *parcellation.names), [[0] * 4, *parcellation.colors], strict=True)
+    table = {key: (name, tuple(map(float, color))) for key, (name, color) in enumerate(rows)}
+    everywhere = np.ones(mesh.n_vertices, dtype=bool)
+    model = axes.BrainModelAxis.from_mask(everywhere, name=f"cortex_{side}")
+    labels = (parcellation.labels[None] + 1).astype(np.int32)
+    image = nibabel.Cifti2Image(labels, (axes.LabelAxis(["parcels"], [table]), model))
+    written: bytes = image.to_bytes()
+    return written
 
 
 def _require_size(data: bytes) -> None:
@@ -74,6 +146,11 @@ def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
 
     Raise FileFormatError if a name has no such structure, or the structures differ in their functions.
     """
+    if suffix != ".dscalar.nii":
+        raise FileFormatError(
+            f"Functions are written to .dscalar.nii, each map of a series by itself; files in {suffix} "
+            "are only read, and es.io.write_parcellation writes parcels."
+        )
     nibabel = require_nibabel("nibabel")
     axes = require_nibabel("nibabel.cifti2.cifti2_axes")
     by_structure: dict[str, Arrays] = {}

@@ -10,7 +10,13 @@ from jaxtyping import Float, Int
 from eigenshape._errors import FileFormatError
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.neuro.shared import Arrays, find_keys, narrow, require_nibabel
+from eigenshape.io.formats.neuro.shared import (
+    NO_PARCEL,
+    Arrays,
+    find_keys,
+    narrow,
+    require_nibabel,
+)
 from eigenshape.io.formats.numbers import ZLIB, numbers_of, require_reasonable, unpack_block
 from eigenshape.io.formats.stl import single_precision
 
@@ -26,7 +32,7 @@ PLAIN = ("Base64Binary", "GIFTI_ENCODING_B64BIN")
 PACKED = ("GZipBase64Binary", "GIFTI_ENCODING_B64GZ")
 POINTS, TRIANGLES, LABELS = "NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE", "NIFTI_INTENT_LABEL"
 UNNAMED = "values"
-NO_PARCEL = "???"  # name of the label 0 in files of Connectome Workbench
+STRUCTURE = "AnatomicalStructurePrimary"
 
 
 def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "f 3"]]:
@@ -78,7 +84,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     }, {}
 
 
-def parse_parcels(data: bytes, n_points: int) -> Parcellation:
+def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
     """Return the parcellation of a file of labels; the label named ??? is no parcel.
 
     Raise FileFormatError if there is not one array of labels, or a label has no name or color.
@@ -126,9 +132,7 @@ def parse_parcels(data: bytes, n_points: int) -> Parcellation:
 def structure_of(data: bytes) -> str:
     """Return the structure that the file names, such as CortexLeft, or an empty text."""
     root = _parse_tags(data)
-    found = (
-        _meta(each).get("AnatomicalStructurePrimary") for each in [root, *root.iter("DataArray")]
-    )
+    found = (_meta(each).get(STRUCTURE) for each in [root, *root.iter("DataArray")])
     return next(filter(None, found), "")
 
 
@@ -205,7 +209,9 @@ def _values(array: ElementTree.Element, n_bytes: int) -> np.ndarray:
     return values.astype(dtype.newbyteorder("="))
 
 
-def format_fields(mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:
+def format_fields(
+    mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays, structure: str = ""
+) -> bytes:
     """Write a surface and functions on its vertices, in single precision.
 
     Raise FileFormatError if a number does not fit into 32 bits, or a function is on faces.
@@ -218,23 +224,27 @@ def format_fields(mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays) -> 
         raise FileFormatError(f"GIFTI files hold 2^31 vertices; the mesh has {mesh.n_vertices}.")
     arrays = [(POINTS, "", single_precision(mesh, "GIFTI")), (TRIANGLES, "", mesh.faces)]
     shapes = [("NIFTI_INTENT_SHAPE", name, values) for name, values in of_vertices.items()]
-    return _format(arrays + shapes)
+    return _format(arrays + shapes, structure)
 
 
-def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
+def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str, structure: str = "") -> bytes:
     """Write functions on vertices alone."""
     intents = {".shape.gii": "NIFTI_INTENT_SHAPE", ".label.gii": LABELS}
     intent = intents.get(suffix, "NIFTI_INTENT_NONE")
-    return _format([(intent, name, values) for name, values in of_vertices.items()])
+    return _format([(intent, name, values) for name, values in of_vertices.items()], structure)
 
 
-def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) -> bytes:
+def format_parcels(
+    mesh: TriangleMesh, parcellation: Parcellation, suffix: str, structure: str = ""
+) -> bytes:
     """Write labels with names and colors; parcel i has the label i + 1, since 0 is for none."""
-    return _format([(LABELS, "parcels", parcellation.labels + 1)], parcellation)
+    return _format([(LABELS, "parcels", parcellation.labels + 1)], structure, parcellation)
 
 
 def _format(
-    arrays: list[tuple[str, str, np.ndarray]], parcellation: Parcellation | None = None
+    arrays: list[tuple[str, str, np.ndarray]],
+    structure: str,
+    parcellation: Parcellation | None = None,
 ) -> bytes:
     gifti = require_nibabel("nibabel.gifti")
     table = gifti.GiftiLabelTable()
@@ -244,12 +254,16 @@ def _format(
             label = gifti.GiftiLabel(key, *map(float, color))
             label.label = name
             table.labels.append(label)
-    image = gifti.GiftiImage(labeltable=table)
+    named = {STRUCTURE: structure} if structure else {}
+    image = gifti.GiftiImage(labeltable=table, meta=gifti.GiftiMetaData(named))
     for intent, name, values in arrays:
         for column in (
             [values] if intent in (POINTS, TRIANGLES) else values.reshape(len(values), -1).T
         ):
-            meta = gifti.GiftiMetaData({"Name": name} if name else {})
+            # Of surfaces, Connectome Workbench reads the structure of the points.
+            meta = gifti.GiftiMetaData(
+                named if intent == POINTS else {"Name": name} if name else {}
+            )
             image.add_gifti_data_array(
                 gifti.GiftiDataArray(narrow(name, column), intent=intent, meta=meta)
             )

@@ -1,0 +1,96 @@
+"""Regions of like heat of one file, in a worker, and the table of those of all."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO, StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eigenshape._extras import import_extra
+from eigenshape._files import replace_file
+from eigenshape.cli.inputs import drops_missing
+from eigenshape.features.condensed import condense
+from eigenshape.geometry.repairs.repair import repair
+from eigenshape.io import mesh_files
+from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.spectral.signatures.approximate_heat import LARGE, approximate_heat_signature
+from eigenshape.spectral.signatures.heat import heat_kernel_signature
+from eigenshape.spectral.solve import solve_spectrum
+
+TABLES = (".csv", ".parquet")
+CUT_OFF = 0.01  # the most that e^{-tλ} of the last mode may be at the shortest time, without a note
+Columns = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class RegionTable:
+    """The regions of a file: columns of equal length, and how exact they are."""
+
+    columns: Columns
+    n_regions: int
+    lost: float
+    error: float
+    notes: tuple[str, ...]
+
+
+def condense_file(
+    times: Sequence[float], n_modes: int, tolerance: float, repairs: Sequence[str], path: Path
+) -> RegionTable:
+    """Average the heat of a file over regions."""
+    mesh, notes = mesh_files.load_mesh(path, drop_missing=drops_missing(repairs))
+    done = repair(mesh, repairs)
+    mesh, notes = done.mesh, (*notes, *done.report)
+    laplacian = cotangent_laplacian(mesh)
+    k = min(n_modes, mesh.n_vertices)
+    if mesh.n_vertices > LARGE:
+        found = approximate_heat_signature(laplacian, k, times)
+        heat, last, error = found.values, found.eigenvalues[-1], float(found.errors.max())
+    else:
+        spectrum = solve_spectrum(laplacian, k)
+        heat, last, error = heat_kernel_signature(spectrum, times), spectrum.eigenvalues[-1], 0.0
+    left = float(np.exp(-last * min(times)))
+    if left > CUT_OFF and k < mesh.n_vertices:
+        needed = -np.log(CUT_OFF) / last
+        notes += (
+            f"{k} modes end too early for the time {min(times):g}: that of the last one has only "
+            f"fallen to {left:.2g} by then; take times from {needed:.2g} on, or more modes",
+        )
+    regions = condense(mesh, np.log(heat), tolerance)
+    columns = {
+        "region": np.arange(len(regions.areas)),
+        **dict(zip("xyz", regions.centers.T, strict=True)),
+        "area": regions.areas,
+        "n_vertices": np.bincount(regions.labels),
+    }
+    columns |= {
+        f"log_heat_{time:g}": mean for time, mean in zip(times, regions.values.T, strict=True)
+    }
+    return RegionTable(columns, len(regions.areas), regions.lost, error, notes)
+
+
+def join_tables(shapes: Sequence[tuple[str, RegionTable]]) -> Columns:
+    """Return the tables of all shapes as one, with the name of the shape in the first column."""
+    names = np.repeat([name for name, _ in shapes], [table.n_regions for _, table in shapes])
+    first = shapes[0][1].columns
+    return {
+        "shape": names,
+        **{name: np.concatenate([table.columns[name] for _, table in shapes]) for name in first},
+    }
+
+
+def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    """Write columns as CSV, whose numbers read back exactly, or as Parquet."""
+    if path.suffix.lower() == ".parquet":
+        arrow: Any = import_extra("pyarrow", "pyarrow")
+        data = BytesIO()
+        import_extra("pyarrow.parquet", "pyarrow").write_table(arrow.table(dict(columns)), data)
+        replace_file(path, data.getvalue())
+        return
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    replace_file(path, text.getvalue().encode())
