@@ -15,6 +15,10 @@ class JobCancelledError(Exception):
     """Nobody waits for a job any more; raised inside it at its next report of progress."""
 
 
+class PreparingError(Exception):
+    """A call asks for what is still computed; it can be sent again."""
+
+
 class Job(Generic[T]):
     """One computation in a thread of its own.
 

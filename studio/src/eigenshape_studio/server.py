@@ -5,11 +5,10 @@ import secrets
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
-from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import anyio.to_thread
-import numpy as np
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
@@ -17,8 +16,10 @@ from starlette.routing import Route
 
 import eigenshape as es
 from eigenshape.plot.camera import Up, View
+from eigenshape_studio.analysis import Analysis
 from eigenshape_studio.bundle import NotBuiltError, read_static
 from eigenshape_studio.guard import App, Guard, Rules
+from eigenshape_studio.history import Shape
 from eigenshape_studio.listening import (
     listen,
     own_hosts,
@@ -26,7 +27,9 @@ from eigenshape_studio.listening import (
     run_app,
     shown_address,
 )
+from eigenshape_studio.loading import load_file
 from eigenshape_studio.memory import share_one_arena, trim_memory
+from eigenshape_studio.sessions import SessionFile, remove_old, sessions_folder
 from eigenshape_studio.workspace import Answer, Workspace, error_message
 
 FILES = {"index.html": "text/html; charset=utf-8", "studio.js": "text/javascript; charset=utf-8"}
@@ -38,26 +41,29 @@ LARGE_CALLS = ("finish", "query")  # which take and free much memory
 
 
 class Tabs:
-    """The workspaces of the tabs that are open, by the number that each tab gave itself."""
+    """The workspaces of the tabs, by the number that each tab gave itself.
 
-    def __init__(self, first: Workspace, most: int = MOST_TABS) -> None:
-        self._first, self._most = first, most
+    Those that were not used for longest leave the memory when there are too many; their files have
+    them until they are used again.
+    """
+
+    def __init__(self, first: Workspace, folder: Path, most: int = MOST_TABS) -> None:
+        self._first, self._folder, self._most = first, folder, most
         self._open: OrderedDict[str, Workspace] = OrderedDict()
         self._calls: dict[str, int] = {}
         self._lock = threading.Lock()
-
-    def __len__(self) -> int:
-        return len(self._open)
 
     def workspace(self, tab: str) -> Workspace:
         """Return the workspace of a tab; a new tab shows the first shape without edits."""
         with self._lock:
             if tab not in self._open:
-                self._open[tab] = self._first.fork()
+                file = SessionFile(self._folder / f"{tab}.sqlite")
+                self._open[tab] = self._first.fork(file)
+                remove_old(self._folder, [self._folder / f"{each}.sqlite" for each in self._open])
             self._open.move_to_end(tab)
-            while len(self._open) > self._most:
-                _, dropped = self._open.popitem(last=False)
-                dropped.close()
+            idle = [each for each in self._open if each not in self._calls and each != tab]
+            for each in idle[: max(0, len(self._open) - self._most)]:
+                self._open.pop(each).close()
             return self._open[tab]
 
     def begin(self, tab: str) -> bool:
@@ -77,7 +83,7 @@ class Tabs:
                 del self._calls[tab]
 
 
-def make_app(first: Workspace, rules: Rules) -> App:
+def make_app(first: Workspace, rules: Rules, folder: Path | None = None) -> App:
     """Return the application: the page, its bundle, and the five calls, behind the guard.
 
     Parameters
@@ -85,9 +91,11 @@ def make_app(first: Workspace, rules: Rules) -> App:
     first : Workspace
         What new tabs show.
     rules : Rules
+    folder : Path, optional
+        Where the sessions are kept; by default in the user's cache.
     """
     first.most_bytes = rules.most_bytes
-    tabs = Tabs(first)
+    tabs = Tabs(first, folder or sessions_folder())
     limiter = anyio.CapacityLimiter(N_THREADS)
 
     async def show_file(request: Request) -> Response:
@@ -199,18 +207,8 @@ def _first_workspace(
         creature = es.make_creature("quadruped", n_vertices=2500)
         return Workspace(creature, "quadruped", index=index, shared=True)
     if isinstance(mesh, str | Path):
-        path, surface = Path(mesh), es.io.read_surface(mesh).mesh
-        attributes, values = None, {}
-        with suppress(es.FileFormatError):  # points have no attributes
-            attributes = es.read_mesh(path, attributes=True, drop_missing=True)[1]
-            attributes = es.io.carry_attributes(attributes, surface)
-            # The page can choose from the functions in the file that it can draw.
-            values = {
-                title: field
-                for title, field in attributes.fields.items()
-                if field.shape == (surface.n_vertices,) and np.isfinite(field).all()
-            }
-        first = Workspace(surface, path.name, values=values, index=index, shared=True)
-        first.attributes = attributes
-        return first
+        path = Path(mesh).absolute()
+        make = partial(Analysis, shared=True)
+        shape = Shape(0, path.name, partial(load_file, path), make, str(path))
+        return Workspace([shape], index=index, shared=True)
     return Workspace(mesh, index=index, shared=True)
