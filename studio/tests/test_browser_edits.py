@@ -26,17 +26,18 @@ pytestmark = pytest.mark.long
 
 HEAD = 0.4  # height above which the quadruped is chosen: head and neck
 READY = "eigenshape.state.deformation.status === 'ready'"
+REGION = f"{PANEL}.selection.regions.vertices(0)"
 RED = [0xD8, 0x30, 0x1F]  # of faces that cross
 N_VERTICES = 1000
 SHADER = 1e-5  # single precision: the largest error that the shader may have, in lengths of about 1
 
 
-def choose_above(page, height):
+def choose_above(page, height, wait=wait_until_bound):
     """Choose what lies above a height, by the numbers of the box; return the vertices."""
     find(page, "tool-box").click()
     find(page, "box-low-1").fill(str(height))
     find(page, "box-low-1").press("Enter")
-    wait_until_bound(page)
+    wait(page)
     return region(page)
 
 
@@ -124,9 +125,10 @@ def test_undo_takes_back_what_the_hand_did_last(page, mesh, tmp_path):
     find(page, "clear").click()
     assert len(region(page)) == 0
     page.keyboard.press("Control+z")
+    wait_until(page, f"{REGION}.length === {len(again)}")
     np.testing.assert_array_equal(region(page), again)
     page.keyboard.press("Control+y")
-    assert len(region(page)) == 0
+    wait_until(page, f"{REGION}.length === 0")
     assert page.evaluate("eigenshape.state.deformation.n_edits") == 1
 
 

@@ -1,7 +1,16 @@
 """Nothing is lost: what a tab holds is found again in its file, and every step is undone exactly."""
 
 import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from itertools import count
+from urllib.parse import urlsplit
 
+import httpx
 import numpy as np
 import pytest
 from conftest import stretched_ball
@@ -13,6 +22,7 @@ from eigenshape_studio.history import N_IN_MEMORY, History, Shape
 from eigenshape_studio.loading import Loaded
 from eigenshape_studio.server import Tabs
 from eigenshape_studio.sessions import SessionFile, remove_old
+from eigenshape_studio.wire import decode, encode
 from eigenshape_studio.workspace import Workspace
 
 TAB = "a-tab-of-the-tests"
@@ -58,7 +68,9 @@ def test_a_thousand_actions_are_undone_to_the_first_state_and_done_again(first, 
         seen.append((history.mesh(history.now.pose).vertices, history.owners(history.now)))
         history.save()
     file.close()
-    again = History([shape.fork() for shape in first.history.shapes.values()], SessionFile(file.path))
+    again = History(
+        [shape.fork() for shape in first.history.shapes.values()], SessionFile(file.path)
+    )
     for each in (history, again):
         in_memory = {moment.pose for moment in each.moments if moment.pose.mesh is not None}
         assert len(in_memory) <= N_IN_MEMORY
@@ -202,3 +214,130 @@ def test_regions_of_another_shape_are_refused(first):
     assert "one region for each of the 162 vertices" in error["message"]
     assert "must have an array 'regions'" in page.error("finish", call)["message"]
     assert "undone edit to redo" in page.error("finish", kind="redo")["message"]
+
+
+# Starts a studio for each line it reads. A child has all that the parent has imported and compiled, so
+# it is there within a tenth of a second.
+SERVERS = """
+import os, signal, sys
+from pathlib import Path
+from eigenshape_studio.analysis import warm_up
+from eigenshape_studio.server import serve
+
+warm_up()
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+port, mesh, sessions = 0, sys.argv[1], Path(sys.argv[2])
+for line in sys.stdin:
+    if os.fork() == 0:
+        announce = lambda url: print(os.getpid(), url, flush=True)
+        serve(mesh, port=int(line), sessions=sessions, browse=False, announce=announce)
+        os._exit(0)
+"""
+
+
+class Dying:
+    """A studio that is killed again and again, and a page that sends its calls until each is answered."""
+
+    def __init__(self, mesh, sessions):
+        command = [sys.executable, "-c", SERVERS, str(mesh), str(sessions)]
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self.parent = subprocess.Popen(command, text=True, **pipes)
+        self.port, self.client = 0, httpx.Client()
+        self.start()
+
+    def start(self):
+        print(self.port, file=self.parent.stdin, flush=True)
+        number, url = self.parent.stdout.readline().split()
+        self.child, parts = int(number), urlsplit(url)
+        self.port = parts.port
+        self.token = parts.query.removeprefix("token=")
+        self.client.close()
+        self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=60)
+
+    def kill(self):
+        with suppress(ProcessLookupError):  # it has just been killed
+            os.kill(self.child, signal.SIGKILL)
+
+    def call(self, name, meta, arrays=None):
+        body = encode(meta, arrays)
+        for _ in range(1000):
+            headers = {
+                "content-type": "application/octet-stream",
+                "x-eigenshape-tab": TAB,
+                "authorization": f"Bearer {self.token}",
+            }
+            try:
+                answer = self.client.post(f"/api/{name}", headers=headers, content=body)
+            except httpx.TransportError:  # it was killed
+                self.start()
+                continue
+            if answer.status_code != 503:
+                facts, found = decode(answer.content)
+                assert answer.status_code == 200, facts
+                return facts, found
+            time.sleep(0.01)
+        raise AssertionError("The studio does not become ready.")
+
+    def close(self):
+        self.kill()
+        self.client.close()
+        self.parent.communicate(timeout=20)
+
+
+def script(top):
+    """Return calls as a hand makes them: strokes, bends, undone and redone, other shapes."""
+    ball = {"file": file_of(es.icosphere(1))}
+    commit = {"kind": "commit", "mode": "graded"}
+    calls = []
+    for number in range(4):
+        chosen = {"regions": owners(*top, *range(number))}
+        calls.append(({"kind": "select", "text": f"Stroke {number}"}, chosen))
+        calls.append(({**commit, "handles": [TURN if number % 2 else PULL]}, None))
+    calls += [({"kind": "undo"}, None), ({"kind": "undo"}, None), ({"kind": "redo"}, None)]
+    calls += [({"kind": "open", "name": "b.ply"}, ball), ({"kind": "choose", "shape": 0}, None)]
+    calls += [({"kind": "reset"}, None), ({"kind": "undo"}, None)]
+    calls.append(({"kind": "select", "text": "Clear"}, {"regions": owners()}))
+    return calls
+
+
+def states(call, n_places):
+    """Return vertices and regions of every state of a session, from the last to the first."""
+    found = []
+    for place in reversed(range(n_places)):
+        state = call("finish", {"kind": "go", "place": place})[0]["state"]
+        arrays = [
+            call("array", {"name": name})[1][name].tobytes() for name in ("vertices", "regions")
+        ]
+        found.append((state["name"], state["history"], *arrays))
+    return found
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the studio is started by fork")
+def test_no_edit_is_lost_by_a_server_that_is_killed(first, top, tmp_path, in_turn):
+    """Each of 50 kills comes at another moment of a session: of a call, of its answer, between."""
+    es.write_mesh(first.mesh, tmp_path / "ball.ply")
+    calls = script(top)
+    steady = Page(Workspace(es.read_mesh(tmp_path / "ball.ply"), "ball.ply").fork())
+    assert steady.workspace.analysis.rig.wait(60)
+    for meta, arrays in calls:
+        steady.call("finish", meta, arrays)
+    n_places = len(steady.call("meta")[0]["history"]) + 1
+    wanted = states(steady.call, n_places)
+
+    moments = np.random.default_rng(41).permutation(50)
+    dying, numbers = Dying(tmp_path / "ball.ply", tmp_path / "sessions"), count()
+    try:
+        for turn in in_turn(range(50)):
+            moment = moments[turn]
+            for place, (meta, arrays) in enumerate(calls):
+                if place == moment % len(calls):
+                    timer = threading.Timer(0.02 * (moment // len(calls)) ** 2, dying.kill)
+                    timer.start()
+                dying.call("finish", {**meta, "id": f"change {next(numbers)}"}, arrays)
+            timer.join()
+            assert states(dying.call, n_places) == wanted
+            (tmp_path / "sessions" / f"{TAB}.sqlite").unlink()
+            dying.kill()
+    finally:
+        dying.close()

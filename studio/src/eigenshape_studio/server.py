@@ -152,6 +152,7 @@ def serve(  # noqa: PLR0913  one for each option of the command
     allow_remote: bool = False,
     announce: Callable[[str], None] = print,
     browse: bool = True,
+    sessions: Path | None = None,
 ) -> None:
     """Open the studio in the browser, and serve it until Ctrl-C.
 
@@ -176,6 +177,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
         Called with the address, when the server listens there.
     browse : bool
         Whether to open the address in a browser.
+    sessions : Path, optional
+        The folder in which the work of each tab is kept; by default one in the user's cache.
 
     Raises
     ------
@@ -195,7 +198,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
     hosts = own_hosts(host, port, allow_remote=allow_remote)
     rules = Rules(token, hosts, port, any_address=allow_remote)
     url = f"{shown_address(host, port)}/?token={token}"
-    run_app(make_app(first, rules), listening, lambda: announce(url), url if browse else None)
+    app = make_app(first, rules, sessions)
+    run_app(app, listening, lambda: announce(url), url if browse else None)
     first.close()
 
 

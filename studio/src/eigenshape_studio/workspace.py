@@ -208,6 +208,7 @@ class Workspace:
             "shapes": [[shape.number, shape.name] for shape in history.shapes.values()],
             "history": [moment.text for moment in history.moments[1:]],
             "place": history.place,
+            "digest": now.shape.digest,
             "selected": now.selected,
             "pose": now.pose.number,
             "shape": now.shape.number,

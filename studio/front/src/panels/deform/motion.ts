@@ -121,7 +121,8 @@ export class Motion {
   }
 
   private change(kind: "preview" | "commit"): Change {
-    return { kind, handles: this.rowHandles(), mode: this.form.get("mode").value };
+    const n_modes = this.form.number("n-modes") || null;
+    return { kind, handles: this.rowHandles(), mode: this.form.get("mode").value, n_modes };
   }
 
   /** Show a motion by shares at once, and the exact result when the pointer rests. */
