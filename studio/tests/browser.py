@@ -40,7 +40,7 @@ from eigenshape_studio.server import serve
 
 mesh, index, view, up, port, sessions = sys.argv[1:]
 serve(
-    mesh, index=index or None, view=view, up=up, port=int(port), sessions=Path(sessions),
+    [mesh], index=index or None, view=view, up=up, port=int(port), sessions=Path(sessions),
     announce=lambda url: print(url, flush=True), browse=False,
 )
 """

@@ -33,7 +33,7 @@ from eigenshape_studio import listening, server
 listening.HEADER_SECONDS = 1.0
 server.Rules = partial(server.Rules, most_bytes=1 << 20, pause=0.5, deadline=2.0)
 sessions = Path(sys.argv[1]).parent
-server.serve(sys.argv[1], browse=False, announce=partial(print, flush=True), sessions=sessions)
+server.serve([sys.argv[1]], browse=False, announce=partial(print, flush=True), sessions=sessions)
 """
 TAB = "a-tab-of-the-tests"
 

@@ -230,7 +230,7 @@ port, mesh, sessions = 0, sys.argv[1], Path(sys.argv[2])
 for line in sys.stdin:
     if os.fork() == 0:
         announce = lambda url: print(os.getpid(), url, flush=True)
-        serve(mesh, port=int(line), sessions=sessions, browse=False, announce=announce)
+        serve([mesh], port=int(line), sessions=sessions, browse=False, announce=announce)
         os._exit(0)
 """
 

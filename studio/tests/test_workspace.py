@@ -11,7 +11,7 @@ from conftest import stretched_ball
 import eigenshape as es
 from eigenshape_studio.history import Shape
 from eigenshape_studio.loading import Loaded
-from eigenshape_studio.server import _first_workspace
+from eigenshape_studio.opening import open_workspace
 from eigenshape_studio.wire import decode, encode
 from eigenshape_studio.workspace import Workspace
 
@@ -206,7 +206,8 @@ def test_edits_are_saved_and_replayed_on_another_resolution(page, top):
 
     fine = Page(Workspace(stretched_ball(4)))
     assert fine.workspace.analysis.rig.wait(300)
-    assert "original mesh" in fine.error("finish", kind="replay", edits=edits)["message"]
+    error = fine.error("finish", kind="replay", edits=edits)
+    assert "choose its file together with the edits" in error["message"]
     arrays = {"source": file_of(stretched_ball())}
     found = fine.call("finish", {"kind": "replay", "edits": edits, "source": "ball.ply"}, arrays)
     assert found[0]["state"]["deformation"]["n_edits"] == 1
@@ -514,6 +515,6 @@ def test_functions_of_the_file_are_there_to_choose_from(tmp_path, suffix):
         "move": ball.vertices,
     }
     es.io.write_fields(ball, tmp_path / f"a{suffix}", fields)
-    workspace = _first_workspace(tmp_path / f"a{suffix}", None)
+    workspace = open_workspace([tmp_path / f"a{suffix}"])
     assert [facts["name"] for facts in workspace.state()["values"]] == ["height (mm)"]
     workspace.close()

@@ -14,7 +14,7 @@ from eigenshape.cli.inputs import memory_bytes
 
 
 def studio(
-    mesh: Path | None = None,
+    shapes: Annotated[list[Path] | None, typer.Argument()] = None,
     *,
     index: Path | None = None,
     view: str = "auto",
@@ -32,8 +32,9 @@ def studio(
 
     Parameters
     ----------
-    mesh
-        Mesh file to open. By default a synthetic creature.
+    shapes
+        Files, folders of files, or an index. The first shape is shown, and the others stand in a
+        list. By default a synthetic creature.
     index
         Folder of an index to search in.
     port
@@ -48,7 +49,7 @@ def studio(
     server = import_extra("eigenshape_studio.server", "eigenshape-studio")
 
     server.serve(
-        mesh,
+        shapes or (),
         index=index,
         **side,
         host=host,

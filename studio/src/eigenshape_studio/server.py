@@ -4,8 +4,7 @@ import re
 import secrets
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import anyio.to_thread
@@ -16,10 +15,8 @@ from starlette.routing import Route
 
 import eigenshape as es
 from eigenshape.plot.camera import Up, View
-from eigenshape_studio.analysis import Analysis
 from eigenshape_studio.bundle import NotBuiltError, read_static
 from eigenshape_studio.guard import App, Guard, Rules
-from eigenshape_studio.history import Shape
 from eigenshape_studio.listening import (
     listen,
     own_hosts,
@@ -27,8 +24,8 @@ from eigenshape_studio.listening import (
     run_app,
     shown_address,
 )
-from eigenshape_studio.loading import load_file
 from eigenshape_studio.memory import share_one_arena, trim_memory
+from eigenshape_studio.opening import open_workspace
 from eigenshape_studio.sessions import SessionFile, remove_old, sessions_folder
 from eigenshape_studio.workspace import Answer, Workspace, error_message
 
@@ -142,7 +139,7 @@ def _respond(answer: Answer) -> Response:
 
 
 def serve(  # noqa: PLR0913  one for each option of the command
-    mesh: str | Path | es.types.MeshLike | None = None,
+    shapes: es.types.MeshLike | Sequence[str | Path] = (),
     *,
     index: str | Path | None = None,
     view: View = "auto",
@@ -158,8 +155,9 @@ def serve(  # noqa: PLR0913  one for each option of the command
 
     Parameters
     ----------
-    mesh : path or MeshLike, optional
-        The shape to show; by default a creature that the library makes.
+    shapes : MeshLike or sequence of paths
+        The shape to show, or files, folders and indexes of shapes to choose from; see
+        `open_workspace`.
     index : path, optional
         Folder of an index to search in.
     view : str or (3,) float
@@ -190,7 +188,7 @@ def serve(  # noqa: PLR0913  one for each option of the command
     """
     require_permission(host, "studio", allow_remote=allow_remote)
     share_one_arena()
-    first = _first_workspace(mesh, index)
+    first = open_workspace(shapes, index)
     first.analysis.look_from(view, up)
     listening = listen(host, port)
     port = listening.getsockname()[1]
@@ -201,18 +199,3 @@ def serve(  # noqa: PLR0913  one for each option of the command
     app = make_app(first, rules, sessions)
     run_app(app, listening, lambda: announce(url), url if browse else None)
     first.close()
-
-
-def _first_workspace(
-    mesh: str | Path | es.types.MeshLike | None, index: str | Path | None
-) -> Workspace:
-    """Return what new tabs show; their analysis is shared."""
-    if mesh is None:
-        creature = es.make_creature("quadruped", n_vertices=2500)
-        return Workspace(creature, "quadruped", index=index, shared=True)
-    if isinstance(mesh, str | Path):
-        path = Path(mesh).absolute()
-        make = partial(Analysis, shared=True)
-        shape = Shape(0, path.name, partial(load_file, path), make, str(path))
-        return Workspace([shape], index=index, shared=True)
-    return Workspace(mesh, index=index, shared=True)

@@ -18,7 +18,7 @@ from eigenshape.deformation.rig import pose_rig
 from eigenshape_studio.analysis import N_MODES, Analysis, cut_rows, diagram_rows, vertex_labels
 from eigenshape_studio.calls import Arrays, Reply, RequestError, file_bytes, whole
 from eigenshape_studio.history import History, Pose, Shape
-from eigenshape_studio.jobs import NO_JOB, PreparingError
+from eigenshape_studio.jobs import NO_JOB, PreparingError, window_message
 from eigenshape_studio.loading import Field, Loaded, check_fields
 from eigenshape_studio.parse import display_name, parse_surface
 from eigenshape_studio.poses import carry_pose
@@ -166,7 +166,7 @@ class Workspace:
             meta, arrays = decode(message)
             return Answer(encode(*self._dispatch(call, meta, arrays)), 200)
         except (es.EigenshapeError, WireError, RequestError, OSError) as error:
-            return Answer(error_message(type(error).__name__, str(error)), 400)
+            return Answer(error_message(type(error).__name__, window_message(error)), 400)
         except PreparingError as error:
             return Answer(error_message("PreparingError", str(error)), 503)
         except MemoryError:
@@ -505,7 +505,9 @@ class Workspace:
         if self.bound is None:
             self.bound = self._chosen(meta)
         if self.bound is None:
-            raise RequestError("A region must be bound before it moves; none is. Call rig first.")
+            raise RequestError(
+                "A region must be bound before it moves; none is. Choose a region first."
+            )
         if not isinstance(entries, list) or len(entries) != len(self.bound.regions):
             raise RequestError(
                 f"There must be one handle for each of the {len(self.bound.regions)} regions."
@@ -577,7 +579,13 @@ class Workspace:
         with TemporaryDirectory() as folder:
             path = Path(folder, "edits.json")
             path.write_text(json.dumps(meta.get("edits")))
-            edits = es.io.read_edits(path, source or self.analysis.mesh)
+            try:
+                edits = es.io.read_edits(path, source or self.analysis.mesh)
+            except es.InvalidParameterError as error:
+                raise RequestError(
+                    "These edits were made on another mesh than that of this shape. To carry them "
+                    "over, choose its file together with the edits."
+                ) from error
         session = es.deformation.replay(rig, edits, source=source)
         self.history.replace_edits(session.edits, session.mesh, "Load edits")
 

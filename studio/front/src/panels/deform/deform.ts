@@ -120,8 +120,9 @@ export class DeformPanel implements Panel {
   private showTools(): void {
     const { active, form, tool } = this;
     form.press("tool", tool);
-    form.text("hint", form.get(`tool-${tool}`).dataset.hint!);
     const selects = SELECTORS.includes(tool);
+    const missing = selects ? null : this.motion.missing;
+    form.text("hint", missing ?? form.get(`tool-${tool}`).dataset.hint!);
     if (!active) this.app.viewer.setPointer();
     this.motion.show(selects ? null : (tool as MotionKind), active);
     this.selection.show(selects ? (tool as Selector) : null, active);

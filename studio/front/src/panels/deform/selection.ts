@@ -14,6 +14,8 @@ const CROSSING = "#d8301f";
 const TINT = 190; // of 255: how strongly a region covers the colors below
 const AXES = [0, 1, 2];
 
+const NOTHING = { status: "none", progress: 0, message: "" } as const; // that is awaited
+
 export type Selector = "box" | "brush" | "part";
 
 export interface SelectionEvents {
@@ -32,6 +34,7 @@ export class Selection {
   private known = 0; // the number by which the server knows the regions
   private sending = 0; // selections of which the server has not heard yet
   private labels: Int32Array | null = null; // part of each vertex
+  private awaited: [Hit, PointerEvent] | null = null; // a click before the parts were found
   private painting: Promise<void> = Promise.resolve(); // discs of the brush, one after the other
 
   constructor(
@@ -69,7 +72,7 @@ export class Selection {
   /** Begin with a new shape, without regions. */
   startShape({ n_vertices, up }: State): void {
     this.regions = new Regions(n_vertices);
-    this.labels = null;
+    this.labels = this.awaited = null;
     this.known = 0;
     this.region = this.app.settings.get("region", 0);
     this.form.press("region", String(this.region));
@@ -96,8 +99,15 @@ export class Selection {
 
   /** Show the parts if they were awaited, and are ready now. */
   showFoundParts(): void {
-    const ready = this.app.state.parts.status === "ready";
-    if (this.tool === "part" && !this.labels && ready) this.loadParts();
+    this.showFinding();
+    const { status } = this.app.state.parts;
+    if (this.tool === "part" && !this.labels && (status === "ready" || status === "none"))
+      this.loadParts();
+  }
+
+  /** Show how far the parts are, if they are awaited. */
+  private showFinding(): void {
+    this.form.progress("finding", this.tool === "part" ? this.app.state.parts : NOTHING);
   }
 
   chooseRegion(region: number): void {
@@ -123,6 +133,7 @@ export class Selection {
     form.get("radius").hidden = tool !== "brush";
     form.get("parts-slider").hidden = tool !== "part" || !labels;
     this.showRadius();
+    this.showFinding();
     this.ring.hidden = true;
     this.box.show(this.tool === "box");
     if (this.tool === "box") viewer.setPointer("grab", null, this.box);
@@ -260,13 +271,18 @@ export class Selection {
     if (this.tool !== "part") return;
     this.form.get("parts-slider").hidden = false;
     viewer.setLabels(this.labels, partColors(levels.length));
+    if (this.awaited) this.pickPart(...this.awaited);
+    this.awaited = null;
   }
 
-  private pickPart({ vertex }: Hit, { shiftKey }: PointerEvent): void {
-    if (!this.labels) return this.app.say("The parts are still being found …");
-    const part = this.labels[vertex];
+  private pickPart(hit: Hit, event: PointerEvent): void {
+    if (!this.labels) {
+      this.awaited = [hit, event];
+      return this.app.say("The parts are being found; then the part that you clicked is chosen.");
+    }
+    const part = this.labels[hit.vertex];
     const vertices = [...this.labels.keys()].filter((each) => this.labels![each] === part);
-    if (shiftKey) this.regions.remove(this.region, vertices);
+    if (event.shiftKey) this.regions.remove(this.region, vertices);
     else this.regions.add(this.region, vertices);
     this.selected("Part");
   }
