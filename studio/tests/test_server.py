@@ -413,7 +413,7 @@ def test_many_good_calls_leave_the_server_well(server):
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.0.2.7", "::", "example.org"])
 def test_another_address_takes_permission(host):
     with pytest.raises(es.InvalidParameterError, match="--allow-remote"):
-        serve(es.icosphere(1), host=host, browse=False)
+        serve(host=host, browse=False)
 
 
 def test_the_command_prints_the_address(tmp_path):

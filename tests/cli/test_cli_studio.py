@@ -40,7 +40,7 @@ def test_studio_passes_its_options_on_and_prints_the_address(monkeypatch):
     local = {"host": "127.0.0.1", "port": 5, "allow_remote": False, "browse": False}
     local |= {"view": [1.0, 0.0, 2.0], "up": "-z"}
     assert calls[0] == ([Path("a.ply"), Path("b.ply")], {"index": Path("shelf"), **local})
-    remote = {"host": "0.0.0.0", "port": 0, "allow_remote": True, "browse": True}
+    remote = {"host": "0.0.0.0", "port": None, "allow_remote": True, "browse": True}
     remote |= {"view": "auto", "up": "auto"}
     assert calls[1] == ((), {"index": None, **remote})
 

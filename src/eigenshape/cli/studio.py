@@ -20,7 +20,7 @@ def studio(
     view: str = "auto",
     up: str = "auto",
     host: str = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535)] = 0,
+    port: Annotated[int | None, typer.Option(min=0, max=65535)] = None,
     browser: bool = True,
     allow_remote: bool = False,
 ) -> None:
@@ -38,7 +38,8 @@ def studio(
     index
         Folder of an index to search in.
     port
-        Port to listen on; 0 takes any that is free.
+        Port to listen on; 0 takes any that is free. By default 8642 if it is free, so that open
+        pages go on when the studio is started again.
     browser
         Open the address in a browser.
     allow_remote

@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,8 @@ class Shape:
         Returns the analysis of a mesh with a name, which begins to compute.
     path : str, optional
         The file that the command was given.
+    shared : bool
+        Whether what is computed is shared by several tabs.
     """
 
     def __init__(
@@ -42,15 +45,17 @@ class Shape:
         number: int,
         name: str,
         load: Callable[[], Loaded],
-        make: Callable[[es.TriangleMesh, str], Analysis] = Analysis,
+        make: Callable[..., Analysis] = Analysis,
         path: str | None = None,
+        *,
+        shared: bool = False,
     ) -> None:
         self.number, self.name, self.path = number, name, path
         self.attributes: es.io.MeshAttributes | None = None
         self.fields: dict[str, Field] = {}
         self.rest = Pose(0, self)
         self.stored = False  # whether the file of the tab has it
-        self._load, self._make = load, make
+        self._load, self._make = load, partial(make, shared=True) if shared else make
         self._analysis: Analysis | None = None
         self._digest = ""
         self._lock = threading.Lock()
@@ -183,7 +188,7 @@ class History:
     def did(self, text: str, *, pose: Pose | None = None, regions: bytes | None = None) -> None:
         """Note a new state; those that were undone before it are forgotten."""
         now, number = self.now, self.moments[-1].number + 1
-        changed: dict[str, object] = {"number": number, "text": text}
+        changed: dict[str, Any] = {"number": number, "text": text}
         if pose is not None:
             changed |= {"pose": pose, "shape": pose.shape}
             if pose.shape is not now.shape:
@@ -256,7 +261,8 @@ class History:
         n_vertices = self.now.shape.analysis.mesh.n_vertices
         if owners.dtype != np.uint8 or owners.shape != (n_vertices,):
             raise RequestError(f"There must be one region for each of the {n_vertices} vertices.")
-        if not np.array_equal(owners, self.owners(self.now)):
+        before = self.owners(self.now)
+        if before is None or not np.array_equal(owners, before):
             self.did(text, regions=zlib.compress(owners.tobytes(), 1))
 
     def owners(self, moment: Moment) -> np.ndarray | None:
@@ -303,8 +309,10 @@ class History:
             [_moment_row(moment) for moment in new],
             (self.moments[0].number, self.moments[-1].number),
         )
-        for kept in (*shapes, *poses):
-            kept.stored = True
+        for shape in shapes:
+            shape.stored = True
+        for pose in poses:
+            pose.stored = True
         self._n_written = len(self.moments)
         # Of the poses in the file, those near the present one stay in memory, too.
         near = {moment.pose for moment in self.moments[-N_IN_MEMORY:]} | {self.now.pose}
@@ -317,7 +325,7 @@ class History:
         tables = file.read()
         if tables is None:
             return False
-        facts = dict(tables["fact"])
+        facts: dict[str, str] = dict(tables["fact"])
         self.last, self._n_poses = facts["last"], int(facts["n_poses"])
         for number, name, path, digest in tables["shape"]:
             # What the server shows to all tabs is analyzed once.

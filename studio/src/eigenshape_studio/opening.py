@@ -1,11 +1,10 @@
 """What the studio shows at first: files, the files of a folder, the shapes of an index, or a creature."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 import eigenshape as es
-from eigenshape_studio.analysis import Analysis
 from eigenshape_studio.history import Shape
 from eigenshape_studio.loading import load_file
 from eigenshape_studio.workspace import Workspace
@@ -13,14 +12,12 @@ from eigenshape_studio.workspace import Workspace
 MOST_LISTED = 500  # shapes that stand in the list of the page
 
 
-def open_workspace(
-    shapes: es.types.MeshLike | Sequence[str | Path] = (), index: str | Path | None = None
-) -> Workspace:
+def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = None) -> Workspace:
     """Return what new tabs show; what is computed of its first shape is shared.
 
     Parameters
     ----------
-    shapes : MeshLike or sequence of paths
+    paths : sequence of paths
         Files, folders of files, or the folder of an index. The first shape is shown, and the others
         can be chosen from a list. Without any, that is a creature which the library makes.
     index : path, optional
@@ -33,16 +30,13 @@ def open_workspace(
     InvalidParameterError
         If a folder has no shape.
     """
-    if not isinstance(shapes, Sequence) or not all(isinstance(one, str | Path) for one in shapes):
-        return Workspace(shapes, index=index, shared=True)
-    folders = [Path(one) for one in shapes if Path(one).is_dir()]
-    opened = {folder: found for folder in folders if (found := _index_in(folder)) is not None}
-    index = index or next(iter(opened), None)
-    found = []
-    for one in shapes:
+    found: list[tuple[str, Path]] = []
+    for one in paths:
         path = Path(one).absolute()
-        if Path(one) in opened:
-            found += list(_files_of(opened[Path(one)]))
+        held = _index_in(path) if path.is_dir() else None
+        if held is not None:
+            index = index or path
+            found += _files_of(held)
         elif path.is_dir():
             found += [(item.name, item.path.absolute()) for item in es.io.find_items(path)]
         else:
@@ -51,12 +45,9 @@ def open_workspace(
         creature = es.make_creature("quadruped", n_vertices=2500)
         return Workspace(creature, "quadruped", index=index, shared=True)
     # All tabs share what is computed of the first one; of the others each tab has its own.
-    makers = [partial(Analysis, shared=True)] + [Analysis] * len(found)
     listed = [
-        Shape(number, name, partial(load_file, path), make, str(path))
-        for number, ((name, path), make) in enumerate(
-            zip(found[:MOST_LISTED], makers, strict=False)
-        )
+        Shape(number, name, partial(load_file, path), path=str(path), shared=number == 0)
+        for number, (name, path) in enumerate(found[:MOST_LISTED])
     ]
     return Workspace(listed, index=index, shared=True)
 
@@ -69,8 +60,7 @@ def _index_in(folder: Path) -> es.ShapeIndex | None:
         return None
 
 
-def _files_of(index: es.ShapeIndex) -> Iterator[tuple[str, Path]]:
-    """Find the files of the shapes of an index that are still there."""
-    for record in index.records():
-        if record.source is not None and Path(record.source).exists():
-            yield record.name, Path(record.source)
+def _files_of(index: es.ShapeIndex) -> list[tuple[str, Path]]:
+    """Return names and files of the shapes of an index whose files are still there."""
+    named = [(record.name, record.source) for record in index.records()]
+    return [(name, Path(source)) for name, source in named if source and Path(source).exists()]

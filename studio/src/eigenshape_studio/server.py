@@ -2,9 +2,11 @@
 
 import re
 import secrets
+import socket
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import anyio.to_thread
@@ -13,7 +15,6 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 
-import eigenshape as es
 from eigenshape.plot.camera import Up, View
 from eigenshape_studio.bundle import NotBuiltError, read_static
 from eigenshape_studio.guard import App, Guard, Rules
@@ -33,6 +34,7 @@ FILES = {"index.html": "text/html; charset=utf-8", "studio.js": "text/javascript
 TAB = re.compile(r"[A-Za-z0-9_-]{8,64}")
 MOST_TABS = 8  # of 25,000 vertices, a tab with a spectrum of its own takes about 200 MB
 MOST_CALLS = 8  # of one tab at the same time; the panels together send fewer
+PORT = 8642  # unless another one is requested
 N_THREADS = 32  # for calls; MOST_CALLS of them for one tab leave enough for the others
 LARGE_CALLS = ("finish", "query")  # which take and free much memory
 
@@ -139,13 +141,13 @@ def _respond(answer: Answer) -> Response:
 
 
 def serve(  # noqa: PLR0913  one for each option of the command
-    shapes: es.types.MeshLike | Sequence[str | Path] = (),
+    paths: Sequence[str | Path] = (),
     *,
     index: str | Path | None = None,
     view: View = "auto",
     up: Up = "auto",
     host: str = "127.0.0.1",
-    port: int = 0,
+    port: int | None = 0,
     allow_remote: bool = False,
     announce: Callable[[str], None] = print,
     browse: bool = True,
@@ -155,9 +157,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
 
     Parameters
     ----------
-    shapes : MeshLike or sequence of paths
-        The shape to show, or files, folders and indexes of shapes to choose from; see
-        `open_workspace`.
+    paths : sequence of paths
+        Files, folders and indexes of shapes to choose from; see `open_workspace`.
     index : path, optional
         Folder of an index to search in.
     view : str or (3,) float
@@ -166,8 +167,9 @@ def serve(  # noqa: PLR0913  one for each option of the command
         The upward direction, as in `es.plot.aim_camera`.
     host : str
         Address to listen on.
-    port : int
-        0 for any that is free.
+    port : int, optional
+        0 for any that is free; None for 8642 if it is free, so that pages which are open find the
+        studio when it is started again.
     allow_remote : bool
         Whether the address may be another one than this machine's own. Whoever has the printed
         address then controls the studio, and can read what is sent, because HTTP is not encrypted.
@@ -188,9 +190,9 @@ def serve(  # noqa: PLR0913  one for each option of the command
     """
     require_permission(host, "studio", allow_remote=allow_remote)
     share_one_arena()
-    first = open_workspace(shapes, index)
+    first = open_workspace(paths, index)
     first.analysis.look_from(view, up)
-    listening = listen(host, port)
+    listening = _listen(host, port)
     port = listening.getsockname()[1]
     token = secrets.token_urlsafe(32)
     hosts = own_hosts(host, port, allow_remote=allow_remote)
@@ -199,3 +201,11 @@ def serve(  # noqa: PLR0913  one for each option of the command
     app = make_app(first, rules, sessions)
     run_app(app, listening, lambda: announce(url), url if browse else None)
     first.close()
+
+
+def _listen(host: str, port: int | None) -> socket.socket:
+    """Return a socket on a port; on any that is free if none is requested and the usual is taken."""
+    if port is None:
+        with suppress(OSError):
+            return listen(host, PORT)
+    return listen(host, port or 0)

@@ -3,7 +3,7 @@
 import json
 import threading
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -70,7 +70,7 @@ class Workspace:
 
     Parameters
     ----------
-    mesh : MeshLike or sequence of Shape
+    mesh : MeshLike or list of Shape
         The shape, or the shapes to choose from, of which the first one is shown.
     name : str
     values : {title: (n,) array}, optional
@@ -85,7 +85,7 @@ class Workspace:
 
     def __init__(
         self,
-        mesh: es.types.MeshLike | Sequence[Shape],
+        mesh: es.types.MeshLike | list[Shape],
         name: str = "shape",
         *,
         values: Mapping[str, Any] | None = None,
@@ -93,12 +93,13 @@ class Workspace:
         n_modes: int = N_MODES,
         shared: bool = False,
     ) -> None:
-        if not isinstance(mesh, Sequence) or not isinstance(mesh[0], Shape):
+        shapes = mesh if isinstance(mesh, list) else []
+        if not isinstance(mesh, list):
             surface = es.as_mesh(mesh)
             loaded = Loaded(surface, fields=check_fields(values or {}, surface.n_vertices))
             make = partial(Analysis, n_modes=n_modes, shared=shared)
-            mesh = [Shape(0, display_name(name), lambda: loaded, make)]
-        self.history = History(mesh)
+            shapes = [Shape(0, display_name(name), lambda: loaded, make)]
+        self.history = History(shapes)
         self.analysis  # noqa: B018  it begins before a page asks
         self.shelf = None if index is None else Shelf(index)
         self.bound: Bound | None = None
