@@ -21,6 +21,7 @@ pytestmark = pytest.mark.long
 
 N_VERTICES = 500
 HEAD = 0.4
+DONE = "eigenshape.state.history"
 STATUS = "eigenshape.main.querySelector('[data-test=status]').textContent"
 
 
@@ -45,7 +46,8 @@ def test_work_goes_on_after_the_server_was_killed(browser, path, tmp_path):
                 page.reload()
                 wait_until(page, "window.eigenshape?.viewer.vertices.length > 0")
                 np.testing.assert_array_equal(positions(page), bent)
-                assert page.evaluate("eigenshape.state.history.length") == 3
+                done = ["Box: region 1", "Box: region 1", "Bend", "Clear: region 1"]
+                assert page.evaluate(DONE) == done
                 wait_until(page, READY)
                 page.keyboard.press("Control+z")
                 wait_until(page, f"{REGION}.length > 0")
@@ -83,9 +85,11 @@ def test_two_browsers_with_two_shapes_do_not_meet(browser, url, path, tmp_path):
         first, second = choose_above(one, HEAD), choose_above(two, 0.5)
         turn(one, 30)
         turn(two, 60)
+        done = [page.evaluate(DONE) for page in (one, two)]
+        assert [len(each) for each in done] == [3, 4]  # choosing the box is a box, too
         for page, chosen in ((one, first), (two, second)):
             page.reload()
             wait_until(page, f"window.eigenshape?.viewer.vertices.length > 0 && {READY}")
             wait_until(page, f"{REGION}.length > 0")
             np.testing.assert_array_equal(region(page), chosen)
-            assert page.evaluate("eigenshape.state.history.length") == 2
+        assert [page.evaluate(DONE) for page in (one, two)] == done
