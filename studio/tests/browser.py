@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
@@ -34,12 +35,13 @@ FLAGS = (
 )
 SERVE = """
 import sys
+from pathlib import Path
 from eigenshape_studio.server import serve
 
-mesh, index, view, up = sys.argv[1:]
+mesh, index, view, up, port, sessions = sys.argv[1:]
 serve(
-    mesh, index=index or None, view=view, up=up, announce=lambda url: print(url, flush=True),
-    browse=False,
+    [mesh], index=index or None, view=view, up=up, port=int(port), sessions=Path(sessions),
+    announce=lambda url: print(url, flush=True), browse=False,
 )
 """
 # The panel in which shapes are bent, in the code of the page.
@@ -72,12 +74,19 @@ def build_page() -> None:
 
 @contextmanager
 def start_server(
-    mesh: Path, index: Path | None = None, view: str = "auto", up: str = "auto"
+    mesh: Path,
+    index: Path | None = None,
+    view: str = "auto",
+    up: str = "auto",
+    port: int = 0,
+    sessions: Path | None = None,
 ) -> Iterator[tuple[str, int]]:
     """Serve the studio in a process of its own; yield its address and the number of the process."""
     build_page()
-    command = [sys.executable, "-c", SERVE, str(mesh), str(index or ""), view, up]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    folder = tempfile.TemporaryDirectory()
+    options = [str(index or ""), view, up, str(port), str(sessions or folder.name)]
+    command = [sys.executable, "-c", SERVE, str(mesh), *options]
+    with folder, subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             yield str(process.stdout.readline().strip()), process.pid  # type: ignore[union-attr]
         finally:
@@ -95,11 +104,17 @@ def serve_studio(
 
 @contextmanager
 def open_page(
-    browser: Browser, url: str, *, dark: bool = False, ready: str = HAS_SHAPE
+    browser: Browser,
+    url: str,
+    *,
+    dark: bool = False,
+    ready: str = HAS_SHAPE,
+    expected: tuple[str, ...] = (),
 ) -> Iterator[Page]:
     """Open the studio as on a laptop, and wait until it shows a shape, or another condition.
 
-    At the end every error, warning and request to another machine fails the test.
+    At the end every error, warning and request to another machine fails the test, but for lines of the
+    console with a text that is expected.
     """
     scheme = "dark" if dark else "light"
     context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme=scheme)
@@ -127,6 +142,7 @@ def open_page(
     wait_until(page, ready)
     yield page
     context.close()
+    seen = [line for line in seen if not any(text in line for text in expected)]
     assert not seen, "\n".join(seen)
 
 

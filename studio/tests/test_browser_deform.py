@@ -186,6 +186,7 @@ def test_numbers_move_undo_redo_and_reload(page, mesh, rig, mode):
     wait_until(page, "window.eigenshape?.viewer.vertices.length > 0")
     wait_until(page, f"{PANEL}?.active")
     np.testing.assert_array_equal(positions(page), posed)
+    wait_until(page, f"{PANEL}.selection.regions.vertices(0).length > 0")
     np.testing.assert_array_equal(region(page), chosen)
 
 

@@ -28,10 +28,12 @@ from eigenshape_studio.workspace import Answer
 SCRIPT = """
 import sys
 from functools import partial
+from pathlib import Path
 from eigenshape_studio import listening, server
 listening.HEADER_SECONDS = 1.0
 server.Rules = partial(server.Rules, most_bytes=1 << 20, pause=0.5, deadline=2.0)
-server.serve(sys.argv[1], browse=False, announce=partial(print, flush=True))
+sessions = Path(sys.argv[1]).parent
+server.serve([sys.argv[1]], browse=False, announce=partial(print, flush=True), sessions=sessions)
 """
 TAB = "a-tab-of-the-tests"
 
@@ -130,11 +132,14 @@ def test_the_printed_address_becomes_a_cookie(server):
     assert "default-src 'none'" in policy
     assert "unsafe" not in policy
     assert page.headers["x-content-type-options"] == "nosniff"
+    again = httpx.get(server.base)
+    assert again.status_code == 403
+    assert "Open the address that it has printed" in again.text
     bundle = httpx.get(f"{server.base}/studio.js", headers={"cookie": server.cookie})
     assert bundle.headers["content-type"].startswith("text/javascript")
 
 
-def test_tabs_are_apart_and_the_oldest_is_dropped(server):
+def test_tabs_are_apart_and_the_oldest_is_kept(server):
     tabs = [f"another-tab-{number:02}" for number in range(12)]
     ball = np.frombuffer(ply_of("0 0 0\n1 0 0\n0 1 0\n"), np.uint8)
     opened = server.call("finish", {"kind": "open", "name": "a.ply"}, {"file": ball}, tabs[0])
@@ -142,7 +147,7 @@ def test_tabs_are_apart_and_the_oldest_is_dropped(server):
     assert server.state(tabs[1])["n_vertices"] == 162
     for tab in tabs:
         server.state(tab)
-    assert server.state(tabs[0])["n_vertices"] == 162
+    assert server.state(tabs[0])["n_vertices"] == 3
 
 
 class SlowWorkspace:
@@ -151,7 +156,7 @@ class SlowWorkspace:
     def __init__(self):
         self.begun, self.let_go = threading.Semaphore(0), threading.Event()
 
-    def fork(self):
+    def fork(self, _file):
         return self
 
     def answer(self, call, _message):
@@ -408,7 +413,7 @@ def test_many_good_calls_leave_the_server_well(server):
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.0.2.7", "::", "example.org"])
 def test_another_address_takes_permission(host):
     with pytest.raises(es.InvalidParameterError, match="--allow-remote"):
-        serve(es.icosphere(1), host=host, browse=False)
+        serve(host=host, browse=False)
 
 
 def test_the_command_prints_the_address(tmp_path):

@@ -9,7 +9,9 @@ import pytest
 from conftest import stretched_ball
 
 import eigenshape as es
-from eigenshape_studio.server import _first_workspace
+from eigenshape_studio.history import Shape
+from eigenshape_studio.loading import Loaded
+from eigenshape_studio.opening import open_workspace
 from eigenshape_studio.wire import decode, encode
 from eigenshape_studio.workspace import Workspace
 
@@ -155,7 +157,7 @@ def test_a_commit_equals_deform_exactly(page, top, mode):
     state = shown[0]["state"]
     assert (state["pose"], state["shape"]) == (1, 0)
     assert state["deformation"]["mode"] == mode
-    assert (state["deformation"]["n_edits"], state["deformation"]["n_redoable"]) == (1, 0)
+    assert (state["deformation"]["n_edits"], state["history"], state["place"]) == (1, ["Bend"], 1)
 
 
 def test_two_regions_and_fixed_vertices_are_those_of_bend(page, top):
@@ -188,8 +190,8 @@ def test_undo_redo_and_reset_restore_the_poses(page, top):
     np.testing.assert_array_equal(page.call("finish", kind="redo")[1]["vertices"], second)
     facts, arrays = page.call("finish", kind="reset")
     np.testing.assert_array_equal(arrays["vertices"], stretched_ball().vertices.astype("<f4"))
-    assert facts["state"]["deformation"]["n_redoable"] == 2
-    page.call("finish", kind="redo")
+    assert facts["state"]["deformation"]["n_edits"] == 0
+    np.testing.assert_array_equal(page.call("finish", kind="undo")[1]["vertices"], second)
     error = page.error("finish", kind="commit", handles=[PULL], mode="graded")
     assert "A region must be bound" in error["message"]
 
@@ -204,7 +206,8 @@ def test_edits_are_saved_and_replayed_on_another_resolution(page, top):
 
     fine = Page(Workspace(stretched_ball(4)))
     assert fine.workspace.analysis.rig.wait(300)
-    assert "original mesh" in fine.error("finish", kind="replay", edits=edits)["message"]
+    error = fine.error("finish", kind="replay", edits=edits)
+    assert "choose its file together with the edits" in error["message"]
     arrays = {"source": file_of(stretched_ball())}
     found = fine.call("finish", {"kind": "replay", "edits": edits, "source": "ball.ply"}, arrays)
     assert found[0]["state"]["deformation"]["n_edits"] == 1
@@ -326,19 +329,18 @@ def test_a_pose_is_transferred_to_another_shape():
 
 
 def test_a_file_that_is_opened_leaves_the_shape_before_with_its_edits(page, top):
-    assert "nothing was opened" in page.error("finish", kind="swap")["message"]
     bend(page, top)
     bent = page.workspace.mesh.vertices
     tetrahedron = es.TriangleMesh(np.eye(4, 3), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
     page.call("finish", {"kind": "open", "name": "t.ply"}, {"file": file_of(tetrahedron)})
     assert page.workspace.mesh.n_vertices == 4
-    facts, _ = page.call("finish", kind="swap")
+    facts, _ = page.call("finish", kind="choose", shape=0)
     assert facts["state"]["name"] == "ball.ply"
+    assert facts["state"]["shapes"] == [[0, "ball.ply"], [1, "t.ply"]]
     assert facts["state"]["deformation"]["n_edits"] == 1
     np.testing.assert_array_equal(page.workspace.mesh.vertices, bent)
-    page.call("finish", kind="undo")
-    facts, _ = page.call("finish", kind="swap")
-    assert (facts["state"]["name"], facts["state"]["shape"]) == ("t.ply", 3)
+    facts, _ = page.call("finish", kind="undo")
+    assert (facts["state"]["name"], facts["state"]["shape"]) == ("t.ply", 1)
     assert page.workspace.analysis.rig.wait(60)
     assert page.workspace.analysis.spectrum.status == "ready"  # its jobs go on or begin anew
 
@@ -509,8 +511,7 @@ def test_a_file_that_is_saved_keeps_what_the_opened_one_held(tmp_path):
     colors = np.arange(3 * ball.n_vertices, dtype=np.uint8).reshape(-1, 3)
     es.write_mesh(ball, tmp_path / "a.glb", colors=colors)
     mesh, attributes = es.read_mesh(tmp_path / "a.glb", attributes=True)
-    workspace = Workspace(mesh, "a.glb")
-    workspace.attributes = attributes
+    workspace = Workspace([Shape(0, "a.glb", lambda: Loaded(mesh, attributes))])
     for kind in ("glb", "ply"):
         path = tmp_path / f"b.{kind}"
         path.write_bytes(workspace._file(kind).tobytes())
@@ -527,6 +528,6 @@ def test_functions_of_the_file_are_there_to_choose_from(tmp_path, suffix):
         "move": ball.vertices,
     }
     es.io.write_fields(ball, tmp_path / f"a{suffix}", fields)
-    workspace = _first_workspace(tmp_path / f"a{suffix}", None)
+    workspace = open_workspace([tmp_path / f"a{suffix}"])
     assert [facts["name"] for facts in workspace.state()["values"]] == ["height (mm)"]
     workspace.close()

@@ -25,8 +25,8 @@ def test_without_the_studio_its_verbs_say_what_to_install(monkeypatch, tmp_path,
 def test_studio_passes_its_options_on_and_prints_the_address(monkeypatch):
     calls = []
 
-    def serve(mesh, *, announce, **options):
-        calls.append((mesh, options))
+    def serve(shapes, *, announce, **options):
+        calls.append((shapes, options))
         announce("http://127.0.0.1:5/?token=abc")
 
     monkeypatch.setitem(sys.modules, "eigenshape_studio", ModuleType("eigenshape_studio"))
@@ -34,15 +34,15 @@ def test_studio_passes_its_options_on_and_prints_the_address(monkeypatch):
     monkeypatch.setattr(module, "serve", serve, raising=False)
     monkeypatch.setitem(sys.modules, module.__name__, module)
     side = ["--view", "1,0,2", "--up", "-z"]
-    done = run("studio", "a.ply", "--index", "shelf", "--port", 5, "--no-browser", *side)
+    done = run("studio", "a.ply", "b.ply", "--index", "shelf", "--port", 5, "--no-browser", *side)
     assert done.stdout == "The studio is open at http://127.0.0.1:5/?token=abc\n"
     run("studio", "--host", "0.0.0.0", "--allow-remote")
     local = {"host": "127.0.0.1", "port": 5, "allow_remote": False, "browse": False}
     local |= {"view": [1.0, 0.0, 2.0], "up": "-z"}
-    assert calls[0] == (Path("a.ply"), {"index": Path("shelf"), **local})
-    remote = {"host": "0.0.0.0", "port": 0, "allow_remote": True, "browse": True}
+    assert calls[0] == ([Path("a.ply"), Path("b.ply")], {"index": Path("shelf"), **local})
+    remote = {"host": "0.0.0.0", "port": None, "allow_remote": True, "browse": True}
     remote |= {"view": "auto", "up": "auto"}
-    assert calls[1] == (None, {"index": None, **remote})
+    assert calls[1] == ((), {"index": None, **remote})
 
 
 def test_serve_passes_its_options_on_and_prints_the_address(monkeypatch):

@@ -14,13 +14,13 @@ from eigenshape.cli.inputs import memory_bytes
 
 
 def studio(
-    mesh: Path | None = None,
+    shapes: Annotated[list[Path] | None, typer.Argument()] = None,
     *,
     index: Path | None = None,
     view: str = "auto",
     up: str = "auto",
     host: str = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535)] = 0,
+    port: Annotated[int | None, typer.Option(min=0, max=65535)] = None,
     browser: bool = True,
     allow_remote: bool = False,
 ) -> None:
@@ -32,12 +32,14 @@ def studio(
 
     Parameters
     ----------
-    mesh
-        Mesh file to open. By default a synthetic creature.
+    shapes
+        Files, folders of files, or an index. The first shape is shown, and the others stand in a
+        list. By default a synthetic creature.
     index
         Folder of an index to search in.
     port
-        Port to listen on; 0 takes any that is free.
+        Port to listen on; 0 takes any that is free. By default 8642 if it is free, so that open
+        pages go on when the studio is started again.
     browser
         Open the address in a browser.
     allow_remote
@@ -48,7 +50,7 @@ def studio(
     server = import_extra("eigenshape_studio.server", "eigenshape-studio")
 
     server.serve(
-        mesh,
+        shapes or (),
         index=index,
         **side,
         host=host,

@@ -3,7 +3,6 @@
 import type { Backend, Change, State } from "./core/backend";
 import markup from "./app.html?raw";
 import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile } from "./core/dom";
-import { History, type Step } from "./core/history";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
 import style from "./style.css?inline";
@@ -39,12 +38,10 @@ export interface Panel {
   hidden?(): void;
 }
 
-const NEW_SHAPES = ["open", "repair", "transfer"]; // changes that replace the shape
 const POLL = 300; // ms between two questions while the server computes
 
 export class Studio {
   readonly viewer: Viewer;
-  readonly history = new History();
   state!: State;
   private readonly page = new Form(markup);
   readonly main = this.page.root;
@@ -58,11 +55,8 @@ export class Studio {
   private shown = { shape: -1, pose: -1 }; // what the viewer shows
   private mesh: Promise<[Float32Array, Uint32Array]>; // requested, of a shape not shown yet
   private readonly first: Promise<State>;
-  /** The last edit of the server's session, as a step. */
-  private readonly edit: Step = {
-    undo: () => this.change({ kind: "undo" }, "Undoing"),
-    redo: () => this.change({ kind: "redo" }, "Redoing"),
-  };
+  private changing: Promise<unknown> = Promise.resolve(); // the last change
+  private stepping: Promise<void> = Promise.resolve(); // undone and redone one after the other
 
   constructor(
     readonly backend: Backend,
@@ -72,6 +66,7 @@ export class Studio {
     keys: EventTarget = host,
   ) {
     // WebGL takes a second to start without a graphics card; meanwhile the shape is on its way.
+    backend.trouble = (why) => this.showTrouble(why);
     this.first = backend.meta();
     this.mesh = this.requestMesh();
     // A shadow root keeps the styles of a notebook out, and ours in.
@@ -118,23 +113,27 @@ export class Studio {
 
   /** Make a change on the server, show its result and its warnings; return whether it was made. */
   async change(change: Change, text: string, files?: Arrays): Promise<boolean> {
-    const done = await this.run(text, this.backend.finish(change, files));
+    const making = this.run(text, this.backend.finish(change, files));
+    this.changing = making;
+    const done = await making;
     if (!done) return false;
-    this.note(change.kind);
     await this.show(done.state, done.vertices);
     this.refreshPanels();
     if (done.warnings.length) this.say(done.warnings.join(" "));
     return true;
   }
 
-  /** Note what Ctrl+Z undoes. */
-  private note(kind: Change["kind"]): void {
-    if (NEW_SHAPES.includes(kind)) {
-      this.history.forget();
-      const back = () => this.change({ kind: "swap" }, "Returning to the other shape");
-      this.history.did({ undo: back, redo: back });
-    } else if (kind === "commit") this.history.did(this.edit);
-    else if (kind === "replay" || kind === "reset") this.history.forget();
+  /** Say why calls wait for the server; once it is there again, show what it has. */
+  private showTrouble(why: string | null): void {
+    if (why) return this.fail(why);
+    const { shape, digest } = this.state;
+    this.refresh()
+      .then(() => {
+        // Another server shows another shape to a tab of which no work is kept.
+        if (this.state.shape === shape && this.state.digest !== digest) location.reload();
+        else this.say("The studio answers again; nothing was lost.");
+      })
+      .catch((error) => this.fail(error));
   }
 
   /** Let the person choose files; none if one cannot be read, and the status says why. */
@@ -164,7 +163,7 @@ export class Studio {
   /** Show `text` as the status while `work` runs; return null if it fails, and say why. */
   async run<T>(text: string, work: Promise<T>): Promise<T | null> {
     this.busy += 1;
-    this.say(`${text} …`);
+    if (text) this.say(`${text} …`);
     this.main.classList.add("busy");
     try {
       const result = await work;
@@ -289,16 +288,18 @@ export class Studio {
     for (const { panel } of this.pages.values()) panel.refresh(this.state);
   }
 
-  can(kind: keyof Step): boolean {
-    const { n_edits, n_redoable } = this.state.deformation;
-    return this.history.can(kind) || (kind === "undo" ? n_edits : n_redoable) > 0;
+  can(kind: "undo" | "redo"): boolean {
+    const { history, place } = this.state;
+    return kind === "undo" ? place > 0 : place < history.length;
   }
 
-  /** Undo or redo what the hand did last; after a reload, the edits that the server has. */
-  async step(kind: keyof Step): Promise<void> {
-    if (!this.can(kind)) return;
-    await this.history.go(kind, this.edit);
-    this.refreshPanels();
+  /** Undo or redo what the hand did last, when what it does now is done. */
+  step(kind: "undo" | "redo"): Promise<void> {
+    this.stepping = this.stepping.then(async () => {
+      await this.changing;
+      if (this.can(kind)) await this.change({ kind }, kind === "undo" ? "Undoing" : "Redoing");
+    });
+    return this.stepping;
   }
 
   private setTheme(dark: boolean): void {

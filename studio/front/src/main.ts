@@ -32,6 +32,9 @@ function fillWindow(backend: Backend, settings: Settings): void {
   const sheet = new CSSStyleSheet();
   sheet.replaceSync("html, body, body > div { height: 100%; margin: 0; }");
   document.adoptedStyleSheets = [sheet];
+  // A file that is dropped beside what takes it would replace the page.
+  for (const type of ["dragover", "drop"])
+    window.addEventListener(type, (event) => event.preventDefault());
   const page = document.getElementById("eigenshape-studio");
   const host = page ?? document.body.appendChild(h("div"));
   (window as any).eigenshape = start(backend, host, settings, window); // for tests

@@ -1,5 +1,7 @@
-import { expect, test } from "vitest";
+import { expect, test, vi } from "vitest";
+import { backendOver } from "../src/core/backend";
 import { decode, encode } from "../src/core/wire";
+import { httpBackend } from "../src/hosts/http";
 import { inlineBackend } from "../src/hosts/inline";
 import { widgetBackend } from "../src/hosts/widget";
 
@@ -63,4 +65,43 @@ test("errors of a notebook are told, and foreign messages ignored", async () => 
   answer("another view", {});
   answer(sent[0]!.content.id, { error: { kind: "RequestError", message: "there is none" } });
   await expect(wrong).rejects.toThrow("there is none");
+});
+
+test("calls wait for a server that has gone, or was started anew, and say so", async () => {
+  const kind = { "Content-Type": "application/octet-stream" };
+  const answers = [
+    () => Promise.reject(new TypeError("no network")),
+    async () => new Response("A request must bring the token.", { status: 403 }),
+    async () => new Response(encode({ error: { message: "soon" } }), { status: 503, headers: kind }),
+    async () => new Response(encode({ name: "ball" }), { headers: kind }),
+    async () => new Response("The body is too long.", { status: 413 }),
+  ];
+  const sent: string[] = [];
+  vi.stubGlobal("fetch", (address: string) => {
+    sent.push(address);
+    return answers.shift()!();
+  });
+  const backend = httpBackend("a-tab", 1);
+  const heard: (string | null)[] = [];
+  backend.trouble = (why) => heard.push(why);
+  expect((await backend.meta()).name).toBe("ball");
+  expect(heard.map((why) => why?.slice(0, 19) ?? null)).toEqual([
+    "The studio does not",
+    "The studio was star",
+    null,
+  ]);
+  expect(sent).toEqual(Array(4).fill("api/meta"));
+  await expect(backend.meta()).rejects.toThrow("413: The body is too long.");
+  vi.unstubAllGlobals();
+});
+
+test("a change that is sent again keeps its name, and each change has another", async () => {
+  const names: string[] = [];
+  const backend = backendOver(async (_, message) => {
+    names.push(decode(message).meta.id);
+    return encode({});
+  });
+  await backend.finish({ kind: "undo" });
+  await backend.finish({ kind: "undo" });
+  expect(new Set(names).size).toBe(2);
 });

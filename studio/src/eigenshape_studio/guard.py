@@ -22,6 +22,13 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
+# What a page shows that is loaded again after its server was started anew, or in another browser. It
+# loads itself again, and shows what it showed when the cookie of the new address is there.
+WAITING = """<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="2">
+<title>{name}</title><h1>The {name} was started anew</h1>
+<p>Open the address that it has printed, in this browser. Then this page goes on, and nothing is lost.
+"""
+HTML = b"text/html; charset=utf-8"
 MESSAGE_TYPE = b"application/octet-stream"
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -116,7 +123,11 @@ class Guard:
             body = await self._read_body(receive)
             await self.app(scope, _replay(body, receive), answered)
         except RefusedError as error:
-            await answered.refuse(error)
+            page = (scope["method"], scope["path"]) == ("GET", "/")
+            if page and error.status == 403 and not self.rules.json_errors:
+                await answered.text(403, WAITING.format(name=self.rules.name), [], HTML)
+            else:
+                await answered.refuse(error)
 
     def _check_source(self, scope: Scope) -> None:
         """Refuse requests that another page, or for another name, sends."""

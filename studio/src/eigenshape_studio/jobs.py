@@ -1,5 +1,6 @@
 """Work in the background, which the page follows by its progress."""
 
+import re
 import threading
 from collections.abc import Callable
 from typing import Any, Generic, Literal, TypeVar
@@ -11,8 +12,16 @@ Status = Literal["none", "running", "ready", "failed"]
 Progress = Callable[[float, str], None]
 
 
+# How the library names a repair to programs; in a window there is a button for it.
+REPAIR_CALL = re.compile(r"(?:[Tt]ry|[Uu]se|by) (?:es\.)?repair\([^)]*\)[^.]*\.")
+
+
 class JobCancelledError(Exception):
     """Nobody waits for a job any more; raised inside it at its next report of progress."""
+
+
+class PreparingError(Exception):
+    """A call asks for what is still computed; it can be sent again."""
 
 
 class Job(Generic[T]):
@@ -68,12 +77,18 @@ class Job(Generic[T]):
             self.status, self.message = "none", ""
         except Exception as error:  # noqa: BLE001  whatever happens, the page must learn of it
             self.error = error
-            self.status, self.message = "failed", str(error) or type(error).__name__
+            self.status, self.message = "failed", window_message(error)
         else:
             self.progress, self.status, self.message = 1.0, "ready", ""
         finally:
             self._done.set()
             trim_memory()
+
+
+def window_message(error: Exception) -> str:
+    """Return what is wrong for a person at the window, who cannot call functions."""
+    text = REPAIR_CALL.sub("The tab Shape offers the repairs that may help.", str(error))
+    return text or type(error).__name__
 
 
 NO_JOB: dict[str, Any] = {"status": "none", "progress": 0.0, "message": ""}

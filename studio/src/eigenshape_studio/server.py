@@ -2,9 +2,10 @@
 
 import re
 import secrets
+import socket
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -14,7 +15,6 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 
-import eigenshape as es
 from eigenshape.plot.camera import Up, View
 from eigenshape_studio.bundle import NotBuiltError, read_static
 from eigenshape_studio.guard import App, Guard, Rules
@@ -26,37 +26,43 @@ from eigenshape_studio.listening import (
     shown_address,
 )
 from eigenshape_studio.memory import share_one_arena, trim_memory
-from eigenshape_studio.workspace import Answer, Workspace, error_message, is_field
+from eigenshape_studio.opening import open_workspace
+from eigenshape_studio.sessions import SessionFile, remove_old, sessions_folder
+from eigenshape_studio.workspace import Answer, Workspace, error_message
 
 FILES = {"index.html": "text/html; charset=utf-8", "studio.js": "text/javascript; charset=utf-8"}
 TAB = re.compile(r"[A-Za-z0-9_-]{8,64}")
 MOST_TABS = 8  # of 25,000 vertices, a tab with a spectrum of its own takes about 200 MB
 MOST_CALLS = 8  # of one tab at the same time; the panels together send fewer
+PORT = 8642  # unless another one is requested
 N_THREADS = 32  # for calls; MOST_CALLS of them for one tab leave enough for the others
 LARGE_CALLS = ("finish", "query")  # which take and free much memory
 
 
 class Tabs:
-    """The workspaces of the tabs that are open, by the number that each tab gave itself."""
+    """The workspaces of the tabs, by the number that each tab gave itself.
 
-    def __init__(self, first: Workspace, most: int = MOST_TABS) -> None:
-        self._first, self._most = first, most
+    Those that were not used for longest leave the memory when there are too many; their files have
+    them until they are used again.
+    """
+
+    def __init__(self, first: Workspace, folder: Path, most: int = MOST_TABS) -> None:
+        self._first, self._folder, self._most = first, folder, most
         self._open: OrderedDict[str, Workspace] = OrderedDict()
         self._calls: dict[str, int] = {}
         self._lock = threading.Lock()
-
-    def __len__(self) -> int:
-        return len(self._open)
 
     def workspace(self, tab: str) -> Workspace:
         """Return the workspace of a tab; a new tab shows the first shape without edits."""
         with self._lock:
             if tab not in self._open:
-                self._open[tab] = self._first.fork()
+                file = SessionFile(self._folder / f"{tab}.sqlite")
+                self._open[tab] = self._first.fork(file)
+                remove_old(self._folder, [self._folder / f"{each}.sqlite" for each in self._open])
             self._open.move_to_end(tab)
-            while len(self._open) > self._most:
-                _, dropped = self._open.popitem(last=False)
-                dropped.close()
+            idle = [each for each in self._open if each not in self._calls and each != tab]
+            for each in idle[: max(0, len(self._open) - self._most)]:
+                self._open.pop(each).close()
             return self._open[tab]
 
     def begin(self, tab: str) -> bool:
@@ -76,7 +82,7 @@ class Tabs:
                 del self._calls[tab]
 
 
-def make_app(first: Workspace, rules: Rules) -> App:
+def make_app(first: Workspace, rules: Rules, folder: Path | None = None) -> App:
     """Return the application: the page, its bundle, and the five calls, behind the guard.
 
     Parameters
@@ -84,9 +90,11 @@ def make_app(first: Workspace, rules: Rules) -> App:
     first : Workspace
         What new tabs show.
     rules : Rules
+    folder : Path, optional
+        Where the sessions are kept; by default in the user's cache.
     """
     first.most_bytes = rules.most_bytes
-    tabs = Tabs(first)
+    tabs = Tabs(first, folder or sessions_folder())
     limiter = anyio.CapacityLimiter(N_THREADS)
 
     async def show_file(request: Request) -> Response:
@@ -133,23 +141,24 @@ def _respond(answer: Answer) -> Response:
 
 
 def serve(  # noqa: PLR0913  one for each option of the command
-    mesh: str | Path | es.types.MeshLike | None = None,
+    paths: Sequence[str | Path] = (),
     *,
     index: str | Path | None = None,
     view: View = "auto",
     up: Up = "auto",
     host: str = "127.0.0.1",
-    port: int = 0,
+    port: int | None = 0,
     allow_remote: bool = False,
     announce: Callable[[str], None] = print,
     browse: bool = True,
+    sessions: Path | None = None,
 ) -> None:
     """Open the studio in the browser, and serve it until Ctrl-C.
 
     Parameters
     ----------
-    mesh : path or MeshLike, optional
-        The shape to show; by default a creature that the library makes.
+    paths : sequence of paths
+        Files, folders and indexes of shapes to choose from; see `open_workspace`.
     index : path, optional
         Folder of an index to search in.
     view : str or (3,) float
@@ -158,8 +167,9 @@ def serve(  # noqa: PLR0913  one for each option of the command
         The upward direction, as in `es.plot.aim_camera`.
     host : str
         Address to listen on.
-    port : int
-        0 for any that is free.
+    port : int, optional
+        0 for any that is free; None for 8642 if it is free, so that pages which are open find the
+        studio when it is started again.
     allow_remote : bool
         Whether the address may be another one than this machine's own. Whoever has the printed
         address then controls the studio, and can read what is sent, because HTTP is not encrypted.
@@ -167,6 +177,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
         Called with the address, when the server listens there.
     browse : bool
         Whether to open the address in a browser.
+    sessions : Path, optional
+        The folder in which the work of each tab is kept; by default one in the user's cache.
 
     Raises
     ------
@@ -178,38 +190,22 @@ def serve(  # noqa: PLR0913  one for each option of the command
     """
     require_permission(host, "studio", allow_remote=allow_remote)
     share_one_arena()
-    first = _first_workspace(mesh, index)
+    first = open_workspace(paths, index)
     first.analysis.look_from(view, up)
-    listening = listen(host, port)
+    listening = _listen(host, port)
     port = listening.getsockname()[1]
     token = secrets.token_urlsafe(32)
     hosts = own_hosts(host, port, allow_remote=allow_remote)
     rules = Rules(token, hosts, port, any_address=allow_remote)
     url = f"{shown_address(host, port)}/?token={token}"
-    run_app(make_app(first, rules), listening, lambda: announce(url), url if browse else None)
+    app = make_app(first, rules, sessions)
+    run_app(app, listening, lambda: announce(url), url if browse else None)
     first.close()
 
 
-def _first_workspace(
-    mesh: str | Path | es.types.MeshLike | None, index: str | Path | None
-) -> Workspace:
-    """Return what new tabs show; their analysis is shared."""
-    if mesh is None:
-        creature = es.make_creature("quadruped", n_vertices=2500)
-        return Workspace(creature, "quadruped", index=index, shared=True)
-    if isinstance(mesh, str | Path):
-        path, surface = Path(mesh), es.io.read_surface(mesh).mesh
-        attributes, values = None, {}
-        with suppress(es.FileFormatError):  # points have no attributes
-            attributes = es.read_mesh(path, attributes=True, drop_missing=True)[1]
-            attributes = es.io.carry_attributes(attributes, surface)
-            # The page can choose from the functions in the file that it can draw.
-            values = {
-                title: field
-                for title, field in attributes.fields.items()
-                if is_field(field, surface.n_vertices)
-            }
-        first = Workspace(surface, path.name, values=values, index=index, shared=True)
-        first.attributes = attributes
-        return first
-    return Workspace(mesh, index=index, shared=True)
+def _listen(host: str, port: int | None) -> socket.socket:
+    """Return a socket on a port; on any that is free if none is requested and the usual is taken."""
+    if port is None:
+        with suppress(OSError):
+            return listen(host, PORT)
+    return listen(host, port or 0)

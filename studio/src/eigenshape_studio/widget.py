@@ -64,8 +64,7 @@ class ShapeWidget(anywidget.AnyWidget):
     @property
     def edits(self) -> tuple[es.deformation.Edit, ...]:
         """The edits that were made by hand, oldest first."""
-        session = self.workspace.session
-        return () if session is None else session.edits
+        return self.workspace.edits
 
     def close(self) -> None:
         """Stop what is still computed, and remove the widget."""

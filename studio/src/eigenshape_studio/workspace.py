@@ -1,10 +1,11 @@
-"""One shape of one tab, and the five calls of the page: the same for all hosts."""
+"""The shapes of one tab, and the five calls of the page: the same for all hosts."""
 
 import json
 import threading
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -13,11 +14,16 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
+from eigenshape.deformation.rig import pose_rig
 from eigenshape_studio.analysis import N_MODES, Analysis, cut_rows, diagram_rows, vertex_labels
-from eigenshape_studio.jobs import NO_JOB
+from eigenshape_studio.calls import Arrays, Reply, RequestError, file_bytes, whole
+from eigenshape_studio.history import History, Pose, Shape
+from eigenshape_studio.jobs import NO_JOB, PreparingError, window_message
+from eigenshape_studio.loading import Field, Loaded, check_fields
 from eigenshape_studio.parse import display_name, parse_surface
 from eigenshape_studio.poses import carry_pose
 from eigenshape_studio.search import Shelf
+from eigenshape_studio.sessions import SessionFile
 from eigenshape_studio.wire import WireError, decode, encode
 
 MOST_REGIONS = 4  # one component each of the attribute `shares` of the vertex shader
@@ -26,18 +32,9 @@ N_BRACKETS = 20  # bracketing costs a solve with three times as many unknowns
 CAPABILITIES = ("rig", "finish", "query", "open", "repair", "solve")
 CALLS = ("meta", "array", "rig", "finish", "query")
 MODES = ("graded", "uncrossed", "thesis")
-# What a workspace holds of one shape
-OF_A_SHAPE = ("analysis", "session", "mode", "fields", "attributes")
 # The filters of warnings belong to the whole process, so only one thread may listen at a time.
 # Only the mode "uncrossed" warns.
 LISTENING = threading.Lock()
-
-Arrays = Mapping[str, np.ndarray]
-Reply = tuple[Any, dict[str, np.ndarray]]
-
-
-class RequestError(ValueError):
-    """A call asks for what cannot be; the text says what."""
 
 
 @dataclass(frozen=True)
@@ -48,20 +45,12 @@ class Answer:
     ----------
     message : bytes
     status : int
-        As in HTTP: 200, 400 if the call was at fault, 500 if the studio was.
+        As in HTTP: 200, 400 if the call was at fault, 500 if the studio was, 503 if the call can be
+        sent again in a while.
     """
 
     message: bytes
     status: int
-
-
-@dataclass(frozen=True, eq=False)
-class Field:
-    """A function on the vertices that was passed to the studio, with its unit."""
-
-    values: np.ndarray
-    title: str
-    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +63,15 @@ class Bound:
 
 
 class Workspace:
-    """One shape of one tab: its analysis, its deformation session, and the five calls.
+    """The shapes of one tab: what is computed of them, what was done to them, and the five calls.
 
     Calls of one workspace that change anything run one after the other; `meta` and `array` never
     wait for them. Workspaces do not share anything that changes.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : MeshLike or list of Shape
+        The shape, or the shapes to choose from, of which the first one is shown.
     name : str
     values : {title: (n,) array}, optional
         Functions on the vertices.
@@ -95,7 +85,7 @@ class Workspace:
 
     def __init__(
         self,
-        mesh: es.types.MeshLike,
+        mesh: es.types.MeshLike | list[Shape],
         name: str = "shape",
         *,
         values: Mapping[str, Any] | None = None,
@@ -103,43 +93,73 @@ class Workspace:
         n_modes: int = N_MODES,
         shared: bool = False,
     ) -> None:
-        surface = es.as_mesh(mesh)
-        # What the file of the shape holds besides; whoever reads a file may set it.
-        self.attributes: es.io.MeshAttributes | None = None
-        self.fields = _fields(values or {}, surface.n_vertices)
-        title = display_name(name)
-        self.analysis = Analysis(surface, title, n_modes=n_modes, shared=shared)
+        shapes = mesh if isinstance(mesh, list) else []
+        if not isinstance(mesh, list):
+            surface = es.as_mesh(mesh)
+            loaded = Loaded(surface, fields=check_fields(values or {}, surface.n_vertices))
+            make = partial(Analysis, n_modes=n_modes, shared=shared)
+            shapes = [Shape(0, display_name(name), lambda: loaded, make)]
+        self.history = History(shapes)
+        self.analysis  # noqa: B018  it begins before a page asks
         self.shelf = None if index is None else Shelf(index)
-        self.session: es.DeformationSession | None = None
         self.bound: Bound | None = None
         self.most_bytes = 256 << 20  # of a file; the server has a limit of its own
         self.matches: list[str] = []  # names, of the last query
         self.mode = "graded"
-        self._before: dict[str, Any] | None = None  # the shape before this one, as OF_A_SHAPE
-        # How often the vertices, and how often the mesh, has changed.
-        self.pose, self.shape = 0, 0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Set up what no two workspaces share."""
         self._changing = threading.RLock()
         self._painting = threading.Lock()
         # The pose that the brush last painted on, and the function that computes distances on it.
         self._waves: tuple[Any, Any] = (None, None)
+        # The pose that is dragged, and the session in which it is.
+        self._dragged: tuple[Pose | None, es.DeformationSession | None] = (None, None)
 
-    def fork(self) -> "Workspace":
-        """Return a workspace of the same shape for another tab, without its edits."""
+    def fork(self, file: SessionFile | None = None) -> "Workspace":
+        """Return a workspace of the same shapes for another tab; it continues what a file holds."""
         twin = object.__new__(Workspace)
         twin.__dict__.update(self.__dict__)
-        twin.analysis, twin.fields = self.analysis.fork(), dict(self.fields)
-        twin.session, twin.bound, twin.mode, twin._before = None, None, "graded", None
-        twin._changing, twin._painting = threading.RLock(), threading.Lock()
+        shapes = self.history.shapes.values()
+        twin.history = History([shape.fork() for shape in shapes], file)
+        twin.bound, twin.mode, twin.matches = None, "graded", []
+        twin._begin()
         return twin
 
     def close(self) -> None:
-        """Stop what is still computed."""
-        self.analysis.cancel()
+        """Stop what is still computed, and let go of the file."""
+        for shape in self.history.shapes.values():
+            shape.leave()
+        if self.history.file is not None:
+            self.history.file.close()
+
+    @property
+    def analysis(self) -> Analysis:
+        """What is computed of the shape."""
+        return self.history.now.shape.analysis
+
+    @property
+    def fields(self) -> dict[str, Field]:
+        """Functions on the vertices of the shape."""
+        self.analysis  # noqa: B018  they are read with the mesh
+        return self.history.now.shape.fields
+
+    @property
+    def attributes(self) -> es.io.MeshAttributes | None:
+        """What the file of the shape holds besides."""
+        self.analysis  # noqa: B018  they are read with the mesh
+        return self.history.now.shape.attributes
 
     @property
     def mesh(self) -> es.TriangleMesh:
         """The shape in its present pose."""
-        return self.analysis.mesh if self.session is None else self.session.mesh
+        return self.history.mesh(self.history.now.pose)
+
+    @property
+    def edits(self) -> tuple[es.deformation.Edit, ...]:
+        """The edits that lead to the present pose, oldest first."""
+        return self.history.edits(self.history.now.pose)
 
     def answer(self, call: str, message: bytes) -> Answer:
         """Answer a call; whatever is wrong with it becomes an answer, too."""
@@ -147,7 +167,9 @@ class Workspace:
             meta, arrays = decode(message)
             return Answer(encode(*self._dispatch(call, meta, arrays)), 200)
         except (es.EigenshapeError, WireError, RequestError, OSError) as error:
-            return Answer(error_message(type(error).__name__, str(error)), 400)
+            return Answer(error_message(type(error).__name__, window_message(error)), 400)
+        except PreparingError as error:
+            return Answer(error_message("PreparingError", str(error)), 503)
         except MemoryError:
             return Answer(error_message("MemoryError", "There is not enough memory for this."), 400)
         except Exception as error:  # noqa: BLE001  the other tabs must go on
@@ -167,7 +189,8 @@ class Workspace:
 
     def state(self) -> dict[str, Any]:
         """Return what the page shows beside the arrays."""
-        analysis = self.analysis
+        analysis, history = self.analysis, self.history
+        now = history.now
         capabilities = [name for name in CAPABILITIES if name != "query" or self.shelf is not None]
         return {
             "name": analysis.name,
@@ -183,18 +206,22 @@ class Workspace:
             "parts": analysis.parts_facts(),
             "deformation": self._deformation_facts(),
             "index": None if self.shelf is None else self.shelf.facts(),
-            "pose": self.pose,
-            "shape": self.shape,
+            "shapes": [[shape.number, shape.name] for shape in history.shapes.values()],
+            "history": [moment.text for moment in history.moments[1:]],
+            "place": history.place,
+            "digest": now.shape.digest,
+            "selected": now.selected,
+            "pose": now.pose.number,
+            "shape": now.shape.number,
         }
 
     def _deformation_facts(self) -> dict[str, Any]:
-        session, bound = self.session, self.bound
+        bound, history = self.bound, self.history
         return {
             **NO_JOB,
             **self.analysis.rig.facts(),
             "mode": self.mode,
-            "n_edits": 0 if session is None else len(session.edits),
-            "n_redoable": 0 if session is None else session.n_redoable,
+            "n_edits": history.now.pose.n_edits,
             "regions": [] if bound is None else [len(region) for region in bound.regions],
         }
 
@@ -225,6 +252,7 @@ class Workspace:
             "brackets": lambda: self._brackets(meta),
             "diagram": self._diagram,
             "crossings": self._crossings,
+            "regions": self._regions,
         }
         families: dict[str, Callable[[str], np.ndarray]] = {
             "parts": self._parts_array,
@@ -239,6 +267,11 @@ class Workspace:
         if tail and head in families:
             return families[head](tail)
         raise RequestError(f"There must be an array of the requested name; {name[:80]!r} is none.")
+
+    def _regions(self) -> np.ndarray:
+        """Return the region of each vertex, as the page chose it; empty where it chose none."""
+        found = self.history.owners(self.history.now)
+        return np.empty(0, np.uint8) if found is None else found
 
     def _vertices(self) -> np.ndarray:
         return self.mesh.vertices.astype("<f4")
@@ -298,7 +331,7 @@ class Workspace:
         return es.geometry.self_intersections(self.mesh).astype("<u4").reshape(-1, 2)
 
     def _skeleton(self, tail: str) -> np.ndarray:
-        rig = self._require_session().rig
+        rig = self._session().rig
         if not tail.isdecimal() or not 1 <= int(tail) <= rig.n_modes:
             raise RequestError(
                 f"A skeleton must be of 1 to {rig.n_modes} modes; not {tail[:80]!r}."
@@ -338,27 +371,33 @@ class Workspace:
         with TemporaryDirectory() as folder:
             path = Path(folder, f"shape.{tail}")
             if tail == "edits":
-                session = self._require_session()
-                es.io.write_edits(session.edits, self.analysis.mesh, path)
+                es.io.write_edits(self.edits, self.analysis.mesh, path)
             else:
                 # A file of materials beside an OBJ file would not be sent.
                 kept = None if tail == "obj" else self.attributes
                 es.write_mesh(self.mesh, path, attributes=kept)
             return np.frombuffer(path.read_bytes(), np.uint8)
 
-    def _require_session(self) -> es.DeformationSession:
-        """Return the session, which begins when the rig is ready."""
+    def _session(self) -> es.DeformationSession:
+        """Return a session in the present pose, which begins when the rig is ready."""
         with self._changing:
-            if self.session is None:
-                self.session = es.DeformationSession(self._rig_at_rest())
-            return self.session
+            now = self.history.now
+            pose, session = self._dragged
+            if session is None or pose is not now.pose:
+                rig = self._rig_at_rest()
+                if now.pose.number:
+                    rig = pose_rig(rig, self.mesh.vertices)
+                session = es.DeformationSession(rig)
+                self._dragged = now.pose, session
+            return session
 
     def _rig_at_rest(self) -> es.deformation.EigenRig:
-        rig = self.analysis.rig.result
-        if rig is None:
-            reason = self.analysis.rig.message or "its modes are being computed."
-            raise RequestError(f"The shape must be prepared for deformation: {reason}")
-        return rig
+        job = self.analysis.rig
+        if job.status == "running":
+            raise PreparingError("The shape is being prepared for bending.")
+        if job.result is None:
+            raise RequestError(f"The shape must be prepared for bending: {job.message}")
+        return job.result
 
     def _require_shelf(self) -> Shelf:
         if self.shelf is None:
@@ -380,7 +419,6 @@ class Workspace:
         fixed = regions.pop() if meta.get("fixed") else None
         began = perf_counter()
         with self._changing:
-            self._require_session()
             self.bound = None
             binding = self._drag(Bound(regions, fixed, n_modes), [None] * n_regions)
         facts = {
@@ -395,7 +433,7 @@ class Workspace:
 
     def _drag(self, bound: Bound, handles: list[Any]) -> es.deformation.Binding:
         """Drag the bound regions by handles, and return by how much each vertex follows."""
-        session = self._require_session()
+        session = self._session()
         moves = [
             es.deformation.Move(region, handle_from(entry))
             for region, entry in zip(bound.regions, handles, strict=True)
@@ -410,8 +448,10 @@ class Workspace:
         works: dict[Any, Callable[[dict[str, Any], Arrays], np.ndarray | None]] = {
             "preview": self._preview,
             "commit": self._commit,
-            "undo": lambda *_: self._posed(self._require_session().undo()),
-            "redo": lambda *_: self._posed(self._require_session().redo()),
+            "undo": self._undo,
+            "redo": self._redo,
+            "go": self._go,
+            "select": self._select,
             "reset": self._reset,
             "cancel": self._cancel,
             "replay": self._replay,
@@ -420,23 +460,30 @@ class Workspace:
             "solve": self._solve,
             "parts": lambda *_: self.analysis.find_parts(),
             "transfer": self._transfer,
-            "swap": self._swap,
+            "choose": self._choose,
         }
         if not isinstance(kind, str) or kind not in works:
             raise RequestError(f"kind must be one of {', '.join(works)}; it is {kind!r:.80}.")
         began = perf_counter()
         with self._changing:
             self._warnings: list[str] = []
-            vertices = works[kind](meta, arrays)
+            history, before, vertices = self.history, self.history.now, None
+            # A page that did not hear of an answer sends its change again.
+            name = str(meta.get("id", ""))[:64]
+            again = bool(name) and name == history.last
+            if not again:
+                vertices = works[kind](meta, arrays)
+            if history.now.pose is not before.pose:
+                self.bound = None
+            if again or history.now.pose is not before.pose:
+                vertices = self.mesh.vertices
+            if history.now is not before:
+                history.last = name
+                history.save()
             told = self._warnings
             state = self.state()
         facts = {"state": state, "seconds": perf_counter() - began, "warnings": told}
         return facts, {} if vertices is None else {"vertices": vertices.astype("<f4")}
-
-    def _posed(self, mesh: es.TriangleMesh) -> np.ndarray:
-        self.pose += 1
-        self.bound = None
-        return mesh.vertices
 
     def _preview(self, meta: dict[str, Any], _arrays: Arrays) -> np.ndarray:
         """Return the exact result of a motion, which is not kept."""
@@ -445,19 +492,23 @@ class Workspace:
         handles = [handle_from(entry) for entry in entries]
         return self._listen(mode, lambda: es.deformation.bend(binding, handles, mode=mode).vertices)
 
-    def _commit(self, meta: dict[str, Any], _arrays: Arrays) -> np.ndarray:
+    def _commit(self, meta: dict[str, Any], _arrays: Arrays) -> None:
         bound, entries, mode = self._motion(meta)
         self._drag(bound, entries)
-        session = self._require_session()
+        session = self._session()
         bent = self._listen(mode, lambda: session.commit(mode=mode))
         self.mode = mode
-        return self._posed(bent)
+        self.history.bend(session.edits, bent, "Bend")
 
     def _motion(self, meta: dict[str, Any]) -> tuple[Bound, list[Any], Any]:
         """Return what a call moves, by which handles and in which mode."""
         entries, mode = meta.get("handles"), meta.get("mode", self.mode)
         if self.bound is None:
-            raise RequestError("A region must be bound before it moves; none is. Call rig first.")
+            self.bound = self._chosen(meta)
+        if self.bound is None:
+            raise RequestError(
+                "A region must be bound before it moves; none is. Choose a region first."
+            )
         if not isinstance(entries, list) or len(entries) != len(self.bound.regions):
             raise RequestError(
                 f"There must be one handle for each of the {len(self.bound.regions)} regions."
@@ -465,6 +516,15 @@ class Workspace:
         if mode not in MODES:
             raise RequestError(f"mode must be one of {', '.join(MODES)}; it is {mode!r:.80}.")
         return self.bound, entries, mode
+
+    def _chosen(self, meta: dict[str, Any]) -> Bound | None:
+        """Return what the chosen regions move; the server may have begun anew since they were bound."""
+        owners = self._regions()
+        members = [np.flatnonzero(owners == region) for region in range(MOST_REGIONS + 1)]
+        fixed = members.pop()
+        regions = [region for region in members if len(region)]
+        n_modes = None if meta.get("n_modes") is None else whole(meta, "n_modes", 1, MOST_MODES)
+        return Bound(regions, fixed if len(fixed) else None, n_modes) if regions else None
 
     def _listen(self, mode: str, work: Callable[[], Any]) -> Any:
         """Do some work, and keep what it warns of for the page."""
@@ -476,40 +536,70 @@ class Workspace:
         self._warnings += [str(warning.message) for warning in heard]
         return result
 
+    def _undo(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+        if not self.history.place:
+            raise RequestError("There must be an edit to undo; there is none.")
+        self.history.go(self.history.place - 1)
+
+    def _redo(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+        if self.history.place == len(self.history.moments) - 1:
+            raise RequestError("There must be an undone edit to redo; there is none.")
+        self.history.go(self.history.place + 1)
+
+    def _go(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+        """Go to a place of the history."""
+        self.history.go(whole(meta, "place", 0, len(self.history.moments) - 1))
+
+    def _select(self, meta: dict[str, Any], arrays: Arrays) -> None:
+        """Take the region of each vertex."""
+        if "regions" not in arrays:
+            raise RequestError("The call must have an array 'regions'.")
+        self.history.select(arrays["regions"], str(meta.get("text", "Select"))[:60])
+
+    def _choose(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+        """Show a shape of the list."""
+        number = meta.get("shape")
+        shapes = self.history.shapes
+        if not isinstance(number, int) or number not in shapes:
+            raise RequestError(f"shape must be one of {[*shapes]}; it is {number!r:.80}.")
+        self.history.choose(shapes[number])
+
     def _cancel(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
         self.bound = None
-        self._require_session().cancel()
+        self._session().cancel()
 
-    def _reset(self, _meta: dict[str, Any], _arrays: Arrays) -> np.ndarray:
-        session = self._require_session()
-        session.cancel()
-        while session.edits:
-            session.undo()
-        return self._posed(session.mesh)
+    def _reset(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+        self.history.did("All undone", pose=self.history.now.shape.rest)
 
-    def _replay(self, meta: dict[str, Any], arrays: Arrays) -> np.ndarray:
+    def _replay(self, meta: dict[str, Any], arrays: Arrays) -> None:
         """Apply stored edits; of another mesh of the shape if the array `source` holds its file."""
-        self._require_session()
+        rig = self._rig_at_rest()
         source = None
         if "source" in arrays:
-            source = self._surface_of(str(meta.get("source")), _bytes(arrays, "source"))
+            source = self._surface_of(str(meta.get("source")), file_bytes(arrays, "source"))
         with TemporaryDirectory() as folder:
             path = Path(folder, "edits.json")
             path.write_text(json.dumps(meta.get("edits")))
-            edits = es.io.read_edits(path, source or self.analysis.mesh)
-        self.session = es.deformation.replay(self._rig_at_rest(), edits, source=source)
-        return self._posed(self.session.mesh)
+            try:
+                edits = es.io.read_edits(path, source or self.analysis.mesh)
+            except es.InvalidParameterError as error:
+                raise RequestError(
+                    "These edits were made on another mesh than that of this shape. To carry them "
+                    "over, choose its file together with the edits."
+                ) from error
+        session = es.deformation.replay(rig, edits, source=source)
+        self.history.replace_edits(session.edits, session.mesh, "Load edits")
 
     def _repair(self, meta: dict[str, Any], _arrays: Arrays) -> None:
         """Repair the shape in its present pose, which becomes the shape."""
         names = meta.get("names")
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise RequestError("names must be a list of the names of repairs.")
-        done, side = es.repair(self.mesh, names), self.analysis.side
-        kept = self.attributes and replace(self.attributes, mesh=self.mesh)
-        self._show(done.mesh, self.analysis.name)
-        self.attributes = kept and es.io.carry_attributes(kept, done.mesh)
-        self.analysis.look_from(*side)
+        done, kept = es.repair(self.mesh, names), self.attributes
+        if kept is not None:
+            kept = es.io.carry_attributes(replace(kept, mesh=self.mesh), done.mesh)
+        loaded = Loaded(done.mesh, kept, side=self.analysis.side)
+        self.history.show(loaded, self.analysis.name, f"Repair: {', '.join(names)}")
         self._warnings += done.report
 
     def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
@@ -519,7 +609,7 @@ class Workspace:
             self._show(self._require_shelf().mesh(name), name)
             return
         name = display_name(meta.get("name"))
-        self._show(self._surface_of(name, _bytes(arrays, "file")), name)
+        self._show(self._surface_of(name, file_bytes(arrays, "file")), name)
 
     def _surface_of(self, name: str, data: bytes) -> es.TriangleMesh:
         """Read a file from outside; what had to be made of points is told with the answer."""
@@ -533,36 +623,16 @@ class Workspace:
 
     def _transfer(self, meta: dict[str, Any], arrays: Arrays) -> None:
         """Bend another shape as this one was bent; the result becomes the shape."""
-        session = self._require_session()
         name = display_name(meta.get("name"))
-        target = self._surface_of(name, _bytes(arrays, "file"))
+        target = self._surface_of(name, file_bytes(arrays, "file"))
         source = self.analysis.mesh
         pairs = arrays["pairs"].astype(np.int64) if "pairs" in arrays else None
-        bent = carry_pose(source, session.mesh, target, pairs)
+        bent = carry_pose(source, self.mesh, target, pairs)
         self._show(bent, name)
 
     def _show(self, mesh: es.TriangleMesh, name: str) -> None:
-        """Replace the shape; the one before is kept with its edits, to return to."""
-        self.analysis.cancel()
-        self._before = {name: getattr(self, name) for name in OF_A_SHAPE}
-        self.analysis = Analysis(mesh, name)
-        self.session, self.bound, self.mode, self.fields = None, None, "graded", {}
-        self.attributes = None
-        self.pose += 1
-        self.shape += 1
-
-    def _swap(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
-        """Return to the shape before, and keep the present one in its place."""
-        if self._before is None:
-            raise RequestError("There must be a shape before this one; nothing was opened yet.")
-        self.analysis.cancel()
-        present = {name: getattr(self, name) for name in OF_A_SHAPE}
-        self.__dict__.update(self._before)
-        self._before = present
-        self.analysis = self.analysis.resume()
-        self.bound = None
-        self.pose += 1
-        self.shape += 1
+        """Show another shape; those before stay in the list, with their edits."""
+        self.history.show(Loaded(mesh), name, f"Open {name}")
 
     def call_query(self, meta: dict[str, Any], arrays: Arrays) -> Reply:
         """Search an index for shapes like the present one, or like that of a file."""
@@ -571,7 +641,7 @@ class Workspace:
         mesh = self.mesh
         report: tuple[str, ...] = ()
         if "file" in arrays:
-            surface = parse_surface(display_name(meta.get("name")), _bytes(arrays, "file"))
+            surface = parse_surface(display_name(meta.get("name")), file_bytes(arrays, "file"))
             mesh, report = surface.mesh, surface.report
         found = shelf.query(mesh, n_matches)
         found[0]["warnings"] = list(report)
@@ -594,21 +664,6 @@ class Workspace:
 def error_message(kind: str, text: str) -> bytes:
     """Return the message that answers a call which failed."""
     return encode({"error": {"kind": kind, "message": text}})
-
-
-def whole(meta: dict[str, Any], name: str, low: int, high: int, default: int | None = None) -> int:
-    """Return a whole number of a call; `default` is its value if it is missing.
-
-    Raises
-    ------
-    RequestError
-        If it is not in low..high.
-    """
-    value = meta.get(name)
-    value = default if value is None else value
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise RequestError(f"{name} must be a whole number in {low}..{high}; it is {value!r:.80}.")
-    return value
 
 
 def handle_from(entry: Any) -> es.types.Handle:
@@ -636,37 +691,6 @@ def _rim_center(mesh: es.TriangleMesh, region: np.ndarray) -> list[float]:
     rim = es.deformation.region_boundary(mesh, es.deformation.region_mask(mesh, region))
     center: list[float] = mesh.vertices[rim if len(rim) else region].mean(axis=0).tolist()
     return center
-
-
-def _bytes(arrays: Arrays, name: str) -> bytes:
-    if name not in arrays or arrays[name].dtype != np.uint8 or arrays[name].ndim != 1:
-        raise RequestError(f"The call must have an array {name!r} with the bytes of a file.")
-    return arrays[name].tobytes()
-
-
-def is_field(values: np.ndarray, n_vertices: int) -> bool:
-    """Tell whether the page can draw a function: a number or NaN at each vertex, and not NaN at all."""
-    return (
-        values.shape == (n_vertices,) and not np.isinf(values).any() and not np.isnan(values).all()
-    )
-
-
-def _fields(values: Mapping[str, Any], n_vertices: int) -> dict[str, Field]:
-    """Return the functions that were passed, checked."""
-    fields = {}
-    for title, given in values.items():
-        numbers = np.asarray(given, dtype=np.float64)
-        if not is_field(numbers, n_vertices):
-            raise es.InvalidParameterError(
-                f"values must hold one finite number for each of the {n_vertices} vertices, or NaN "
-                f"where there is none, and at least one number; {title!r} has the shape "
-                f"{numbers.shape}, {np.isfinite(numbers).sum()} finite numbers and "
-                f"{np.isinf(numbers).sum()} infinite ones."
-            )
-        # "height (m)" is a title with its unit.
-        text, _, unit = str(title).removesuffix(")").partition(" (")
-        fields[str(title).replace("/", " ")] = Field(numbers, text, unit)
-    return fields
 
 
 def _field_facts(name: str, field: Field) -> dict[str, Any]:

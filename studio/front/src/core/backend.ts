@@ -22,8 +22,8 @@ export interface State {
   up: Vec3;
   towards: Vec3; // the viewer
   capabilities: string[]; // rig, finish, query, open, repair, solve
-  suffixes: string;
-  most_bytes: number; // of a file // of the files that can be opened, as a file dialog takes them
+  suffixes: string; // of the files that can be opened, as a file dialog takes them
+  most_bytes: number; // of a file
   health: {
     status: Progress["status"]; // all else is null or empty until it is ready
     area: number;
@@ -35,9 +35,14 @@ export interface State {
   values: { name: string; title: string; unit: string; min: number; max: number }[];
   spectrum: Progress & { k: number; certificate: string; complete: boolean };
   parts: Progress & { n_regions: number; levels: (number | null)[] }; // null: without end
-  deformation: Progress & { n_edits: number; n_redoable: number };
+  deformation: Progress & { n_edits: number };
   index: { path: string; n_shapes: number } | null;
-  pose: number; // counts the poses of the shape, and the shapes
+  shapes: [number, string][]; // numbers and names of those that can be chosen
+  history: string[]; // what the hand did, oldest first
+  place: number; // how much of it stands; the rest was undone
+  digest: string; // tells the mesh at rest from all others
+  selected: number; // tells the present regions from others; 0: none
+  pose: number; // tells the pose from others of the shape, and the shape from others
   shape: number;
 }
 
@@ -45,12 +50,16 @@ export interface State {
 export interface Change {
   kind: string;
   handles?: Handle[];
+  n_modes?: number | null;
   mode?: string;
   edits?: unknown;
   source?: string;
   names?: string[];
   k?: number;
   name?: string;
+  text?: string; // what the hand did
+  place?: number;
+  shape?: number;
 }
 export interface Finished {
   state: State;
@@ -80,6 +89,7 @@ export interface Matches {
 }
 
 export interface Backend {
+  trouble(text: string | null): void; // says why calls wait; null: they are answered again
   meta(): Promise<State>;
   array<T extends TypedArray>(name: string, start?: number, stop?: number): Promise<T>;
   rig(request: RigRequest): Promise<RigAnswer>;
@@ -88,11 +98,12 @@ export interface Backend {
 }
 
 type Bytes = ArrayBuffer | ArrayBufferView;
-export type Send = (call: keyof Backend, message: Uint8Array<ArrayBuffer>) => Promise<Bytes>;
+type Call = Exclude<keyof Backend, "trouble">;
+export type Send = (call: Call, message: Uint8Array<ArrayBuffer>) => Promise<Bytes>;
 
 /** Return the five calls over any way to send a message and receive its answer. */
 export function backendOver(send: Send): Backend {
-  async function ask(call: keyof Backend, meta: unknown = {}, arrays: Arrays = {}) {
+  async function ask(call: Call, meta: unknown = {}, arrays: Arrays = {}) {
     const answer = decode(await send(call, encode(meta, arrays)));
     if (answer.meta.error) throw new Error(answer.meta.error.message); // of the library
     return answer;
@@ -100,12 +111,15 @@ export function backendOver(send: Send): Backend {
   // The library answers side by side, in any order. What changes its state is asked one after the
   // other: of two regions that are bound in a hurry, the last must be the one that moves.
   let last: Promise<unknown> = Promise.resolve();
-  function askInTurn(call: keyof Backend, meta: unknown, arrays?: Arrays) {
+  function askInTurn(call: Call, meta: unknown, arrays?: Arrays) {
     const answer = last.then(() => ask(call, meta, arrays));
     last = answer.catch(() => {}); // whoever asked hears of it
     return answer;
   }
+  const page = Math.random().toString(36).slice(2);
+  let number = 0;
   return {
+    trouble: () => {},
     meta: async () => (await ask("meta")).meta,
     array: async (name, start, stop) =>
       (await ask("array", { name, start, stop })).arrays[name] as any,
@@ -117,7 +131,9 @@ export function backendOver(send: Send): Backend {
       return { ...answer.meta, ...answer.arrays };
     },
     async finish(change, files) {
-      const answer = await askInTurn("finish", change, files);
+      // By its name the server knows a change that it has made already, if its answer was lost.
+      const id = `${page}-${number++}`;
+      const answer = await askInTurn("finish", { ...change, id }, files);
       return { ...answer.meta, ...answer.arrays };
     },
     async query(n_matches) {

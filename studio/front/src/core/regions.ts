@@ -5,7 +5,7 @@ export const FIXED = MAX_REGIONS; // number of the fixed vertices, after those o
 const FREE = FIXED + 1;
 
 export class Regions {
-  private owner: Uint8Array;
+  private owner: Uint8Array<ArrayBuffer>;
 
   constructor(nVertices: number) {
     this.owner = new Uint8Array(nVertices).fill(FREE);
@@ -37,13 +37,14 @@ export class Regions {
     this.remove(region, this.owner.keys());
   }
 
-  /** Return the regions as text for the storage of the tab: one digit a vertex. */
-  write(): string {
-    return this.owner.join("");
+  /** The region of each vertex, as the server keeps it. */
+  get owners(): Uint8Array<ArrayBuffer> {
+    return this.owner.slice();
   }
 
-  /** Take what `write` returned; text of another mesh is ignored. */
-  read(text: string): void {
-    if (text.length === this.owner.length) this.owner = Uint8Array.from(text, Number);
+  /** Take the region of each vertex; no numbers at all stand for no region. */
+  read(owners: Uint8Array): void {
+    if (owners.length) this.owner.set(owners);
+    else this.owner.fill(FREE);
   }
 }

@@ -16,6 +16,7 @@ export async function inlineBackend(script: HTMLElement): Promise<Backend> {
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const { meta, arrays } = decode(await new Response(stream).arrayBuffer());
   return {
+    trouble: () => {},
     meta: async () => meta,
     async array(name, start, stop) {
       const whole = arrays[name];

@@ -36,6 +36,7 @@ export class ShapePanel extends ColoringPanel {
 
   override refresh(state: State): void {
     const { health, values } = state;
+    this.listShapes(state);
     const select = this.form.get<HTMLSelectElement>("values");
     const names = values.map(({ name }) => name).join();
     if (names !== select.dataset.names) {
@@ -51,6 +52,18 @@ export class ShapePanel extends ColoringPanel {
     const lines = health.lines.map(([kind, text]) => h("li", { class: kind }, text));
     this.form.get("health").replaceChildren(...lines, ...this.buildRepairs(state));
     super.refresh(state);
+  }
+
+  /** List the shapes that were opened, if there are several, to choose from. */
+  private listShapes({ shapes, shape }: State): void {
+    const buttons = shapes.map(([number, name]) => {
+      const click = () => this.app.change({ kind: "choose", shape: number }, `Showing ${name}`);
+      const attributes = { type: "button", "data-test": `shape-${number}`, title: name, click };
+      return h("button", { ...attributes, "aria-pressed": String(number === shape) }, name);
+    });
+    const list = this.form.get("shapes");
+    list.hidden = shapes.length < 2;
+    list.replaceChildren(...buttons);
   }
 
   /** Return a line with a button for each repair that would help. */

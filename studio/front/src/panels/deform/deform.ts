@@ -2,7 +2,7 @@
 
 import type { Panel, Studio } from "../../app";
 import type { State } from "../../core/backend";
-import { Form } from "../../core/dom";
+import { Form, h } from "../../core/dom";
 import type { MotionKind } from "../../core/tools";
 import markup from "./deform.html?raw";
 import { replayFile, transferToFile } from "./files";
@@ -72,8 +72,12 @@ export class DeformPanel implements Panel {
     form.progress("rig-progress", deformation);
     form.get("reset").disabled = !deformation.n_edits;
     this.showSteps();
+    this.showHistory(state);
     const pose = `${state.shape} ${state.pose} ${deformation.status}`;
-    if (pose === this.pose) return selection.showFoundParts();
+    if (pose === this.pose) {
+      selection.takeRegions(state).catch((error) => this.app.fail(error));
+      return selection.showFoundParts();
+    }
     if (!this.pose.startsWith(`${state.shape} `)) {
       selection.startShape(state);
       motion.startShape();
@@ -82,6 +86,7 @@ export class DeformPanel implements Panel {
     selection.crossing = [];
     motion.startPose();
     selection.paint();
+    selection.takeRegions(state).catch((error) => this.app.fail(error));
     motion.bind();
     if (form.get("skeleton").checked) this.showSkeleton();
     if (form.get("crossings").checked) this.showCrossings();
@@ -115,8 +120,9 @@ export class DeformPanel implements Panel {
   private showTools(): void {
     const { active, form, tool } = this;
     form.press("tool", tool);
-    form.text("hint", form.get(`tool-${tool}`).dataset.hint!);
     const selects = SELECTORS.includes(tool);
+    const missing = selects ? null : this.motion.missing;
+    form.text("hint", missing ?? form.get(`tool-${tool}`).dataset.hint!);
     if (!active) this.app.viewer.setPointer();
     this.motion.show(selects ? null : (tool as MotionKind), active);
     this.selection.show(selects ? (tool as Selector) : null, active);
@@ -125,6 +131,22 @@ export class DeformPanel implements Panel {
   private showSteps(): void {
     for (const kind of ["undo", "redo"] as const)
       this.form.get(kind).disabled = !this.app.can(kind);
+  }
+
+  /** List what the hand did, to return to by a click. */
+  private showHistory({ history, place }: State): void {
+    const list = this.form.get("history");
+    const version = [place, history.length, history.at(-1)].join(" ");
+    if (version === list.dataset.version) return;
+    list.dataset.version = version;
+    const buttons = ["Start", ...history].map((text, number) => {
+      const click = () => this.app.change({ kind: "go", place: number }, "Returning");
+      const present = number === place ? "step" : "false";
+      const attributes = { type: "button", click, "aria-current": present };
+      return h("button", { ...attributes, class: number > place ? "undone" : "" }, text);
+    });
+    list.replaceChildren(...buttons.map((button) => h("li", {}, button)));
+    list.scrollTop = buttons[place]!.offsetTop - list.clientHeight / 2;
   }
 
   private clear(): void {

@@ -58,6 +58,15 @@ export class Motion {
     return this.form.get("several").checked;
   }
 
+  /** What has to come before a motion, as a sentence. */
+  get missing(): string | null {
+    const { status } = this.app.state.deformation;
+    if (!this.selection.regions.vertices(this.selection.region).length)
+      return "Choose a region first: paint on the shape, draw a box, or click a part.";
+    if (status === "running") return "The shape is still being prepared; then the region can move.";
+    return null;
+  }
+
   get ready(): boolean {
     return this.form.root.dataset.ready === "true";
   }
@@ -121,7 +130,8 @@ export class Motion {
   }
 
   private change(kind: "preview" | "commit"): Change {
-    return { kind, handles: this.rowHandles(), mode: this.form.get("mode").value };
+    const n_modes = this.form.number("n-modes") || null;
+    return { kind, handles: this.rowHandles(), mode: this.form.get("mode").value, n_modes };
   }
 
   /** Show a motion by shares at once, and the exact result when the pointer rests. */
@@ -169,8 +179,8 @@ export class Motion {
     const kind = this.form.get<HTMLSelectElement>("exact-kind").selectedIndex;
     const amount = this.form.number("exact-amount");
     const { region } = this.selection;
-    if (!this.ready || !this.rows.includes(region))
-      return this.app.say("Choose a region first: paint on the shape, or draw a box around it.");
+    if (this.missing) return this.app.say(this.missing);
+    if (!this.ready || !this.rows.includes(region)) return;
     if (!amount) return this.app.say("Write by how much it should move.");
     const axis = AXES.map((each) => Number(each === kind % 3)) as Vec3;
     const pivot = this.pivotOf(region);

@@ -14,14 +14,9 @@ const CROSSING = "#d8301f";
 const TINT = 190; // of 255: how strongly a region covers the colors below
 const AXES = [0, 1, 2];
 
-export type Selector = "box" | "brush" | "part";
+const NOTHING = { status: "none", progress: 0, message: "" } as const; // that is awaited
 
-/** What of the selection survives a reload, for the shape of this number. */
-interface Kept {
-  shape: number;
-  text: string; // of the regions
-  region: number;
-}
+export type Selector = "box" | "brush" | "part";
 
 export interface SelectionEvents {
   changing(): void; // the regions are no longer those that are bound
@@ -36,8 +31,10 @@ export class Selection {
   private readonly ring = h("div", { class: "ring", hidden: true });
   private tool: Selector | null = null; // that has the pointer
   private visible = false;
-  private kept = ""; // the regions after the last selection, as text
+  private known = 0; // the number by which the server knows the regions
+  private sending = 0; // selections of which the server has not heard yet
   private labels: Int32Array | null = null; // part of each vertex
+  private awaited: [Hit, PointerEvent] | null = null; // a click before the parts were found
   private painting: Promise<void> = Promise.resolve(); // discs of the brush, one after the other
 
   constructor(
@@ -49,7 +46,7 @@ export class Selection {
     this.box = new BoxTool(
       viewer,
       () => this.boxMoved(),
-      () => this.selected(),
+      () => this.selected("Box"),
     );
     viewer.stage.append(this.ring);
     viewer.canvas.addEventListener("pointermove", (event) => this.moveRing(event));
@@ -72,16 +69,12 @@ export class Selection {
     return h("input", { type: "number", step: "any", ...labels, change: () => this.readBox() });
   }
 
-  /** Begin with a new shape: without regions, or with those of before a reload. */
-  startShape({ shape, n_vertices, up }: State): void {
+  /** Begin with a new shape, without regions. */
+  startShape({ n_vertices, up }: State): void {
     this.regions = new Regions(n_vertices);
-    this.labels = null;
-    const kept = this.app.settings.get<Kept | null>("regions", null);
-    if (kept?.shape === shape) {
-      this.regions.read(kept.text);
-      this.region = kept.region;
-    }
-    this.kept = this.regions.write();
+    this.labels = this.awaited = null;
+    this.known = 0;
+    this.region = this.app.settings.get("region", 0);
     this.form.press("region", String(this.region));
     // The first box holds what is above the middle, and nothing touches its other sides.
     const { box, extent } = this.app.viewer;
@@ -93,22 +86,42 @@ export class Selection {
     this.writeBox();
   }
 
+  /** Take the regions of the server if they are others: after undo, or when the page is loaded. */
+  async takeRegions({ selected, shape }: State): Promise<void> {
+    if (this.sending || selected === this.known) return;
+    this.known = selected;
+    const owners = await this.app.backend.array<Uint8Array>("regions");
+    if (this.sending || this.app.state.shape !== shape) return;
+    this.regions.read(owners);
+    this.paint();
+    this.events.selected();
+  }
+
   /** Show the parts if they were awaited, and are ready now. */
   showFoundParts(): void {
-    const ready = this.app.state.parts.status === "ready";
-    if (this.tool === "part" && !this.labels && ready) this.loadParts();
+    this.showFinding();
+    const { status } = this.app.state.parts;
+    if (this.tool === "part" && !this.labels && (status === "ready" || status === "none"))
+      this.loadParts();
+  }
+
+  /** Show how far the parts are, if they are awaited. */
+  private showFinding(): void {
+    this.form.progress("finding", this.tool === "part" ? this.app.state.parts : NOTHING);
   }
 
   chooseRegion(region: number): void {
     this.region = region;
     this.form.press("region", String(region));
-    this.remember();
+    this.app.settings.set("region", region);
+    this.paint();
   }
 
   /** A box that has just been chosen selects what is in it. */
   startBox(): void {
-    if (!this.regions.vertices(this.region).length) this.boxMoved();
-    this.selected();
+    if (this.regions.vertices(this.region).length) return this.events.selected();
+    this.boxMoved();
+    this.selected("Box");
   }
 
   /** Show the options of a selector, and give it the pointer if the panel is seen. */
@@ -120,6 +133,7 @@ export class Selection {
     form.get("radius").hidden = tool !== "brush";
     form.get("parts-slider").hidden = tool !== "part" || !labels;
     this.showRadius();
+    this.showFinding();
     this.ring.hidden = true;
     this.box.show(this.tool === "box");
     if (this.tool === "box") viewer.setPointer("grab", null, this.box);
@@ -148,28 +162,23 @@ export class Selection {
 
   clear(): void {
     this.regions.clear(this.region);
-    this.selected();
+    this.selected("Clear");
   }
 
-  private remember(): void {
-    const text = this.regions.write();
-    const kept: Kept = { shape: this.app.state.shape, text, region: this.region };
-    this.app.settings.set("regions", kept);
+  /** A selection has ended: the server keeps it, and then the regions can be bound. */
+  private selected(text: string): void {
+    const { app, region } = this;
+    const place = region === FIXED ? "fixed" : `region ${region + 1}`;
     this.paint();
-  }
-
-  /** A selection has ended: keep it, and let the regions be bound. */
-  private selected(): void {
-    const [before, after] = [this.kept, this.regions.write()];
-    if (after !== before)
-      this.app.history.did({ undo: () => this.select(before), redo: () => this.select(after) });
-    this.select(after);
-  }
-
-  private select(kept: string): void {
-    this.kept = kept;
-    this.regions.read(kept);
-    this.remember();
+    this.sending += 1;
+    app
+      .change({ kind: "select", text: `${text}: ${place}` }, "", { regions: this.regions.owners })
+      .then((done) => {
+        this.sending -= 1;
+        if (done) this.known = app.state.selected;
+        return this.takeRegions(app.state);
+      })
+      .catch((error) => app.fail(error));
     this.events.selected();
   }
 
@@ -198,7 +207,7 @@ export class Selection {
     if (!low.every((value, axis) => value <= high[axis]!)) return;
     this.box.set(low, high);
     this.boxMoved();
-    this.selected();
+    this.selected("Box");
   }
 
   private showRadius(): void {
@@ -225,7 +234,7 @@ export class Selection {
   private readonly brush: PointerTool = {
     down: (event) => this.stroke(event),
     move: (event) => void this.stroke(event),
-    up: () => this.painting.then(() => this.selected()),
+    up: () => this.painting.then(() => this.selected("Brush")),
   };
 
   private stroke(event: PointerEvent): boolean {
@@ -262,14 +271,19 @@ export class Selection {
     if (this.tool !== "part") return;
     this.form.get("parts-slider").hidden = false;
     viewer.setLabels(this.labels, partColors(levels.length));
+    if (this.awaited) this.pickPart(...this.awaited);
+    this.awaited = null;
   }
 
-  private pickPart({ vertex }: Hit, { shiftKey }: PointerEvent): void {
-    if (!this.labels) return this.app.say("The parts are still being found …");
-    const part = this.labels[vertex];
+  private pickPart(hit: Hit, event: PointerEvent): void {
+    if (!this.labels) {
+      this.awaited = [hit, event];
+      return this.app.say("The parts are being found; then the part that you clicked is chosen.");
+    }
+    const part = this.labels[hit.vertex];
     const vertices = [...this.labels.keys()].filter((each) => this.labels![each] === part);
-    if (shiftKey) this.regions.remove(this.region, vertices);
+    if (event.shiftKey) this.regions.remove(this.region, vertices);
     else this.regions.add(this.region, vertices);
-    this.selected();
+    this.selected("Part");
   }
 }

@@ -1,0 +1,66 @@
+"""What the studio shows at first: files, the files of a folder, the shapes of an index, or a creature."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import eigenshape as es
+from eigenshape_studio.history import Shape
+from eigenshape_studio.loading import load_file
+from eigenshape_studio.workspace import Workspace
+
+MOST_LISTED = 500  # shapes that stand in the list of the page
+
+
+def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = None) -> Workspace:
+    """Return what new tabs show; what is computed of its first shape is shared.
+
+    Parameters
+    ----------
+    paths : sequence of paths
+        Files, folders of files, or the folder of an index. The first shape is shown, and the others
+        can be chosen from a list. Without any, that is a creature which the library makes.
+    index : path, optional
+        Folder of an index to search in; by default the first one among the paths.
+
+    Raises
+    ------
+    FileFormatError
+        If the first shape cannot be read.
+    InvalidParameterError
+        If a folder has no shape.
+    """
+    found: list[tuple[str, Path]] = []
+    for one in paths:
+        path = Path(one).absolute()
+        held = _index_in(path) if path.is_dir() else None
+        if held is not None:
+            index = index or path
+            found += _files_of(held)
+        elif path.is_dir():
+            found += [(item.name, item.path.absolute()) for item in es.io.find_items(path)]
+        else:
+            found.append((path.name, path))
+    if not found:
+        creature = es.make_creature("quadruped", n_vertices=2500)
+        return Workspace(creature, "quadruped", index=index, shared=True)
+    # All tabs share what is computed of the first one; of the others each tab has its own.
+    listed = [
+        Shape(number, name, partial(load_file, path), path=str(path), shared=number == 0)
+        for number, (name, path) in enumerate(found[:MOST_LISTED])
+    ]
+    return Workspace(listed, index=index, shared=True)
+
+
+def _index_in(folder: Path) -> es.ShapeIndex | None:
+    """Return the index in a folder, if there is one."""
+    try:
+        return es.ShapeIndex.open(folder)
+    except es.StoreError:
+        return None
+
+
+def _files_of(index: es.ShapeIndex) -> list[tuple[str, Path]]:
+    """Return names and files of the shapes of an index whose files are still there."""
+    named = [(record.name, record.source) for record in index.records()]
+    return [(name, Path(source)) for name, source in named if source and Path(source).exists()]
