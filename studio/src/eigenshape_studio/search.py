@@ -61,7 +61,7 @@ class Shelf:
         """
         part, numbers = mesh, np.arange(mesh.n_vertices)
         if region is not None:
-            inside: np.ndarray = np.isin(mesh.faces, region).all(axis=1)
+            inside = np.asarray(np.isin(mesh.faces, region).all(axis=1))
             if not inside.any():
                 raise RequestError("The part must have a face; paint a larger one.")
             part, numbers = submesh(mesh, inside)
