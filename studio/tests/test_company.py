@@ -128,16 +128,16 @@ def test_a_correction_is_made_and_taken_back(poses):
     beside = Beside(part, whole, "other", 1, first)
     assert beside.job.wait(10)
     near = int(np.argsort(np.linalg.norm(whole.vertices - whole.vertices[7], axis=1))[4])
-    beside.correct(np.array([7, near], "<u4"))
+    beside.correct(beside.check_pairs(np.array([7, near], "<u4")))
     assert beside.job.wait(60)
     assert beside.array("partners/0")[7] == near
     assert beside.facts()["pairs"] == [[7, near]]
-    beside.correct(np.empty(0, "<u4"))
+    beside.correct(beside.check_pairs(np.empty(0, "<u4")))
     assert beside.job.wait(10)
     assert beside.require_map() is first
     for pairs, reason in (([7], "pairs of vertices"), ([7, 500], r"pair 0 is \[7, 500\]")):
         with pytest.raises(RequestError, match=reason):
-            beside.correct(np.array(pairs, "<u4"))
+            beside.check_pairs(np.array(pairs, "<u4"))
     bent = beside.take_pose()
     np.testing.assert_array_equal(bent.faces, part.faces)
     away = np.linalg.norm(bent.vertices - whole.vertices, axis=1)
@@ -167,7 +167,7 @@ def test_landmarks_are_placed_saved_and_loaded():
         "finish", kind="open", name="b.ply", _arrays={"file": file_of(es.icosphere(1))}
     )
     assert two_shapes[0]["state"]["landmarks"] == []  # those of the other shape
-    assert page.call("finish", kind="swap")[0]["state"]["landmarks"] == again
+    assert page.call("finish", kind="choose", shape=0)[0]["state"]["landmarks"] == again
 
 
 WRONG = [
@@ -249,7 +249,7 @@ def test_a_collection_opens_with_its_mean_modes_and_specimens(collection):
     )
     pairs = {"pairs": np.array([0, 1], "<u4")}
     assert "kept as it is" in page.error("finish", kind="correct", _arrays=pairs)["message"]
-    state = page.call("finish", kind="specimen", name="c")[0]["state"]
-    assert (state["name"], state["collection"]["is_mean"]) == ("c", False)
-    assert page.call("finish", kind="specimen")[0]["state"]["collection"]["is_mean"]
+    state = page.call("finish", kind="choose", shape=1)[0]["state"]
+    assert (state["name"], state["collection"]["is_mean"]) == ("b", False)
+    assert page.call("finish", kind="mean")[0]["state"]["collection"]["is_mean"]
     first.close()

@@ -215,7 +215,7 @@ class History:
         *,
         pose: Pose | None = None,
         regions: bytes | None = None,
-        **changed: object,
+        **changed: Any,
     ) -> None:
         """Note a new state; those that were undone before it are forgotten.
 
