@@ -12,7 +12,7 @@ from eigenshape.matching.spectral_refinement import corners_of_faces
 from eigenshape_studio.beside import Beside
 from eigenshape_studio.calls import RequestError
 from eigenshape_studio.mapping import NEAR, correct_map, map_of_match
-from eigenshape_studio.server import _first_workspace
+from eigenshape_studio.opening import open_workspace
 from eigenshape_studio.workspace import Workspace
 
 
@@ -226,7 +226,7 @@ def collection(tmp_path_factory):
 
 
 def test_a_collection_opens_with_its_mean_modes_and_specimens(collection):
-    first = _first_workspace(collection, None)
+    first = open_workspace([collection])
     page = Page(first.fork())
     state = page.call("meta")[0]
     assert "collection" in state["capabilities"]

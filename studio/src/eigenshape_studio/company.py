@@ -94,11 +94,15 @@ class Company:
                 self._beside = None
                 return None
             mesh, second = now.shape.mesh, shapes[now.beside]
+            try:
+                other = second.mesh
+            except (es.EigenshapeError, OSError):  # its file has gone, or changed
+                return None
             kept = self._beside
             if kept is None or kept.meshes[0] is not mesh or kept.number != second.number:
                 self.close()
                 known = self._known_map(mesh, second)
-                kept = Beside(mesh, second.mesh, second.name, second.number, known)
+                kept = Beside(mesh, other, second.name, second.number, known)
                 self._beside = kept
             kept.correct(np.frombuffer(now.pairs, dtype=np.int64).reshape(-1, 2))
             return kept
