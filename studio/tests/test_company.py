@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from conftest import stretched_ball
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 from test_workspace import Page, file_of
 
 import eigenshape as es
@@ -98,6 +99,10 @@ def test_a_scan_is_mapped_to_the_whole_from_the_page(poses):
     near = scan.mesh.vertices[page.array("landmarks/1/vertices")[0]]
     goal = scan.mesh.vertices[np.flatnonzero(scan.source_vertices == seen)[0]]
     assert np.linalg.norm(near - goal) < 0.1 * np.sqrt(es.geometry.surface_area(whole))
+    # What the scanner did not see has no place there.
+    hidden = whole.vertices[np.flatnonzero(back < 0)[:1]]
+    page.call("finish", kind="landmarks", names=["far"], _arrays={"points": hidden.ravel()})
+    assert page.array("landmarks/1/vertices").tolist() == [-1]
     assert "whole first shape" in page.error("finish", kind="pose")["message"]
     assert "of sides 0 and 1" in page.error("array", name="beside/colors/2")["message"]
     found, _ = page.call("finish", kind="beside", close=True)
@@ -120,6 +125,17 @@ def test_points_given_by_hand_move_what_is_around_them(poses):
     assert (after.placed[0].confidence[feet] == 1).all()
     # Where the map has moved nothing was measured.
     assert set(np.round(after.placed[0].confidence, 3)) <= {0.5, 0.9, 1.0}
+
+
+def test_what_lies_elsewhere_is_seen_from_the_same_side(poses):
+    part = poses[0]
+    turn = Rotation.from_rotvec([0.3, 2.0, -0.5]).as_matrix()
+    whole = es.TriangleMesh(3 * part.vertices @ turn.T + [1, 2, 3], part.faces)
+    found = map_of_match(part, whole, match_of(whole, np.arange(part.n_vertices)))
+    beside = Beside(part, whole, "turned", 1, found)
+    assert beside.job.wait(10)
+    np.testing.assert_allclose(np.reshape(beside.facts()["turn"], (3, 3)), turn, atol=1e-12)
+    np.testing.assert_allclose(beside.carry(part.vertices[:3]), whole.vertices[:3], atol=1e-9)
 
 
 def test_a_correction_is_made_and_taken_back(poses):

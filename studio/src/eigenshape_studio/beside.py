@@ -102,6 +102,7 @@ class Beside:
             "n_faces": self.meshes[1].n_faces,
             **self._view,
             "map": NO_JOB if self.job is None else self.job.facts(),
+            "turn": None if found is None else self._turn(found),
             "lines": [] if found is None else self._describe(found),
             "pairs": self.pairs.tolist(),
         }
@@ -178,10 +179,17 @@ class Beside:
         ordered = pairs[:, ::-1] if self._flipped else pairs
         return correct_map(first, first.match, ordered, progress)
 
+    def _turn(self, found: DenseMap) -> list[float]:
+        """Return the rotation from the first shape to the second, row by row."""
+        turn = found.turn()
+        return (turn.T if self._flipped else turn).ravel().tolist()
+
     def _describe(self, found: DenseMap) -> list[str]:
         """Return what a person should know of the map, in sentences."""
         sure = found.placed[0].confidence >= SURE
-        lines = [f"{sure.mean():.0%} of the vertices are placed with a confidence of 50 % or more."]
+        lines = [
+            f"{100 * sure.mean():.0f} % of the vertices are placed with a confidence of 50 % or more."
+        ]
         match = found.match
         if match is None:
             return lines

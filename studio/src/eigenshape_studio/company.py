@@ -190,7 +190,12 @@ class Company:
             beside = self._require_beside()
             mesh = beside.meshes[1]
             points = beside.carry(self.landmarks.points(self._of.analysis.mesh))
-        if what == "vertices":
-            placed, _ = place_landmarks(mesh, self.landmarks.names, points)
-            return placed.vertices(mesh).astype("<u4")
+        if what == "vertices":  # -1 where nothing corresponds
+            vertices = np.full(len(points), -1, dtype="<i4")
+            known = np.isfinite(points).all(axis=1)
+            if known.any():
+                there = es.geometry.closest_points(mesh, points[known])
+                rows = mesh.faces[there.simplices]
+                vertices[known] = rows[np.arange(len(rows)), there.weights.argmax(axis=1)]
+            return vertices
         return landmark_file(self.landmarks.names, points, what)

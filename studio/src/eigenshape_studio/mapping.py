@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import eigenshape as es
+from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, refine_places
 from eigenshape_studio.jobs import Progress
 from eigenshape_studio.search import color_places
@@ -12,6 +13,9 @@ from eigenshape_studio.search import color_places
 # A point of the whole farther than this share of its √area from the image of the part has no partner:
 # the distance that the confidence of a match is about.
 NEAR = 0.05
+LEAST_WEIGHT = (
+    1e-3  # of a place that is not sure at all, where no other tells how shapes are turned
+)
 GRAY = 150  # of 255: what fades to gray may be anywhere
 # A correction keeps what agrees with the points given by hand: their distances along both surfaces
 # differ by no more than NEAR; or this share of the map, if less agrees, as between individuals.
@@ -60,12 +64,27 @@ class DenseMap:
     match: es.matching.ShapeMatch | None = None
 
     def carry(self, side: int, points: np.ndarray) -> np.ndarray:
-        """Return the points of the other shape's surface that correspond to points of one's surface."""
+        """Return the points of the other shape's surface that correspond to points of one's surface.
+
+        Where nothing corresponds they are NaN.
+        """
         mesh, other = self.meshes[side], self.meshes[1 - side]
         there = es.geometry.closest_points(mesh, points)
         corners = mesh.faces[there.simplices]
         images = np.einsum("pc,pcd->pd", there.weights, self.placed[side].points[corners])
-        return es.geometry.closest_points(other, images).points
+        found = es.geometry.closest_points(other, images).points.copy()
+        found[(self.placed[side].partners[corners] < 0).all(axis=1)] = np.nan
+        return found
+
+    def turn(self) -> np.ndarray:
+        """Return the rotation that takes directions of the part to those of the whole."""
+        ours, theirs = self.meshes[0].vertices, self.placed[0].points
+        sure = self.placed[0].confidence[:, None] + LEAST_WEIGHT
+        center, center_there = (
+            (points * sure).sum(axis=0) / sure.sum() for points in (ours, theirs)
+        )
+        product = ((theirs - center_there) * sure).T @ (ours - center)
+        return nearest_rotations(product[None])[0]
 
     def colors(self) -> tuple[np.ndarray, np.ndarray]:
         """Return red, green, blue of the vertices of both: equal where they correspond.

@@ -58,6 +58,7 @@ export interface Second {
   up: Vec3;
   towards: Vec3;
   map: Progress;
+  turn: number[] | null; // rotation from the shape to this one by the map, row by row
   lines: string[]; // what is known of the map
   pairs: [number, number][]; // vertices of both that correspond, by hand
 }

@@ -29,6 +29,7 @@ export class Beside {
   private readonly watch: ResizeObserver;
   private seats: [Seat, Seat] | null = null;
   private following = false;
+  private turn: three.Matrix4 | null = null; // from the first shape to the second, if it is known
   private partners: Int32Array | null = null; // vertex of the first for each of the second
   private marks: Uint8Array | null = null; // of the first
 
@@ -77,11 +78,21 @@ export class Beside {
     this.follow(0);
   }
 
+  /** Let the cameras see corresponding sides, by a rotation from the first shape to the second. */
+  turnBy(rows: number[] | null): void {
+    const [a, b, c, d, e, f, g, h, i] = rows ?? [];
+    this.turn = rows && new three.Matrix4().set(a!, b!, c!, 0, d!, e!, f!, 0, g!, h!, i!, 0, 0, 0, 0, 1);
+    this.follow(0);
+  }
+
   /** Move the other camera as that of a side has moved. */
   private follow(side: 0 | 1): void {
     if (!this.seats || this.following) return;
     const [from, to] = side === 0 ? this.seats : ([this.seats[1], this.seats[0]] as const);
-    const turn = to.turn.clone().multiply(from.turn.clone().transpose());
+    const turn = this.turn
+      ? this.turn.clone()
+      : this.seats[1].turn.clone().multiply(this.seats[0].turn.clone().transpose());
+    if (side === 1) turn.transpose();
     const scale = to.distance / from.distance;
     const place = (point: three.Vector3) =>
       point.clone().sub(from.target).applyMatrix4(turn).multiplyScalar(scale).add(to.target);

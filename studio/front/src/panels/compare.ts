@@ -92,8 +92,8 @@ export class ComparePanel implements Panel {
 
   hidden(): void {
     this.choose(null);
-    this.active = false;
     this.clear();
+    this.active = false;
   }
 
   private openFile({ name, bytes }: NamedFile): Promise<void> {
@@ -167,6 +167,7 @@ export class ComparePanel implements Panel {
     const [partners, confidence, colors] = loaded;
     this.map = { partners, confidence, colors } as Arrays;
     this.form.get("map-results").hidden = false;
+    this.app.second?.turnBy(this.app.state.beside?.turn ?? null);
     this.paint();
   }
 

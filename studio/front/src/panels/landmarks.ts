@@ -172,9 +172,13 @@ export class LandmarksPanel implements Panel {
     const second = app.second;
     if (!second?.viewer.vertices.length || app.state.beside?.map.status !== "ready") return;
     const carried = landmarks.length
-      ? await app.backend.array<Uint32Array>("landmarks/1/vertices")
-      : [];
-    if (this.active && second === app.second && carried.length === this.landmarks.length)
-      second.viewer.setPoints(carried, colors);
+      ? await app.backend.array<Int32Array>("landmarks/1/vertices")
+      : new Int32Array();
+    if (!this.active || second !== app.second || carried.length !== this.landmarks.length) return;
+    const known = [...carried.keys()].filter((row) => carried[row]! >= 0);
+    second.viewer.setPoints(
+      known.map((row) => carried[row]!),
+      Uint8Array.from(known.flatMap((row) => [...colors.subarray(3 * row, 3 * row + 3)])),
+    );
   }
 }
