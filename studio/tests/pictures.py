@@ -2,7 +2,8 @@
 
     python studio/tests/pictures.py docs/pictures
 
-A giraffe whose head and neck are turned, its eigenfunctions, and its parts. Then figures 6.3, 6.4 and 6.13
+A giraffe whose head and neck are turned, its eigenfunctions, and its parts; a horse and the scan of
+another pose, with the map between them. Then figures 6.3, 6.4 and 6.13
 of the thesis, by the mouse: knee, arm and waist of a biped, and a bar that is twisted.
 """
 
@@ -50,11 +51,18 @@ def main(folder: Path, *, n_vertices: int = 8000) -> list[Path]:
     bar = es.geometry.boundary_surface(es.shapes.box(cells, 6 * cells, cells, sides=(1, 6, 1)))
     with tempfile.TemporaryDirectory() as work, start_browser() as browser:
         draw = partial(draw_shape, browser, folder, Path(work))
+        horse, running = (
+            es.make_creature("quadruped", pose, n_vertices=n_vertices) for pose in (0, 1)
+        )
+        scan = Path(work) / "scan of a running horse.ply"
+        es.write_mesh(es.partial_scan(running, [1, 0, 0.3]).mesh, scan)
+        compare = partial(show_second, path=scan)
         looks = {"deform": show_deform, "spectrum": show_spectrum, "parts": show_parts}
         return [
             *draw("giraffe", giraffe, looks),
             *draw("biped", biped, {"biped": bend_biped}),
             *draw("bar", bar, {"bar": twist_bar}),
+            *draw("horse", horse, {"compare": compare}),
         ]
 
 
@@ -104,6 +112,15 @@ def show_parts(page):
     find(page, "tab-parts").click()
     find(page, "find-parts").click()
     find(page, "diagram").locator("canvas").wait_for(timeout=120_000)
+
+
+def show_second(page, path):
+    """Open a second shape, and wait for the map."""
+    find(page, "tab-compare").click()
+    with page.expect_file_chooser() as chooser:
+        find(page, "second-file").click()
+    chooser.value.set_files(path)
+    wait_until(page, "eigenshape.state.beside?.map.status === 'ready'", 240)
 
 
 def bend_biped(page):

@@ -366,7 +366,9 @@ def test_search_ranks_shapes_and_shows_corresponding_points(page, folder, mesh):
     find(page, "search").click()
     find(page, "match-0").wait_for(timeout=60_000)
     index = es.ShapeIndex.open(folder / "index")
-    matches = index.query(mesh, n_matches=10)
+    # The first match is the shape itself, which the page leaves out.
+    matches = index.query(mesh, n_matches=10)[1:]
+    assert find(page, "found").inner_text().endswith("is there, too, as quadruped.")
     cards = find(page, "matches").locator("button").all_inner_texts()
     assert len(cards) == len(matches)
     for card, match in zip(cards, matches, strict=True):
@@ -379,7 +381,24 @@ def test_search_ranks_shapes_and_shows_corresponding_points(page, folder, mesh):
     marked = page.evaluate("eigenshape.viewer.discs.geometry.index.count")
     assert marked == len(matches[1].correspondences)
     find(page, "close-match").click()
+    wait_until(page, "eigenshape.second === null")
     assert page.locator('[data-test="canvas"]').count() == 1
+    # What was found is found again after a reload.
+    page.reload()
+    find(page, "match-0").wait_for(timeout=60_000)
+    again = find(page, "matches").locator("button").all_inner_texts()
+    assert again == cards
+
+    # A painted part
+    find(page, "search-part").click()
+    page.get_by_text("Paint a part first").wait_for()
+    open_panel(page, "deform")
+    find(page, "tool-box").click()
+    wait_until_still(page)
+    open_panel(page, "search")
+    find(page, "search-part").click()
+    page.get_by_text("Shapes with a part like the painted one.").wait_for(timeout=60_000)
+    assert find(page, "matches").locator("button").count() >= 1
 
 
 def picture_axes(page):

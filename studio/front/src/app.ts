@@ -2,6 +2,7 @@
 
 import type { Backend, Change, State } from "./core/backend";
 import markup from "./app.html?raw";
+import type { Beside } from "./core/beside";
 import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile } from "./core/dom";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
@@ -50,6 +51,8 @@ export class Studio {
   private readonly shortcuts = new Map<string, { text: string; action: () => void }>();
   private readonly pages = new Map<string, { panel: Panel; tab: HTMLElement; page: HTMLElement }>();
   private active: Panel | null = null;
+  second: Beside | null = null; // picture of the second shape
+  secondShown: (second: Beside) => void = () => {}; // called when its shape is there
   private busy = 0;
   private timer = 0;
   private shown = { shape: -1, pose: -1 }; // what the viewer shows
@@ -276,11 +279,12 @@ export class Studio {
     );
     this.page.text("counts", `${nVertices} vertices · ${nFaces} faces`);
     clearTimeout(this.timer);
-    const { health, spectrum, parts, deformation } = state;
+    const { health, spectrum, parts, deformation, beside } = state;
     // The repair that turns faces helps unless all of them face outward.
     const outward = health.findings.every(({ name }) => name !== "orient");
     this.viewer.setSolid(health.closed === true && outward);
-    if ([health, spectrum, parts, deformation].some(({ status }) => status === "running"))
+    const works = [health, spectrum, parts, deformation, beside?.map];
+    if (works.some((work) => work?.status === "running"))
       this.timer = window.setTimeout(() => this.refresh().catch((error) => this.fail(error)), POLL);
   }
 

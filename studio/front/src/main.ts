@@ -6,21 +6,28 @@ import { h } from "./core/dom";
 import { httpBackend } from "./hosts/http";
 import { inlineBackend } from "./hosts/inline";
 import { widgetBackend, type WidgetModel } from "./hosts/widget";
+import { CollectionPanel } from "./panels/collection";
+import { ComparePanel } from "./panels/compare";
 import { DeformPanel } from "./panels/deform/deform";
 import { HeatPanel } from "./panels/heat";
+import { LandmarksPanel } from "./panels/landmarks";
 import { PartsPanel } from "./panels/parts";
 import { SearchPanel } from "./panels/search";
 import { ShapePanel } from "./panels/shape";
 import { SpectrumPanel } from "./panels/spectrum";
 
 function start(backend: Backend, host: HTMLElement, settings: Settings, keys: EventTarget): Studio {
+  const deform = new DeformPanel();
   const panels = [
-    new DeformPanel(),
+    deform,
     new ShapePanel(),
     new SpectrumPanel(),
     new HeatPanel(),
     new PartsPanel(),
-    new SearchPanel(),
+    new SearchPanel(() => deform.painted),
+    new ComparePanel(),
+    new LandmarksPanel(),
+    new CollectionPanel(),
   ];
   const studio = new Studio(backend, host, panels, settings, keys);
   studio.start().catch((error) => studio.fail(error));

@@ -27,7 +27,7 @@ test("a report refuses what it cannot do", async () => {
   const backend = await report({}, {});
   await expect(backend.array("brackets")).rejects.toThrow("no array brackets");
   await expect(backend.finish({ kind: "undo" })).rejects.toThrow("cannot change");
-  await expect(backend.query(1)).rejects.toThrow("cannot change");
+  await expect(backend.query(1, null)).rejects.toThrow("cannot change");
 });
 
 /** A model as in a notebook: every view hears every answer. */

@@ -56,6 +56,7 @@ class Shape:
         self.rest = Pose(0, self)
         self.stored = False  # whether the file of the tab has it
         self._load, self._make = load, partial(make, shared=True) if shared else make
+        self._found: Loaded | None = None  # what was read
         self._analysis: Analysis | None = None
         self._digest = ""
         self._lock = threading.Lock()
@@ -65,13 +66,24 @@ class Shape:
         """What is computed of the mesh; it begins now if the shape was not shown yet."""
         with self._lock:
             if self._analysis is None:
-                found = self._load()
+                found = self._read()
                 self.attributes, self.fields = found.attributes, dict(found.fields)
                 self._analysis = self._make(found.mesh, self.name)
                 if found.side != ("auto", "auto"):
                     self._analysis.look_from(*found.side)
                 self.stored = False  # where the file has the path alone
             return self._analysis
+
+    def _read(self) -> Loaded:
+        if self._found is None:
+            self._found = self._load()
+        return self._found
+
+    @property
+    def mesh(self) -> es.TriangleMesh:
+        """The mesh at rest, of which nothing else needs to be computed."""
+        with self._lock:
+            return self._read().mesh if self._analysis is None else self._analysis.mesh
 
     @property
     def digest(self) -> str:
@@ -148,6 +160,12 @@ class Moment:
         The region of each vertex, compressed; empty where none was chosen.
     selected : int
         The number of the moment in which these regions were chosen.
+    landmarks : str
+        Those of the shape, as `SurfaceLandmarks.write` returns them.
+    beside : int
+        The number of the second shape; -1 if there is none.
+    pairs : bytes
+        Vertices of both shapes that correspond, given by hand: numbers of 8 bytes.
     """
 
     number: int
@@ -156,6 +174,9 @@ class Moment:
     pose: Pose
     regions: bytes = b""
     selected: int = 0
+    landmarks: str = ""
+    beside: int = -1
+    pairs: bytes = b""
 
 
 class History:
@@ -182,18 +203,32 @@ class History:
         self._n_written = 0  # of the moments; later ones are new to the file
         if file is None or not self._restore(file):
             first = next(iter(self.shapes.values()))
-            self.moments = [Moment(0, "", first, first.rest)]
+            # Who opens two shapes wants to compare them.
+            others = [number for number in self.shapes if number != first.number]
+            beside = others[0] if len(others) == 1 else -1
+            self.moments = [Moment(0, "", first, first.rest, beside=beside)]
         self.now = self.moments[self.place]  # one name, so that other threads never see a half
 
-    def did(self, text: str, *, pose: Pose | None = None, regions: bytes | None = None) -> None:
-        """Note a new state; those that were undone before it are forgotten."""
+    def did(
+        self,
+        text: str,
+        *,
+        pose: Pose | None = None,
+        regions: bytes | None = None,
+        **changed: Any,
+    ) -> None:
+        """Note a new state; those that were undone before it are forgotten.
+
+        `changed` has further entries of the moment.
+        """
         now, number = self.now, self.moments[-1].number + 1
-        changed: dict[str, Any] = {"number": number, "text": text}
+        changed |= {"number": number, "text": text}
         if pose is not None:
             changed |= {"pose": pose, "shape": pose.shape}
             if pose.shape is not now.shape:
                 before = self._latest(pose.shape)
                 changed |= {"regions": before.regions, "selected": before.selected}
+                changed |= {"landmarks": before.landmarks, "pairs": b""}
         if regions is not None:
             changed |= {"regions": regions, "selected": number}
         del self.moments[self.place + 1 :]
@@ -230,9 +265,14 @@ class History:
 
     def show(self, loaded: Loaded, name: str, text: str) -> Shape:
         """Add a shape to the list, and show it."""
+        shape = self.add(loaded, name)
+        self.did(text, pose=shape.rest)
+        return shape
+
+    def add(self, loaded: Loaded, name: str) -> Shape:
+        """Add a shape to the list."""
         shape = Shape(max(self.shapes) + 1, name, lambda: loaded)
         self.shapes[shape.number] = shape
-        self.did(text, pose=shape.rest)
         return shape
 
     def bend(
@@ -338,10 +378,10 @@ class History:
         for number, shape, parent, n_edits in tables["pose"]:
             owner = self.shapes[shape]
             poses[number] = Pose(number, owner, poses.get(parent), n_edits, None, None, True)
-        for number, text, shape, pose, regions, selected in tables["moment"]:
+        for number, text, shape, pose, *others in tables["moment"]:
             owner = self.shapes[shape]
             place = poses[pose] if pose else owner.rest
-            self.moments.append(Moment(number, text, owner, place, regions, selected))
+            self.moments.append(Moment(number, text, owner, place, *others))
         self._n_written = len(self.moments)
         numbers = [moment.number for moment in self.moments]
         self.place = numbers.index(int(facts["place"]))
@@ -365,15 +405,16 @@ def _load(file: SessionFile, number: int, path: str | None) -> Loaded:
 
 
 def _shape_row(shape: Shape) -> Row:
-    if not shape.loaded:
+    if shape.path is not None and not shape.loaded:
         return shape.number, shape.name, shape.path, "", None, None
-    mesh = shape.analysis.mesh
+    mesh = shape.mesh
     arrays = {"vertices": mesh.vertices.astype("<f8"), "faces": mesh.faces.astype("<u4")}
     for place, one in enumerate(shape.fields.values()):
         arrays[f"field {place}"] = one.values.astype("<f8")
     names = [(name, one.title, one.unit) for name, one in shape.fields.items()]
     pickled = None if shape.attributes is None else pickle.dumps(shape.attributes)
-    message = encode({"fields": names, "side": shape.analysis.side}, arrays)
+    side = shape.analysis.side if shape.loaded else ("auto", "auto")
+    message = encode({"fields": names, "side": side}, arrays)
     return shape.number, shape.name, shape.path, shape.digest, message, pickled
 
 
@@ -387,4 +428,5 @@ def _pose_row(pose: Pose) -> Row:
 
 def _moment_row(moment: Moment) -> Row:
     numbers = moment.shape.number, moment.pose.number
-    return moment.number, moment.text, *numbers, moment.regions, moment.selected
+    chosen = moment.regions, moment.selected, moment.landmarks, moment.beside, moment.pairs
+    return moment.number, moment.text, *numbers, *chosen

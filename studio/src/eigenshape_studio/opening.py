@@ -7,6 +7,7 @@ from pathlib import Path
 import eigenshape as es
 from eigenshape_studio.history import Shape
 from eigenshape_studio.loading import load_file
+from eigenshape_studio.specimens import Specimens, is_collection
 from eigenshape_studio.workspace import Workspace
 
 MOST_LISTED = 500  # shapes that stand in the list of the page
@@ -19,7 +20,8 @@ def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = 
     ----------
     paths : sequence of paths
         Files, folders of files, or the folder of an index. The first shape is shown, and the others
-        can be chosen from a list. Without any, that is a creature which the library makes.
+        can be chosen from a list. Without any, that is a creature which the library makes. Of the
+        folder of a collection, its mean is shown, and its specimens can be chosen.
     index : path, optional
         Folder of an index to search in; by default the first one among the paths.
 
@@ -31,16 +33,24 @@ def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = 
         If a folder has no shape.
     """
     found: list[tuple[str, Path]] = []
+    collection: Path | None = None
     for one in paths:
         path = Path(one).absolute()
         held = _index_in(path) if path.is_dir() else None
         if held is not None:
             index = index or path
             found += _files_of(held)
+        elif is_collection(path):
+            collection = path
         elif path.is_dir():
             found += [(item.name, item.path.absolute()) for item in es.io.find_items(path)]
         else:
             found.append((path.name, path))
+    if collection is not None:
+        specimens = Specimens(collection)
+        workspace = Workspace(specimens.mean, specimens.title, index=index, shared=True)
+        workspace.specimens = specimens
+        return workspace
     if not found:
         creature = es.make_creature("quadruped", n_vertices=2500)
         return Workspace(creature, "quadruped", index=index, shared=True)

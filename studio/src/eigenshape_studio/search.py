@@ -9,7 +9,9 @@ import numpy as np
 from matplotlib.image import imsave
 
 import eigenshape as es
+from eigenshape.geometry.topology import submesh
 from eigenshape_studio.analysis import upright_view
+from eigenshape_studio.calls import RequestError
 
 THUMBNAIL = 144  # pixels
 N_KEPT = 256  # pictures that are kept in memory, about 10 kB each
@@ -46,30 +48,66 @@ class Shelf:
         return es.io.read_surface(source).mesh
 
     def query(
-        self, mesh: es.TriangleMesh, n_matches: int
+        self, mesh: es.TriangleMesh, n_matches: int, region: np.ndarray | None = None
     ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-        """Search for shapes like a mesh; return names and scores, pictures and pairs of vertices."""
-        descriptor = es.describe(mesh, self.index.default_recipe())
+        """Search for shapes like a mesh; return names and scores, pictures and pairs of vertices.
+
+        Parameters
+        ----------
+        mesh : TriangleMesh
+        n_matches : int
+        region : (r,) int, optional
+            Vertices of a part: shapes are found that have a part like it.
+        """
+        part, numbers = mesh, np.arange(mesh.n_vertices)
+        if region is not None:
+            inside = np.asarray(np.isin(mesh.faces, region).all(axis=1))
+            if not inside.any():
+                raise RequestError("The part must have a face; paint a larger one.")
+            part, numbers = submesh(mesh, inside)
+        descriptor = es.describe(part, self.index.default_recipe())
+        # One more: the shape itself may be in the index.
+        found = self.index.query(descriptor, n_matches=n_matches + 1)
+        itself = [match.name for match in found[:1] if _is_file_of(mesh, match.source)]
         matches, arrays = [], {}
-        for number, match in enumerate(self.index.query(descriptor, n_matches=n_matches)):
+        shown = [match for match in found if match.name not in itself][:n_matches]
+        for number, match in enumerate(shown):
             facts = {"name": match.name, "label": match.label, "score": match.score}
             picture, view = _picture(match.source)
             matches.append({**facts, **view, "path": match.source})
             ours, theirs = match.correspondences.T
-            pairs = np.column_stack([descriptor.vertices[ours], match.vertices[theirs]])
+            ours = numbers[descriptor.vertices[ours]]
+            pairs = np.column_stack([ours, match.vertices[theirs]])
             arrays[f"pairs{number}"] = pairs.astype("<u4")
-            arrays[f"colors{number}"] = color_places(mesh.vertices[pairs[:, 0]])
+            arrays[f"colors{number}"] = color_places(mesh.vertices[ours])
             if picture is not None:
                 arrays[f"thumbnail{number}"] = np.frombuffer(picture, np.uint8)
-        return {"matches": matches}, arrays
+        return {"matches": matches, "itself": "".join(itself)}, arrays
 
 
-def color_places(points: np.ndarray) -> np.ndarray:
-    """Return a color for each point, red, green, blue of 255: neighbors have similar colors."""
-    low = points.min(axis=0, initial=np.inf)
-    span = np.ptp(points, axis=0) if len(points) else np.ones(3)
+def _is_file_of(mesh: es.TriangleMesh, source: str | None) -> bool:
+    """Say whether a file holds this very mesh."""
+    try:
+        kept = None if source is None else es.io.read_surface(source).mesh
+    except (es.EigenshapeError, OSError):  # it has gone, or changed
+        return False
+    return (
+        kept is not None
+        and np.array_equal(kept.vertices, mesh.vertices)
+        and np.array_equal(kept.faces, mesh.faces)
+    )
+
+
+def color_places(points: np.ndarray, within: np.ndarray | None = None) -> np.ndarray:
+    """Return a color for each point, red, green, blue of 255: neighbors have similar colors.
+
+    Colors are coordinates in the box around the points, or around those `within`.
+    """
+    box = points if within is None else within
+    low = box.min(axis=0, initial=np.inf)
+    span = np.ptp(box, axis=0) if len(box) else np.ones(3)
     shares = (points - low) / np.where(span > 0, span, 1.0)
-    return np.round(40 + 215 * shares).astype(np.uint8)
+    return np.round(40 + 215 * np.clip(shares, 0, 1)).astype(np.uint8)
 
 
 def _picture(source: str | None) -> tuple[bytes | None, dict[str, list[float]]]:

@@ -32,7 +32,7 @@ create table if not exists pose
      vertices blob);
 create table if not exists moment
     (number integer primary key, text text, shape integer, pose integer, regions blob,
-     selected integer);
+     selected integer, landmarks text, beside integer, pairs blob);
 """
 
 Row = tuple[Any, ...]
@@ -86,7 +86,7 @@ class SessionFile:
                 "fact": "name, value",
                 "shape": "number, name, path, digest",
                 "pose": "number, shape, parent, n_edits",
-                "moment": "number, text, shape, pose, regions, selected",
+                "moment": "number, text, shape, pose, regions, selected, landmarks, beside, pairs",
             }
             return {
                 table: database.execute(f"select {columns} from {table} order by rowid").fetchall()
@@ -107,7 +107,8 @@ class SessionFile:
             database.executemany("insert or replace into shape values (?, ?, ?, ?, ?, ?)", shapes)
             database.executemany("insert or replace into pose values (?, ?, ?, ?, ?, ?)", poses)
             database.execute("delete from moment where not number between ? and ?", kept)
-            database.executemany("insert or replace into moment values (?, ?, ?, ?, ?, ?)", moments)
+            holes = ", ".join("?" * 9)
+            database.executemany(f"insert or replace into moment values ({holes})", moments)
             # Nothing returns to these poses, but later ones count on their edits.
             database.execute(
                 "update pose set vertices = null "

@@ -17,6 +17,7 @@ import eigenshape as es
 from eigenshape.deformation.rig import pose_rig
 from eigenshape_studio.analysis import N_MODES, Analysis, cut_rows, diagram_rows, vertex_labels
 from eigenshape_studio.calls import Arrays, Reply, RequestError, file_bytes, whole
+from eigenshape_studio.company import Company
 from eigenshape_studio.history import History, Pose, Shape
 from eigenshape_studio.jobs import NO_JOB, PreparingError, window_message
 from eigenshape_studio.loading import Field, Loaded, check_fields
@@ -24,12 +25,13 @@ from eigenshape_studio.parse import display_name, parse_surface
 from eigenshape_studio.poses import carry_pose
 from eigenshape_studio.search import Shelf
 from eigenshape_studio.sessions import SessionFile
+from eigenshape_studio.specimens import Specimens
 from eigenshape_studio.wire import WireError, decode, encode
 
 MOST_REGIONS = 4  # one component each of the attribute `shares` of the vertex shader
 MOST_MODES = 2000  # that the page may request
 N_BRACKETS = 20  # bracketing costs a solve with three times as many unknowns
-CAPABILITIES = ("rig", "finish", "query", "open", "repair", "solve")
+CAPABILITIES = ("rig", "finish", "query", "open", "repair", "solve", "beside")
 CALLS = ("meta", "array", "rig", "finish", "query")
 MODES = ("graded", "uncrossed", "thesis")
 # The filters of warnings belong to the whole process, so only one thread may listen at a time.
@@ -105,11 +107,14 @@ class Workspace:
         self.bound: Bound | None = None
         self.most_bytes = 256 << 20  # of a file; the server has a limit of its own
         self.matches: list[str] = []  # names, of the last query
+        self._searched: tuple[Any, Reply] | None = None  # for what, and what was found
+        self.specimens: Specimens | None = None  # of the collection that the studio was opened with
         self.mode = "graded"
         self._begin()
 
     def _begin(self) -> None:
         """Set up what no two workspaces share."""
+        self.company = Company(self)
         self._changing = threading.RLock()
         self._painting = threading.Lock()
         # The pose that the brush last painted on, and the function that computes distances on it.
@@ -129,6 +134,7 @@ class Workspace:
 
     def close(self) -> None:
         """Stop what is still computed, and let go of the file."""
+        self.company.close()
         for shape in self.history.shapes.values():
             shape.leave()
         if self.history.file is not None:
@@ -192,6 +198,7 @@ class Workspace:
         analysis, history = self.analysis, self.history
         now = history.now
         capabilities = [name for name in CAPABILITIES if name != "query" or self.shelf is not None]
+        capabilities += [] if self.specimens is None else ["collection"]
         return {
             "name": analysis.name,
             "n_vertices": analysis.mesh.n_vertices,
@@ -206,6 +213,7 @@ class Workspace:
             "parts": analysis.parts_facts(),
             "deformation": self._deformation_facts(),
             "index": None if self.shelf is None else self.shelf.facts(),
+            **self.company.facts(),
             "shapes": [[shape.number, shape.name] for shape in history.shapes.values()],
             "history": [moment.text for moment in history.moments[1:]],
             "place": history.place,
@@ -261,6 +269,7 @@ class Workspace:
             "disc": self._disc,
             "file": self._file,
             "match": self._match_array,
+            **self.company.families,
         }
         if not tail and head in makers:
             return makers[head]()
@@ -461,6 +470,7 @@ class Workspace:
             "parts": lambda *_: self.analysis.find_parts(),
             "transfer": self._transfer,
             "choose": self._choose,
+            **self.company.works,
         }
         if not isinstance(kind, str) or kind not in works:
             raise RequestError(f"kind must be one of {', '.join(works)}; it is {kind!r:.80}.")
@@ -558,11 +568,14 @@ class Workspace:
 
     def _choose(self, meta: dict[str, Any], _arrays: Arrays) -> None:
         """Show a shape of the list."""
-        number = meta.get("shape")
+        self.history.choose(self.listed_shape(meta.get("shape")))
+
+    def listed_shape(self, number: Any) -> Shape:
+        """Return a shape of the list."""
         shapes = self.history.shapes
         if not isinstance(number, int) or number not in shapes:
             raise RequestError(f"shape must be one of {[*shapes]}; it is {number!r:.80}.")
-        self.history.choose(shapes[number])
+        return shapes[number]
 
     def _cancel(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
         self.bound = None
@@ -576,7 +589,7 @@ class Workspace:
         rig = self._rig_at_rest()
         source = None
         if "source" in arrays:
-            source = self._surface_of(str(meta.get("source")), file_bytes(arrays, "source"))
+            source = self.read_surface(str(meta.get("source")), file_bytes(arrays, "source"))
         with TemporaryDirectory() as folder:
             path = Path(folder, "edits.json")
             path.write_text(json.dumps(meta.get("edits")))
@@ -605,17 +618,20 @@ class Workspace:
     def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
         """Show the mesh of a file, or a shape of the index by its name."""
         if "match" in meta:
-            name = self._match_name(meta["match"])
-            self._show(self._require_shelf().mesh(name), name)
+            self.show(*self.read_match(meta["match"]))
             return
         name = display_name(meta.get("name"))
-        self._show(self._surface_of(name, file_bytes(arrays, "file")), name)
+        self.show(self.read_surface(name, file_bytes(arrays, "file")), name)
 
-    def _surface_of(self, name: str, data: bytes) -> es.TriangleMesh:
+    def read_surface(self, name: str, data: bytes) -> es.TriangleMesh:
         """Read a file from outside; what had to be made of points is told with the answer."""
         found = parse_surface(name, data)
         self._warnings += found.report
         return found.mesh
+
+    def warn(self, lines: list[str]) -> None:
+        """Tell something with the answer to the present call."""
+        self._warnings += lines
 
     def _solve(self, meta: dict[str, Any], _arrays: Arrays) -> None:
         most = min(MOST_MODES, self.analysis.mesh.n_vertices)
@@ -624,18 +640,18 @@ class Workspace:
     def _transfer(self, meta: dict[str, Any], arrays: Arrays) -> None:
         """Bend another shape as this one was bent; the result becomes the shape."""
         name = display_name(meta.get("name"))
-        target = self._surface_of(name, file_bytes(arrays, "file"))
+        target = self.read_surface(name, file_bytes(arrays, "file"))
         source = self.analysis.mesh
         pairs = arrays["pairs"].astype(np.int64) if "pairs" in arrays else None
         bent = carry_pose(source, self.mesh, target, pairs)
-        self._show(bent, name)
+        self.show(bent, name)
 
-    def _show(self, mesh: es.TriangleMesh, name: str) -> None:
+    def show(self, mesh: es.TriangleMesh, name: str) -> None:
         """Show another shape; those before stay in the list, with their edits."""
         self.history.show(Loaded(mesh), name, f"Open {name}")
 
     def call_query(self, meta: dict[str, Any], arrays: Arrays) -> Reply:
-        """Search an index for shapes like the present one, or like that of a file."""
+        """Search an index for shapes like the present one, a part of it, or that of a file."""
         shelf = self._require_shelf()
         n_matches = whole(meta, "n_matches", 1, 100, 5)
         mesh = self.mesh
@@ -643,7 +659,12 @@ class Workspace:
         if "file" in arrays:
             surface = parse_surface(display_name(meta.get("name")), file_bytes(arrays, "file"))
             mesh, report = surface.mesh, surface.report
-        found = shelf.query(mesh, n_matches)
+        # A page that is loaded again asks again.
+        region = arrays.get("region")
+        key = (mesh, n_matches, b"" if region is None else region.tobytes())
+        if self._searched is None or self._searched[0] != key:
+            self._searched = key, shelf.query(mesh, n_matches, region)
+        found = self._searched[1]
         found[0]["warnings"] = list(report)
         self.matches = [match["name"] for match in found[0]["matches"]]
         return found
@@ -659,6 +680,11 @@ class Workspace:
     def _match_name(self, number: Any) -> str:
         place = whole({"match": number}, "match", 0, len(self.matches) - 1)
         return self.matches[place]
+
+    def read_match(self, number: Any) -> tuple[es.TriangleMesh, str]:
+        """Return the mesh and the name of a match of the last query."""
+        name = self._match_name(number)
+        return self._require_shelf().mesh(name), name
 
 
 def error_message(kind: str, text: str) -> bytes:

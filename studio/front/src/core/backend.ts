@@ -43,7 +43,38 @@ export interface State {
   digest: string; // tells the mesh at rest from all others
   selected: number; // tells the present regions from others; 0: none
   pose: number; // tells the pose from others of the shape, and the shape from others
+  beside: Second | null;
+  landmarks: Landmark[];
+  collection: Collection | null;
   shape: number;
+}
+
+/** A second shape, and the map between the shape and it. */
+export interface Second {
+  name: string;
+  number: number; // tells it from others
+  n_vertices: number;
+  n_faces: number;
+  up: Vec3;
+  towards: Vec3;
+  map: Progress;
+  turn: number[] | null; // rotation from the shape to this one by the map, row by row
+  lines: string[]; // what is known of the map
+  pairs: [number, number][]; // vertices of both that correspond, by hand
+}
+
+export interface Landmark {
+  name: string;
+  point: Vec3;
+  vertex: number; // near it
+}
+
+export interface Collection {
+  title: string;
+  is_mean: boolean; // whether the shape is the mean of the collection
+  specimens: { name: string; notes: string[]; scores: number[] }[];
+  failures: [string, string][]; // names and reasons
+  shares: number[]; // of the variance, of each mode
 }
 
 /** What `finish` shall change; `kind` says which of the other entries there are. */
@@ -60,6 +91,10 @@ export interface Change {
   text?: string; // what the hand did
   place?: number;
   shape?: number;
+  sample?: string;
+  match?: number;
+  specimen?: string;
+  close?: boolean;
 }
 export interface Finished {
   state: State;
@@ -85,6 +120,7 @@ export interface Match {
 }
 export interface Matches {
   matches: Match[];
+  itself: string; // name in the index of what was searched with, if it is there
   arrays: Arrays; // thumbnail0.., pairs0.., colors0..
 }
 
@@ -94,7 +130,7 @@ export interface Backend {
   array<T extends TypedArray>(name: string, start?: number, stop?: number): Promise<T>;
   rig(request: RigRequest): Promise<RigAnswer>;
   finish(change: Change, files?: Arrays): Promise<Finished>;
-  query(nMatches: number): Promise<Matches>;
+  query(nMatches: number, region: Uint32Array | null): Promise<Matches>;
 }
 
 type Bytes = ArrayBuffer | ArrayBufferView;
@@ -136,9 +172,9 @@ export function backendOver(send: Send): Backend {
       const answer = await askInTurn("finish", { ...change, id }, files);
       return { ...answer.meta, ...answer.arrays };
     },
-    async query(n_matches) {
-      const answer = await ask("query", { n_matches });
-      return { matches: answer.meta.matches, arrays: answer.arrays };
+    async query(n_matches, region) {
+      const answer = await ask("query", { n_matches }, region ? { region } : {});
+      return { ...answer.meta, arrays: answer.arrays };
     },
   };
 }

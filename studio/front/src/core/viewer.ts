@@ -23,6 +23,8 @@ export interface View {
   target: Vec3;
 }
 export type { Hit, Click, PointerTool };
+/** What colors a shape; a second picture may take it over. */
+export type Colors = Pick<Viewer, "setScalars" | "setLabels" | "setMarks">;
 
 const FINE = 2; // pixels of the picture for each of the page, in both directions
 const REST = 250; // ms after which a picture drawn in software is drawn again with smooth edges
@@ -33,6 +35,8 @@ export class Viewer {
   /** Number of the mesh that is shown; views of another mesh are not restored. */
   shape = -1;
   onView: (view: View) => void = () => {};
+  onMove: () => void = () => {}; // of the camera
+  twin: Colors | null = null; // is told of all colors
   /** Everything in the coordinates of the mesh; the scene around it has size 1 at any unit. */
   readonly space = new three.Group();
   readonly scene = new three.Scene();
@@ -84,7 +88,10 @@ export class Viewer {
     }
     this.eye = new Eye(
       canvas,
-      () => this.invalidate(),
+      () => {
+        this.invalidate();
+        this.onMove();
+      },
       () => this.onView({ shape: this.shape, ...this.eye.view }),
     );
     this.pointer = new Pointer(canvas, (x, y) => this.pick(x, y));
@@ -170,6 +177,7 @@ export class Viewer {
   setScalars(values: Float32Array | null, scale?: Scale): void {
     this.legend?.remove();
     this.surface.setScalars(values, scale);
+    this.twin?.setScalars(values, scale);
     if (values && scale) this.stage.append((this.legend = buildLegend(scale)));
     this.invalidate();
   }
@@ -177,12 +185,15 @@ export class Viewer {
   /** Color by parts; `palette` has three bytes a label. Labels below 0 stay plain. */
   setLabels(labels: Int32Array | null, palette: Uint8Array = new Uint8Array(0)): void {
     this.setScalars(null);
-    if (labels) this.surface.setLabels(labels, palette);
+    if (!labels) return;
+    this.surface.setLabels(labels, palette);
+    this.twin?.setLabels(labels, palette);
   }
 
   /** Tint vertices: red, green, blue and strength of each, in bytes. */
   setMarks(marks: Uint8Array): void {
     this.surface.setMarks(marks);
+    this.twin?.setMarks(marks);
     this.invalidate();
   }
 
@@ -282,7 +293,8 @@ export class Viewer {
     return this.eye.rayAt(x, y).applyMatrix4(this.space.matrixWorld.clone().invert());
   }
 
-  private resize(): void {
+  /** Fill the stage. */
+  resize(): void {
     const { clientWidth: width, clientHeight: height } = this.stage;
     if (!width || !height) return;
     this.renderer?.setSize(width, height);

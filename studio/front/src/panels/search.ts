@@ -1,12 +1,20 @@
-/** Search: the shapes of an index that are most like this one, and which points correspond. */
+/** Search: the shapes of an index that are most like this one or a painted part of it. */
 
 import type { Panel, Studio } from "../app";
 import type { Match, Matches, State } from "../core/backend";
+import type { Beside } from "../core/beside";
+import { rgbOf } from "../core/colors";
 import { Form, h, type NamedFile } from "../core/dom";
-import { Viewer } from "../core/viewer";
 import markup from "./search.html?raw";
 
-const N_MATCHES = 10;
+const [PART, TINT] = ["#e08a2e", 190]; // as the first region of Deform
+const N_MATCHES = 12; // three on each row of the wall
+
+/** What was searched with, which survives a reload. */
+interface Asked {
+  shape: number;
+  region: number[] | null;
+}
 
 export class SearchPanel implements Panel {
   readonly id = "search";
@@ -15,49 +23,91 @@ export class SearchPanel implements Panel {
   private app!: Studio;
   private readonly form = new Form(markup);
   private readonly list = this.form.get("matches");
-  private readonly beside = h("div", { class: "stage", "data-test": "beside" });
-  private second: Viewer | null = null;
   private found: Matches | null = null;
+  private opened = -1; // match that is shown beside
   private shape = -1; // which the matches belong to
+  private active = false;
+
+  /** `painted` returns the vertices that are selected, if any are. */
+  constructor(private readonly painted: () => Uint32Array) {}
 
   build(app: Studio): HTMLElement {
     this.app = app;
     this.form.on({
-      search: () => this.search(),
+      search: () => this.search(null),
+      "search-part": () => this.searchPart(),
       "search-file": async () => (await app.choose()).forEach((file) => this.searchFile(file)),
     });
     app.acceptDrops(this.form.root, (file) => this.searchFile(file));
+    app.secondShown = (second) => this.mark(second);
     return this.form.root;
   }
 
-  refresh({ index, shape }: State): void {
+  refresh({ index, shape, beside }: State): void {
     const about = `${index!.n_shapes.toLocaleString("en")} shapes in ${index!.path}.`;
     const help = "A smaller score is more alike. Drop a file here to search with it.";
     this.form.text("index", `${about} ${help}`);
     if (shape !== this.shape) this.clear();
+    this.shape = shape;
+    if (!beside) this.opened = -1;
+    this.list.querySelectorAll("li").forEach((card, i) => {
+      card.classList.toggle("chosen", i === this.opened);
+    });
+  }
+
+  /** What was found before a reload is found again; a search by a part follows what is painted. */
+  shown(): void {
+    this.active = true;
+    const asked = this.app.settings.get<Asked | null>("search", null);
+    const painted = this.painted();
+    this.showPart(painted);
+    if (asked?.shape !== this.shape) return;
+    const other = asked.region && painted.length && painted.join() !== asked.region.join();
+    if (other) this.search(painted);
+    else if (!this.found) this.search(asked.region && Uint32Array.from(asked.region));
   }
 
   hidden(): void {
-    this.closeMatch();
+    this.active = false;
+    this.showPart(new Uint32Array());
+    this.app.viewer.setPoints([], PART);
+  }
+
+  private showPart(part: Uint32Array): void {
+    const marks = new Uint8Array(4 * this.app.state.n_vertices);
+    for (const vertex of part) marks.set([...rgbOf(PART), TINT], 4 * vertex);
+    this.app.viewer.setMarks(marks);
   }
 
   /** The file becomes the shape, so that what is searched with is what is seen. */
   private async searchFile(file: NamedFile): Promise<void> {
-    if (await this.app.openFile(file)) await this.search();
+    if (await this.app.openFile(file)) await this.search(null);
   }
 
-  private async search(): Promise<void> {
+  private searchPart(): void {
+    const region = this.painted();
+    if (region.length) this.search(region);
+    else this.app.say("Paint a part first: choose Deform, and paint on the shape.");
+  }
+
+  private async search(region: Uint32Array | null): Promise<void> {
+    const { app, form, list } = this;
     this.clear();
-    this.found = await this.app.run("Searching", this.app.backend.query(N_MATCHES));
-    if (!this.found) return;
-    this.shape = this.app.state.shape;
-    this.list.replaceChildren(...this.found.matches.map((match, i) => this.buildCard(match, i)));
-    if (!this.found.matches.length) this.list.append("The index has no shape like this one.");
+    const text = region ? "Searching for shapes with this part" : "Searching";
+    const found = await app.run(text, app.backend.query(N_MATCHES, region));
+    if (!found) return;
+    this.found = found;
+    app.settings.set("search", { shape: this.shape, region: region && [...region] } as Asked);
+    list.replaceChildren(...found.matches.map((match, i) => this.buildCard(match, i)));
+    const what = region ? "Shapes with a part like the painted one." : "Shapes like this one.";
+    const itself = found.itself && ` The shape itself is there, too, as ${found.itself}.`;
+    form.text("found", found.matches.length ? what + itself : "The index has no shape like this one.");
   }
 
   private clear(): void {
-    this.closeMatch();
+    [this.found, this.opened] = [null, -1];
     this.list.replaceChildren();
+    this.form.text("found", "");
   }
 
   private buildCard({ name, label, score }: Match, number: number): HTMLElement {
@@ -78,46 +128,22 @@ export class SearchPanel implements Panel {
     return h("li", {}, h("button", attributes, picture, text));
   }
 
-  /** Show a match in a second view, and corresponding points of both in the same colors. */
   private async openMatch(number: number): Promise<void> {
-    const { app, found } = this;
-    const { backend, state, viewer } = app;
-    const loading = Promise.all([
-      backend.array<Float32Array>(`match/${number}/vertices`),
-      backend.array<Uint32Array>(`match/${number}/faces`),
-    ]);
-    const loaded = await app.run("Loading the match", loading);
-    if (!loaded || !found || found !== this.found) return;
-    const { name, up = state.up, towards = state.towards } = found.matches[number]!;
-    this.closeMatch();
-    viewer.stage.after(this.beside);
-    viewer.stage.parentElement!.classList.add("compare");
-    this.second = new Viewer(this.beside);
-    const click = () => this.closeMatch();
-    const close = { type: "button", "data-test": "close-match", title: "Close the match", click };
-    const caption = h("div", { class: "caption" }, name, h("button", close, "Close"));
-    this.beside.append(caption);
-    this.second.setMesh(...loaded, up, towards);
-    viewer.fit();
-    const pairs = found.arrays[`pairs${number}`] as Uint32Array;
-    const colors = found.arrays[`colors${number}`] as Uint8Array;
-    [viewer, this.second].forEach((view, side) =>
+    this.opened = number;
+    await this.app.change({ kind: "beside", match: number }, "Loading the match");
+  }
+
+  /** Mark corresponding points of both shapes in the same colors. */
+  private mark(second: Beside): void {
+    const { app, found, opened } = this;
+    if (!this.active || !found || opened < 0) return;
+    const pairs = found.arrays[`pairs${opened}`] as Uint32Array;
+    const colors = found.arrays[`colors${opened}`] as Uint8Array;
+    [app.viewer, second.viewer].forEach((view, side) =>
       view.setPoints(
         pairs.filter((_, i) => i % 2 === side),
         colors,
       ),
     );
-    [...this.list.children].forEach((card, i) => card.classList.toggle("chosen", i === number));
-  }
-
-  private closeMatch(): void {
-    if (!this.second) return;
-    this.second.dispose();
-    this.second = null;
-    this.beside.remove();
-    this.beside.replaceChildren();
-    this.app.viewer.stage.parentElement!.classList.remove("compare");
-    this.app.viewer.setPoints([], "#000000");
-    for (const card of this.list.children) card.classList.remove("chosen");
   }
 }

@@ -100,8 +100,14 @@ export class DeformPanel implements Panel {
 
   hidden(): void {
     this.active = false;
+    this.app.viewer.setPointer();
     this.motion.drop();
     this.selection.paint();
+  }
+
+  /** The vertices of the chosen region. */
+  get painted(): Uint32Array {
+    return this.selection.regions.vertices(this.selection.region);
   }
 
   private chooseRegion(region: number): void {
@@ -123,7 +129,6 @@ export class DeformPanel implements Panel {
     const selects = SELECTORS.includes(tool);
     const missing = selects ? null : this.motion.missing;
     form.text("hint", missing ?? form.get(`tool-${tool}`).dataset.hint!);
-    if (!active) this.app.viewer.setPointer();
     this.motion.show(selects ? null : (tool as MotionKind), active);
     this.selection.show(selects ? (tool as Selector) : null, active);
   }

@@ -1,0 +1,201 @@
+"""What stands beside the shape of a tab: a second shape with a map, landmarks, a collection."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import eigenshape as es
+from eigenshape_studio.beside import Beside
+from eigenshape_studio.calls import Arrays, RequestError, file_bytes
+from eigenshape_studio.history import Shape
+from eigenshape_studio.landmarks import (
+    SurfaceLandmarks,
+    landmark_file,
+    parse_landmarks,
+    place_landmarks,
+)
+from eigenshape_studio.loading import Loaded
+from eigenshape_studio.mapping import DenseMap
+from eigenshape_studio.parse import display_name
+from eigenshape_studio.specimens import Specimens
+
+if TYPE_CHECKING:
+    from eigenshape_studio.workspace import Workspace
+
+SAMPLE_POSE = 1  # of a sample beside the shape; the one that opens as the shape has pose 0
+
+
+class Company:
+    """The second shape, landmarks and collection of a workspace.
+
+    Parameters
+    ----------
+    workspace : Workspace
+
+    Attributes
+    ----------
+    works : {str: callable}
+        What changes something, by the kind of the call.
+    families : {str: callable}
+        What returns an array, by the first part of its name.
+    """
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._of = workspace
+        self._beside: Beside | None = None  # of the shape at rest and the second one
+        self._lock = threading.Lock()
+        self.works: dict[str, Callable[[dict[str, Any], Arrays], None]] = {
+            "beside": self._open,
+            "map": lambda *_: self._require_beside().start(),
+            "correct": self._correct,
+            "pose": self._take_pose,
+            "landmarks": self._set_landmarks,
+            "mean": self._show_mean,
+        }
+        self.families: dict[str, Callable[[str], np.ndarray]] = {
+            "beside": lambda tail: self._require_beside().array(tail),
+            "landmarks": self._landmarks_array,
+            "collection": lambda tail: self._require_specimens().array(tail),
+        }
+
+    def close(self) -> None:
+        """Stop what is still computed."""
+        if self._beside is not None:
+            self._beside.cancel()
+
+    def facts(self) -> dict[str, Any]:
+        """Return what the page shows."""
+        beside, specimens = self.beside, self._of.specimens
+        shown = None
+        if specimens is not None:
+            shown = {**specimens.facts(), "is_mean": self._of.analysis.mesh is specimens.mean}
+        return {
+            "beside": None if beside is None else beside.facts(),
+            "landmarks": self.landmarks.facts(self._of.mesh),
+            "collection": shown,
+        }
+
+    @property
+    def landmarks(self) -> SurfaceLandmarks:
+        """The landmarks of the shape."""
+        return SurfaceLandmarks.read(self._of.history.now.landmarks)
+
+    @property
+    def beside(self) -> Beside | None:
+        """The second shape of the present moment, with the corrections of its map."""
+        now, shapes = self._of.history.now, self._of.history.shapes
+        with self._lock:
+            if now.beside < 0:
+                self.close()
+                self._beside = None
+                return None
+            mesh, second = now.shape.mesh, shapes[now.beside]
+            try:
+                other = second.mesh
+            except (es.EigenshapeError, OSError):  # its file has gone, or changed
+                return None
+            kept = self._beside
+            if kept is None or kept.meshes[0] is not mesh or kept.number != second.number:
+                self.close()
+                known = self._known_map(mesh, second)
+                kept = Beside(mesh, other, second.name, second.number, known)
+                self._beside = kept
+            kept.correct(np.frombuffer(now.pairs, dtype=np.int64).reshape(-1, 2))
+            return kept
+
+    def _known_map(self, mesh: es.TriangleMesh, second: Shape) -> DenseMap | None:
+        """Return the map from the mean of the collection to one of its specimens."""
+        specimens = self._of.specimens
+        if specimens is None or mesh is not specimens.mean:
+            return None
+        is_specimen = second.name in specimens.collection.names
+        return specimens.map_to(second.name, second.mesh) if is_specimen else None
+
+    def _require_beside(self) -> Beside:
+        if self.beside is None:
+            raise RequestError("There must be a second shape; none is open.")
+        return self.beside
+
+    def _require_specimens(self) -> Specimens:
+        if self._of.specimens is None:
+            raise RequestError("There must be a collection; open the studio with its folder.")
+        return self._of.specimens
+
+    def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
+        """Show a second shape: of the list, a file, a match, a sample or a specimen; or none."""
+        history = self._of.history
+        if meta.get("close"):
+            history.did("Close the second shape", beside=-1, pairs=b"")
+            return
+        if "shape" in meta:
+            second = self._of.listed_shape(meta["shape"])
+        else:
+            mesh, name = self._read(meta, arrays)
+            second = history.add(Loaded(mesh), name)
+        second.mesh  # noqa: B018  a file that cannot be read must not stand beside
+        history.did(f"{second.name} beside", beside=second.number, pairs=b"")
+
+    def _read(self, meta: dict[str, Any], arrays: Arrays) -> tuple[es.TriangleMesh, str]:
+        """Return the mesh and the name of what a call wants to see."""
+        if "match" in meta:
+            return self._of.read_match(meta["match"])
+        if "sample" in meta:
+            kind = str(meta["sample"])
+            return es.make_creature(kind, SAMPLE_POSE), kind
+        if "specimen" in meta:
+            name = str(meta["specimen"])
+            return self._require_specimens().mesh(name), name
+        name = display_name(meta.get("name"))
+        return self._of.read_surface(name, file_bytes(arrays, "file")), name
+
+    def _correct(self, _meta: dict[str, Any], arrays: Arrays) -> None:
+        """Correct the map by pairs of vertices."""
+        given = arrays.get("pairs", np.empty(0, dtype=np.int64))
+        pairs = self._require_beside().check_pairs(given)
+        self._of.history.did("Correct the map", pairs=pairs.tobytes())
+
+    def _take_pose(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+        """Bend the shape into the pose of the second one; the result becomes the shape."""
+        self._of.show(self._require_beside().take_pose(), self._of.analysis.name)
+
+    def _show_mean(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+        """Show the mean of the collection."""
+        specimens = self._require_specimens()
+        self._of.show(specimens.mean, specimens.title)
+
+    def _set_landmarks(self, meta: dict[str, Any], arrays: Arrays) -> None:
+        """Take all landmarks anew: by names and points, or from a file."""
+        names, points = meta.get("names"), arrays.get("points", np.empty(0))
+        if "file" in arrays:
+            name = display_name(meta.get("name"))
+            given = parse_landmarks(name, file_bytes(arrays, "file"))
+            names, points = list(given.names), given.points
+        if not isinstance(names, list):
+            raise RequestError("names must be a list of the names of landmarks.")
+        placed, told = place_landmarks(self._of.mesh, names, points)
+        self._of.history.did("Landmarks", landmarks=placed.write())
+        self._of.warn(told)
+
+    def _landmarks_array(self, tail: str) -> np.ndarray:
+        """Return a file of the landmarks of a side, as "0/fcsv", or vertices near carried ones."""
+        side, _, what = tail.partition("/")
+        if side not in ("0", "1"):
+            raise RequestError(f"Landmarks are those of side 0 or 1; not {tail[:80]!r}.")
+        mesh, points = self._of.mesh, self.landmarks.points(self._of.mesh)
+        if side == "1":
+            beside = self._require_beside()
+            mesh = beside.meshes[1]
+            points = beside.carry(self.landmarks.points(self._of.analysis.mesh))
+        if what == "vertices":  # -1 where nothing corresponds
+            vertices = np.full(len(points), -1, dtype="<i4")
+            known = np.isfinite(points).all(axis=1)
+            if known.any():
+                there = es.geometry.closest_points(mesh, points[known])
+                rows = mesh.faces[there.simplices]
+                vertices[known] = rows[np.arange(len(rows)), there.weights.argmax(axis=1)]
+            return vertices
+        return landmark_file(self.landmarks.names, points, what)

@@ -1,0 +1,212 @@
+"""Two shapes, landmarks and a collection in a real browser, by mouse and keyboard."""
+
+import json
+
+import numpy as np
+import pytest
+from browser import (
+    find,
+    move_pointer,
+    move_slider,
+    open_page,
+    place_of,
+    positions,
+    serve_studio,
+    vertex_values,
+    wait_until,
+    wait_until_still,
+)
+from test_company import collection  # noqa: F401  a fixture
+
+import eigenshape as es
+
+pytestmark = pytest.mark.long
+
+N_VERTICES = 800
+BOTH = ("eigenshape.viewer", "eigenshape.second.viewer")
+# The way from the middle to the eye, in the coordinates of right, up and front of each shape
+EYE = """(() => {
+    const sides = [[eigenshape.viewer, eigenshape.state], [eigenshape.second.viewer, eigenshape.state.beside]];
+    return sides.map(([viewer, {up, towards}]) => {
+        const { camera, controls } = viewer;
+        const vector = () => camera.position.clone();
+        const upward = vector().fromArray(up);
+        const right = upward.clone().cross(vector().fromArray(towards)).normalize();
+        const eye = vector().sub(controls.target).normalize();
+        return [right, upward, right.clone().cross(upward)].map((axis) => axis.dot(eye));
+    });
+})()"""
+
+
+def attribute(page, name, side):
+    code = f"Array.from({BOTH[side]}.geometry.getAttribute('{name}').array)"
+    return np.array(page.evaluate(code))
+
+
+def discs(page, side):
+    code = f"{BOTH[side]}.discs.visible ? Array.from({BOTH[side]}.discs.geometry.index.array) : []"
+    return page.evaluate(code)
+
+
+def place_in_second(page, point):
+    """Return where a point of the second shape is seen."""
+    page.evaluate(
+        "[window.first, eigenshape.viewer] = [eigenshape.viewer, eigenshape.second.viewer]"
+    )
+    found = place_of(page, point)
+    page.evaluate("eigenshape.viewer = window.first")
+    return found
+
+
+def seen_vertex(page, side):
+    """Return a vertex that nothing hides, as the picture says, and where it is seen."""
+    code = f"""(() => {{
+        const {{ canvas, pick }} = {BOTH[side]};
+        const view = {BOTH[side]};
+        for (const x of [0.5, 0.45, 0.55, 0.4, 0.6])
+            for (const y of [0.5, 0.45, 0.55, 0.4]) {{
+                const hit = view.pick(x * canvas.clientWidth, y * canvas.clientHeight);
+                if (hit) return hit.vertex;
+            }}
+    }})()"""
+    vertex = page.evaluate(code)
+    point = attribute(page, "position", side).reshape(-1, 3)[vertex]
+    return vertex, place_of(page, point) if side == 0 else place_in_second(page, point)
+
+
+@pytest.fixture(scope="module")
+def other(tmp_path_factory):
+    path = tmp_path_factory.mktemp("second") / "other.ply"
+    es.write_mesh(es.make_creature("quadruped", 1, n_vertices=N_VERTICES), path)
+    return path
+
+
+def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page, other):
+    find(page, "tab-compare").click()
+    with page.expect_file_chooser() as chooser:
+        find(page, "second-file").click()
+    chooser.value.set_files(other)
+    wait_until(page, "eigenshape.state.beside?.map.status === 'ready'", 120)
+    wait_until(page, "eigenshape.panels.find(({ id }) => id === 'compare').map !== null")
+    wait_until_still(page)
+
+    # One camera follows the other, in both directions.
+    for side in (0, 1):
+        page.locator('[data-test="canvas"]').nth(side).press("ArrowLeft")
+        page.locator('[data-test="canvas"]').nth(side).press("ArrowUp")
+        eyes = np.array(page.evaluate(EYE))
+        np.testing.assert_allclose(eyes[0], eyes[1], atol=1e-6)
+
+    # Equal colors correspond; what is not sure is gray.
+    compare = "eigenshape.panels.find(({ id }) => id === 'compare').map"
+    partners, back = (
+        np.array(page.evaluate(f"Array.from({compare}.partners[{i}])")) for i in (0, 1)
+    )
+    ours, theirs = (attribute(page, "mark", side).reshape(-1, 4).astype(int) for side in (0, 1))
+    assert (ours[:, 3] == 255).all()
+    assert np.median(np.abs(ours[:, :3] - theirs[partners, :3])) <= 6
+
+    # The point under the pointer, and the one that corresponds
+    _, place = seen_vertex(page, 0)
+    move_pointer(page, *place)
+    wait_until(page, "eigenshape.viewer.discs.visible")
+    assert discs(page, 1) == [partners[discs(page, 0)[0]]]
+    assert find(page, "under-pointer").inner_text().startswith("Right by ")
+
+    # Two points that belong together: the map goes through them, and Ctrl+Z takes that back.
+    find(page, "correct").click()
+    _vertex, place = seen_vertex(page, 0)
+    page.mouse.click(*place)
+    _there, place = seen_vertex(page, 1)
+    page.mouse.click(*place)
+    wait_until(page, "eigenshape.state.beside.pairs.length === 1", 60)
+    wait_until(page, "eigenshape.state.beside.map.status === 'ready'", 60)
+    wait_until_still(page)
+    chosen = page.evaluate("eigenshape.state.beside.pairs[0]")
+    assert page.evaluate(f"{compare}.partners[0][{chosen[0]}]") == chosen[1]
+    page.keyboard.press("Control+z")
+    wait_until(page, "eigenshape.state.beside.pairs.length === 0", 60)
+    wait_until(page, "eigenshape.state.beside.map.status === 'ready'", 60)
+    wait_until_still(page)
+
+    # What is painted on one is seen on the other.
+    find(page, "tab-deform").click()
+    find(page, "tool-brush").click()
+    _, place = seen_vertex(page, 0)
+    page.mouse.click(*place)
+    wait_until_still(page)
+    back = np.array(page.evaluate(f"Array.from({compare}.partners[1])"))
+    ours, theirs = (attribute(page, "mark", side).reshape(-1, 4) for side in (0, 1))
+    assert (ours[:, 3] > 0).any()
+    np.testing.assert_array_equal(theirs[back >= 0], ours[back[back >= 0]])
+
+    find(page, "close-match").click()
+    wait_until(page, "eigenshape.second === null")
+    assert page.locator('[data-test="canvas"]').count() == 1
+
+
+def test_landmarks_are_placed_named_moved_saved_and_loaded(page, tmp_path):
+    find(page, "tab-landmarks").click()
+    find(page, "place").click()
+    _first, place = seen_vertex(page, 0)
+    page.mouse.click(*place)
+    wait_until(page, "eigenshape.state.landmarks.length === 1")
+    page.mouse.click(place[0] + 25, place[1])
+    wait_until(page, "eigenshape.state.landmarks.length === 2")
+    find(page, "place").click()
+    wait_until_still(page)
+    assert len(discs(page, 0)) == 2
+    name = find(page, "landmark-0").locator("input")
+    name.fill("withers")
+    name.press("Enter")
+    wait_until(page, "eigenshape.state.landmarks[0].name === 'withers'")
+    with page.expect_download() as download:
+        find(page, "save-0").get_by_text(".mrk.json").click()
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    saved = es.morphometrics.read_landmarks(path)
+    points = page.evaluate("eigenshape.state.landmarks.map(({ point }) => point)")
+    assert saved.names == ("withers", "2")
+    np.testing.assert_array_equal(saved.points, points)
+
+    find(page, "landmark-1").get_by_text("Move").click()
+    page.mouse.click(place[0], place[1] + 20)
+    wait_until(
+        page, f"JSON.stringify(eigenshape.state.landmarks[1].point) !== '{json.dumps(points[1])}'"
+    )
+    find(page, "landmark-0").get_by_text("×").click()
+    wait_until(page, "eigenshape.state.landmarks.length === 1")
+    page.keyboard.press("Control+z")
+    wait_until(page, "eigenshape.state.landmarks.length === 2")
+    with page.expect_file_chooser() as chooser:
+        find(page, "load-landmarks").click()
+    chooser.value.set_files(path)
+    wait_until_still(page)
+    again = page.evaluate("eigenshape.state.landmarks.map(({ point }) => point)")
+    np.testing.assert_allclose(again, points, atol=1e-9)
+
+
+def test_a_collection_has_sliders_and_specimens(browser, collection):  # noqa: F811
+    with serve_studio(collection) as url, open_page(browser, url) as page:
+        find(page, "tab-collection").click()
+        mean = positions(page)
+        move_slider(page, "mode-0", 2)
+        wait_until(page, "eigenshape.panels.find(({ id }) => id === 'collection').modes !== null")
+        wait_until_still(page)
+        modes = np.array(
+            page.evaluate(
+                "Array.from(eigenshape.panels.find(({ id }) => id === 'collection').modes)"
+            )
+        ).reshape(-1, *mean.shape)
+        np.testing.assert_allclose(positions(page), mean + 2 * modes[0], atol=1e-5)
+        assert np.abs(vertex_values(page)).max() > 0
+        find(page, "mean").click()
+        wait_until_still(page)
+        np.testing.assert_allclose(positions(page), mean, atol=1e-6)
+        find(page, "specimen-b").click()
+        wait_until(page, "eigenshape.second?.viewer.vertices.length > 0")
+        wait_until(page, "eigenshape.state.beside.map.status === 'ready'")
+        find(page, "tab-compare").click()
+        wait_until_still(page)
+        assert page.evaluate("eigenshape.state.beside.name") == "b"
+        assert (attribute(page, "mark", 1).reshape(-1, 4)[:, 3] == 255).all()
