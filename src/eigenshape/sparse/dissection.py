@@ -101,7 +101,7 @@ class _Dissection:
         self.nodes, self.place = np.arange(n), np.arange(n)  # nodes[place[v]] = v
         # The name of the segment that a point lies in; -1 when its place is final.
         self.owner = np.zeros(n, dtype=np.int64)
-        self.one, self.two, self.queue, self.key = (np.empty(n, dtype=np.int64) for _ in range(4))
+        self.one, self.queue, self.key = (np.empty(n, dtype=np.int64) for _ in range(3))
         bits = LEAF * -(-n // WORD)
         self.leaf_memory = SpareMemory(
             lambda: (
@@ -151,7 +151,7 @@ class _Dissection:
 
         None where it is nearly a clique, or nothing would be left beside the cut.
         """
-        graph, owner, key, one, two = self.graph, self.owner, self.key, self.one, self.two
+        graph, owner, key, one = self.graph, self.owner, self.key, self.one
         size = len(points)
         # A search from any point ends far away, one from there farther, and so on. The distances
         # from two of these ends make a key.
