@@ -172,8 +172,8 @@ def test_nodes_of_elements_are_ordered_by_the_corners_that_dominate_them(order, 
     for node in range(mesh.n_points, len(place)):
         neighbors = pattern[:, [node]].indices
         assert place[node] < place[neighbors[neighbors < mesh.n_points]].max()
-    monkeypatch.setattr(elimination, "SOLID_NEIGHBORS", np.inf)
-    monkeypatch.setattr(dissection, "SOLID_NEIGHBORS", np.inf)
+    monkeypatch.setattr(elimination, "DENSE", np.inf)
+    monkeypatch.setattr(dissection, "DENSE", np.inf)
     assert reduced.n_entries < 0.9 * analyze_pattern(pattern).n_entries
 
 
@@ -182,7 +182,7 @@ def test_solids_have_fewer_entries_with_several_keys_and_narrow_cuts(monkeypatch
     mesh = SimplicialMesh(points, Delaunay(points).simplices)
     pattern = sp.csc_array(mass(mesh, mesh.simplices, 1))
     narrow = analyze_pattern(pattern).n_entries
-    monkeypatch.setattr(dissection, "SOLID_NEIGHBORS", np.inf)
+    monkeypatch.setattr(dissection, "DENSE", np.inf)
     assert narrow < 0.9 * analyze_pattern(pattern).n_entries
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain, combinations, count, pairwise
+from itertools import chain, count, pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,24 +28,29 @@ FINE = 64
 SEGMENTS_TO_SHARE = 16
 # and points of a segment that is worth a thread.
 WORTH_A_THREAD = 4000
-# Neighbors a point, itself included, from which on a graph counts as that of a solid: surfaces have
-# 7, tetrahedra 14. The separators of a solid are most of its factor, so more cuts are compared there,
-# and narrowed: the factor takes 0.4 of the multiplications. On surfaces it takes 0.9 (measured), less
-# than the cuts cost.
-SOLID_NEIGHBORS = 10
-# Points far apart whose distances make keys, on surfaces and in solids. In a cube these are corners,
-# and cuts across its diagonals are larger than others.
-ENDS, SOLID_ENDS = 2, 4
+# Neighbors a point, itself included, and the square of the points on a cut, over those that it cuts,
+# from which on these are of a solid: surfaces have 7 and 3, or 19 and 12 where second neighbors are
+# joined, tetrahedra 14 and more the more they are. The separators of a solid are most of its factor,
+# so that other cuts compete there and the best is narrowed: 0.4 of the multiplications are left. On
+# surfaces 0.9 would be (measured), which costs more than it saves.
+DENSE, SOLID_CUT = 10, 16
+# Points far apart whose distances make the keys in a solid. In a cube these are corners, and the cut
+# across the diagonal of the first two is larger than others.
+SOLID_ENDS = 4
 BELOW, ABOVE, CUT = 0, 1, 2  # sides of a segment, as `take_sides` numbers them
 
 
 @dataclass(frozen=True)
 class _Segment:
-    """Points nodes[start:stop] that are still to be ordered; whether they are known to be connected."""
+    """Points nodes[start:stop] that are still to be ordered.
+
+    Also whether they are known to be connected, and to be part of a solid.
+    """
 
     start: int
     stop: int
     connected: bool
+    solid: bool
 
     @property
     def size(self) -> int:
@@ -74,7 +79,7 @@ def dissect(indptr: Indices, indices: Indices, leaf: int = LEAF) -> Indices:
     """
     n = len(indptr) - 1
     dissection = _Dissection(indptr, indices, leaf)
-    waiting, name = [_Segment(0, n, False)], 1
+    waiting, name = [_Segment(0, n, False, False)], 1
     # Rounds of cuts side by side, until there are segments for all threads; names may be any that
     # are not in use.
     while free_threads() > 1 and 0 < len(waiting) < SEGMENTS_TO_SHARE:
@@ -96,7 +101,7 @@ class _Dissection:
     def __init__(self, indptr: Indices, indices: Indices, leaf: int) -> None:
         n = len(indptr) - 1
         self.graph, self.leaf = (indptr, indices), leaf
-        self.solid = len(indices) >= SOLID_NEIGHBORS * n
+        self.dense = len(indices) >= DENSE * n
         self.rows = sp.csr_array((np.ones(len(indices)), indices, indptr), shape=(n, n))
         self.nodes, self.place = np.arange(n), np.arange(n)  # nodes[place[v]] = v
         # The name of the segment that a point lies in; -1 when its place is final.
@@ -134,53 +139,63 @@ class _Dissection:
             ends = _find_pieces(measure, points, owner, name, self.one, queue)
             points[:] = queue
             self.place[points] = np.arange(start, stop)
-            return [_Segment(start + low, start + high, True) for low, high in pairwise([0, *ends])]
-        numbers = self._sort_by_sides(points, name, queue)
+            return [
+                _Segment(start + low, start + high, True, segment.solid)
+                for low, high in pairwise([0, *ends])
+            ]
+        numbers = self._sort_by_sides(points, name, queue, segment.solid)
         if numbers is None:
             owner[points] = -1
             return []
-        n_first, n_cut = numbers
+        n_first, n_cut, solid = numbers
         self.place[points] = np.arange(start, stop)
         middle, cut = start + n_first, stop - n_cut
         owner[points[segment.size - n_cut :]] = -1
-        halves = _Segment(start, middle, False), _Segment(middle, cut, False)
+        halves = _Segment(start, middle, False, solid), _Segment(middle, cut, False, solid)
         return [half for half in halves if half.size]
 
-    def _sort_by_sides(self, points: Indices, name: int, queue: Indices) -> tuple[int, int] | None:
-        """Sort a segment: below the cheapest cut, above it, on it; return the first and last number.
+    def _sort_by_sides(
+        self, points: Indices, name: int, queue: Indices, solid: bool
+    ) -> tuple[int, int, bool] | None:
+        """Sort a segment: below the cheapest cut, above it, on it.
 
+        Return the first and the last number, and whether the segment is part of a solid.
         None where it is nearly a clique, or nothing would be left beside the cut.
         """
         graph, owner, key, one = self.graph, self.owner, self.key, self.one
         size = len(points)
+        side = np.empty(size, dtype=np.int8)
+        lowest = np.inf
         # A search from any point ends far away, one from there farther, and so on. The distances
         # from two of these ends make a key.
         breadth_first(*graph, points[0], owner, name, one, queue)
         distances: list[Indices] = []
-        for _ in range(SOLID_ENDS if self.solid else ENDS):
-            end = queue[-1]
-            if len(distances) > 1:
-                end = points[np.min(distances, axis=0).argmax()]
+        for n_before in range(SOLID_ENDS):
+            end = points[np.min(distances, axis=0).argmax()] if n_before > 1 else queue[-1]
             breadth_first(*graph, end, owner, name, one, queue)
-            distances.append(one[points])
-        side = np.empty(size, dtype=np.int8)
-        lowest = np.inf
-        for nearer, farther in combinations(distances, 2):
-            key[points] = FINE * (nearer - farther)
-            smooth_keys(*graph, points, owner, name, key, one)
-            low, high = key[points].min(), key[points].max()
-            counts = np.zeros((3, high - low + 2), dtype=np.int64)
-            n_joined = count_cuts(*graph, points, owner, name, key, low, *counts)
-            # The cheapest cut: the points on it, over those on its smaller side
-            sums = counts.cumsum(axis=1)
-            smaller = np.minimum(sums[0], sums[0, -1] - sums[0])
-            costs = np.full((len(smaller), 2), np.inf)
-            np.divide(sums[1:].T + 1, smaller[:, None], out=costs, where=smaller[:, None] > 0)
-            cut_at, from_below = divmod(int(costs.argmin()), 2)
-            if costs.min() < lowest or lowest == np.inf:
-                lowest = costs.min()
-                take_sides(*graph, points, owner, name, key, low + cut_at, not from_below, side)
-        if self.solid:
+            latest = one[points]
+            for earlier in distances:
+                key[points] = FINE * (earlier - latest)
+                smooth_keys(*graph, points, owner, name, key, one)
+                low, high = key[points].min(), key[points].max()
+                counts = np.zeros((3, high - low + 2), dtype=np.int64)
+                n_joined = count_cuts(*graph, points, owner, name, key, low, *counts)
+                # The cheapest cut: the points on it, over those on its smaller side
+                sums = counts.cumsum(axis=1)
+                smaller = np.minimum(sums[0], sums[0, -1] - sums[0])
+                costs = np.full((len(smaller), 2), np.inf)
+                np.divide(sums[1:].T + 1, smaller[:, None], out=costs, where=smaller[:, None] > 0)
+                cut_at, from_below = divmod(int(costs.argmin()), 2)
+                if n_before == 1 or costs.min() < lowest:
+                    lowest = costs.min()
+                    level = low + cut_at
+                    take_sides(*graph, points, owner, name, key, level, not from_below, side)
+            distances.append(latest)
+            n_cut = np.count_nonzero(side == CUT)
+            solid = solid or (self.dense and n_cut**2 > SOLID_CUT * size)
+            if n_before == 1 and not solid:
+                break
+        else:
             side = self._narrow_cut(points, name, side)
         n_first, _, n_cut = np.bincount(side, minlength=3).tolist()
         # If half of all pairs are joined, no order saves much, and cuts of one point each take
@@ -190,7 +205,7 @@ class _Dissection:
         if n_cut in (0, size) or (full and not parted):
             return None
         points[:] = points[np.argsort(side, kind="stable")]
-        return n_first, n_cut
+        return n_first, n_cut, solid
 
     def _narrow_cut(self, points: Indices, name: int, side: Indices) -> Indices:
         """Return sides with a cut that costs as much or less, found by bipartite matchings (Liu 1989).
@@ -207,6 +222,8 @@ class _Dissection:
             rows = self.rows[cut]
             others = rows.indices
             joined = (self.owner[others] == name) & (sides[others] == near)
+            if not joined.any():
+                continue
             beside, columns = np.unique(others[joined], return_inverse=True)
             rows_joined = np.repeat(np.arange(len(cut)), np.diff(rows.indptr))[joined]
             edges = sp.coo_array(

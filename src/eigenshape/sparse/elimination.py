@@ -8,7 +8,7 @@ from eigenshape._arrays import record
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
 from eigenshape.sparse.dense_loops import LONG, NARROW
-from eigenshape.sparse.dissection import SOLID_NEIGHBORS, dissect
+from eigenshape.sparse.dissection import DENSE, dissect
 from eigenshape.sparse.dissection_loops import LEAF
 from eigenshape.sparse.tasks import Tasks, divide_fronts
 
@@ -155,7 +155,7 @@ def _order_points(indptr: Indices, indices: Indices) -> Indices:
     been joined without it.
     """
     n = len(indptr) - 1
-    if len(indices) < SOLID_NEIGHBORS * n:
+    if len(indices) < DENSE * n:
         return dissect(indptr, indices)
     degrees = np.diff(indptr)
     leader, mark = _unknown(n), _unknown(n)
