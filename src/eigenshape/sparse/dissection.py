@@ -192,7 +192,7 @@ class _Dissection:
                     take_sides(*graph, points, owner, name, key, level, not from_below, side)
             distances.append(latest)
             n_cut = np.count_nonzero(side == CUT)
-            solid = solid or (self.dense and n_cut**2 > SOLID_CUT * size)
+            solid = solid or bool(self.dense and n_cut**2 > SOLID_CUT * size)
             if n_before == 1 and not solid:
                 break
         else:
