@@ -95,6 +95,7 @@ FIGURES = {
     "factor": Figure("bench_factor.py --sizes 5 6 160000", ("sparse",)),
     "parts": Figure("bench_parts.py", SOLVER),
     "merge": Figure("bench_merge.py --repeats 1", ("features",)),
+    "tetrahedra": Figure("bench_tetrahedra.py --repeats 1", ("operators", *SOLVER)),
     "growth": Figure("bench_growth.py --only points pairs kernel --repeats 1", SOLVER),
     "features": Figure("bench_features.py --repeats 1", (*HEAT, *SOLVER)),
     "first_call": Figure("bench_first_call.py --repeats 1", ("_compile.py", "spectral/solver")),

@@ -29,3 +29,18 @@ def test_all_methods_assemble_the_same_kernel(run_quick):
     for row in rows[1:]:
         assert row["trace"] == pytest.approx(rows[0]["trace"], rel=1e-12)
         assert row["entries"] == rows[0]["entries"]
+
+
+@pytest.mark.long
+def test_all_libraries_solve_the_same_tetrahedra(run_quick):
+    rows, _, page = run_quick("bench_tetrahedra.py")
+    assert [(row["order"], row["library"]) for row in rows[:3]] == [
+        (1, "eigenshape"),
+        (1, "ARPACK"),
+        (1, "LaPy"),
+    ]
+    errors = [row["error"] for row in rows]
+    assert errors[:3] == pytest.approx([errors[0]] * 3, rel=1e-4)
+    assert errors[3] == pytest.approx(errors[4], rel=1e-4)
+    assert errors[5] < errors[3] / 10 < errors[0] / 100
+    assert "| P3 | 4,096 | eigenshape |" in page

@@ -6,10 +6,15 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pencils import random_symmetric
+from scipy.spatial import Delaunay
 
+from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.elements import mass
+from eigenshape.operators.fem import fem_laplacian
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.spheres import fibonacci_sphere
+from eigenshape.sparse import dissection, elimination
 from eigenshape.sparse.elimination import analyze_pattern
 from eigenshape.sparse.front_loops import WIDE
 from eigenshape.sparse.symmetric_factor import factorize_symmetric
@@ -155,3 +160,39 @@ def test_the_bound_of_rounding_is_that_of_the_factor_in_any_unit():
         share = found[elimination.order] / (unit * np.finfo(np.float64).eps * sizes)
         assert (share <= lengths + 5).all()
         assert (share >= 4).all()
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_nodes_of_elements_are_ordered_by_the_corners_that_dominate_them(order, monkeypatch):
+    mesh = box(6, 6, 6)
+    pattern = sp.csc_array(fem_laplacian(mesh, order).mass)
+    reduced = analyze_pattern(pattern)
+    # Corners alone are dissected, and each other node is eliminated before some corner of its element.
+    place = np.argsort(reduced.order)
+    for node in range(mesh.n_points, len(place)):
+        neighbors = pattern[:, [node]].indices
+        assert place[node] < place[neighbors[neighbors < mesh.n_points]].max()
+    monkeypatch.setattr(elimination, "DENSE", np.inf)
+    monkeypatch.setattr(dissection, "DENSE", np.inf)
+    assert reduced.n_entries < 0.9 * analyze_pattern(pattern).n_entries
+
+
+def test_solids_have_fewer_entries_with_several_keys_and_narrow_cuts(monkeypatch):
+    points = np.random.default_rng(0).random((1500, 3))
+    mesh = SimplicialMesh(points, Delaunay(points).simplices)
+    pattern = sp.csc_array(mass(mesh, mesh.simplices, 1))
+    narrow = analyze_pattern(pattern).n_entries
+    monkeypatch.setattr(dissection, "DENSE", np.inf)
+    assert narrow < 0.9 * analyze_pattern(pattern).n_entries
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 9), st.integers(1, 9), st.floats(0, 1), st.integers(0, 10**6))
+def test_the_smallest_cover_meets_all_edges(n_rows, n_columns, density, seed):
+    edges = np.random.default_rng(seed).random((n_rows, n_columns)) < density
+    outside, columns = dissection._cover_edges(sp.csr_array(edges.astype(float)))
+    assert not np.delete(edges[outside], columns, axis=1).any()
+    # No smaller set of rows and columns does (brute force over the rows).
+    rows = [np.array(each, dtype=bool) for each in itertools.product([0, 1], repeat=n_rows)]
+    smallest = min(int(each.sum() + edges[~each].any(axis=0).sum()) for each in rows)
+    assert n_rows - len(outside) + len(columns) == smallest

@@ -12,7 +12,7 @@ from eigenshape.geometry.simplices import require_volumes, scaled_corners, trian
 from eigenshape.operators import elements
 from eigenshape.operators.choices import Mass
 from eigenshape.operators.cotangent import linear_mass
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, with_mass_floor
 
 # Asymmetry and negative eigenvalues up to this share of the largest entry count as rounding.
 TENSOR_ROUNDING = 1e-12
@@ -81,7 +81,8 @@ def anisotropic_laplacian(
         )
     require_sound(mesh)
     products = elements.gradient_products(mesh, tensors)
-    return Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
+    laplacian = Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
+    return with_mass_floor(laplacian, elements.mass_floor(mesh.dim, 1))
 
 
 def curvature_tensors(

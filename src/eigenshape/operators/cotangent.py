@@ -16,7 +16,7 @@ from eigenshape.geometry.simplices import dual_volumes, in_length
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
 from eigenshape.operators.choices import Mass
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, with_mass_floor
 
 # Dimension in which the default mass is averaged: experiments/ch3_tetrahedra chose it.
 TETRAHEDRA = 3
@@ -89,7 +89,8 @@ def cotangent_laplacian(
             )
         # Gradients are constant on a simplex, so the integral takes the mean.
         products = products * values[mesh.simplices].mean(axis=1)[:, None, None]
-    return Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
+    laplacian = Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
+    return with_mass_floor(laplacian, elements.mass_floor(mesh.dim, 1))
 
 
 def linear_mass(mesh: Mesh, mass: Mass) -> sp.csr_array:

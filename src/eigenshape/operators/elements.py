@@ -10,6 +10,7 @@ from itertools import combinations_with_replacement
 from math import factorial
 
 import numpy as np
+import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
@@ -110,6 +111,13 @@ def reference_mass(dim: int, order: int) -> Float[np.ndarray, "nodes nodes"]:
     """Return ∫ N_i N_j over a simplex of volume 1."""
     exponents, coefficients = _basis(dim, order)
     return freeze(coefficients.T @ _integrals(exponents[:, None] + exponents) @ coefficients)
+
+
+@lru_cache
+def mass_floor(dim: int, order: int) -> float:
+    """Return the largest c with B ≥ c diag(B) on one simplex, and so on any mesh."""
+    reference = reference_mass(dim, order)
+    return float(sl.eigvalsh(reference, np.diag(np.diag(reference)))[0])
 
 
 @lru_cache

@@ -11,7 +11,7 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import elements
-from eigenshape.operators.laplacian import Laplacian
+from eigenshape.operators.laplacian import Laplacian, with_mass_floor
 
 HIGHEST = 3  # order of elements; the tests fit the convergence of orders 1 to 3
 
@@ -59,9 +59,10 @@ def fem_laplacian(mesh: MeshLike, order: Integer = 2) -> Laplacian:
     require_sound(mesh)
     _, nodes = elements.number_nodes(mesh.simplices, degree)
     products = elements.gradient_products(mesh)
-    return Laplacian(
+    laplacian = Laplacian(
         elements.stiffness(nodes, products, degree), elements.mass(mesh, nodes, degree)
     )
+    return with_mass_floor(laplacian, elements.mass_floor(mesh.dim, degree))
 
 
 def fem_nodes(mesh: MeshLike, order: Integer = 2) -> Float[np.ndarray, "nodes d"]:

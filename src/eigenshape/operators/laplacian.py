@@ -132,6 +132,10 @@ class Laplacian(ReadOnly):
     mass: sp.csr_array
     kernel: GaussianKernel | None = None
 
+    # A c with B ≥ c diag(B), known from how B was built (`with_mass_floor`). Where it is 0, solvers
+    # prove one by a factor of B. It is no field, so that `replace` with another mass forgets it.
+    mass_floor = 0.0
+
     def __post_init__(self) -> None:
         for name in ("stiffness", "mass"):
             object.__setattr__(self, name, as_symmetric(name, getattr(self, name)))
@@ -151,6 +155,12 @@ class Laplacian(ReadOnly):
     def n_points(self) -> int:
         """Number of points n on which the operator acts."""
         return int(self.stiffness.shape[0])
+
+
+def with_mass_floor(laplacian: Laplacian, floor: float) -> Laplacian:
+    """Note in an operator that is new, and return it, that B ≥ floor · diag(B)."""
+    object.__setattr__(laplacian, "mass_floor", floor)
+    return laplacian
 
 
 def find_zero_row_sums(matrix: sp.sparray) -> Bool[np.ndarray, " n"]:
@@ -211,7 +221,7 @@ def dirichlet_laplacian(
             f"At least one point must be free; all {laplacian.n_points} are fixed."
         )
     cut = {name: getattr(laplacian, name)[free][:, free] for name in ("stiffness", "mass")}
-    return replace(laplacian, **cut), free
+    return with_mass_floor(replace(laplacian, **cut), laplacian.mass_floor), free
 
 
 def require_points(fixed: ArrayLike, n_points: int) -> Int[np.ndarray, " c"]:

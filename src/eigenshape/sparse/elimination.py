@@ -8,10 +8,13 @@ from eigenshape._arrays import record
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
 from eigenshape.sparse.dense_loops import LONG, NARROW
-from eigenshape.sparse.dissection import dissect
+from eigenshape.sparse.dissection import DENSE, dissect
+from eigenshape.sparse.dissection_loops import LEAF
 from eigenshape.sparse.tasks import Tasks, divide_fronts
 
 Indices = Int[np.ndarray, " ..."]
+# Largest share of points that are not dominated by others with which they alone are dissected.
+LARGEST_CORE = 0.5
 
 
 @record
@@ -75,7 +78,7 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
     """
     n = pattern.shape[0]
     indptr, indices = pattern.indptr.astype(np.int64), pattern.indices.astype(np.int64)
-    order = dissect(indptr, indices)
+    order = _order_points(indptr, indices)
     parent = _unknown(n)  # of each column of the factor; -1 at a root
     symbolic.find_parents(indptr, indices, order, _inverse(order), parent, _unknown(n))
 
@@ -140,6 +143,34 @@ def analyze_pattern(pattern: sp.csc_array) -> Elimination:
         lower_rows=lower_rows[source],
         source=source,
     )
+
+
+def _order_points(indptr: Indices, indices: Indices) -> Indices:
+    """Return an order of elimination with few entries in the factor.
+
+    A point is dominated by a neighbor that has all of its neighbors, as a node on an edge or in a
+    triangle of quadratic or cubic elements is by a corner. If most points are, the others are
+    dissected, a smaller graph whose separators are those of the mesh, and each dominated point is
+    eliminated just before the first that dominates it. That joins no points that would not have
+    been joined without it.
+    """
+    n = len(indptr) - 1
+    if len(indices) < DENSE * n:
+        return dissect(indptr, indices)
+    degrees = np.diff(indptr)
+    leader, mark = _unknown(n), _unknown(n)
+    symbolic.find_dominated(indptr, indices, np.argsort(-degrees, kind="stable"), leader, mark)
+    core = np.flatnonzero(leader < 0)
+    if len(core) > LARGEST_CORE * n:
+        return dissect(indptr, indices)
+    graph = sp.csr_array((np.ones(len(indices)), indices, indptr), shape=(n, n))[core][:, core]
+    # A leaf is to have as many points with those that are dominated.
+    leaf = max(LEAF * len(core) // n, 1)
+    order = core[dissect(graph.indptr.astype(np.int64), graph.indices.astype(np.int64), leaf)]
+    leader[:], mark[:] = -1, -1
+    symbolic.find_dominated(indptr, indices, order, leader, mark)
+    leader[order] = np.arange(len(order))
+    return np.lexsort((degrees, leader))
 
 
 def _unknown(n: int) -> Indices:

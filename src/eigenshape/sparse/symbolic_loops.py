@@ -16,6 +16,35 @@ BEYOND_ZEROS = 0.05
 
 
 @njit
+def find_dominated(indptr, indices, order, leader, mark):
+    """Fill the place, in an order of points, of the first that dominates each other point.
+
+    Point v dominates its neighbor u if it is joined to all neighbors of u; of two points that
+    dominate each other, the first in the order does. A point that is dominated itself is passed
+    over: what dominates it dominates all that it does. `leader` and `mark` come filled with -1;
+    `mark` is scratch.
+    """
+    for place in range(len(order)):
+        v = order[place]
+        if leader[v] >= 0:
+            continue
+        mark[v] = v
+        for at in range(indptr[v], indptr[v + 1]):
+            mark[indices[at]] = v
+        for at in range(indptr[v], indptr[v + 1]):
+            u = indices[at]
+            if u == v or leader[u] >= 0:
+                continue
+            inside = True
+            for other in range(indptr[u], indptr[u + 1]):
+                if mark[indices[other]] != v:
+                    inside = False
+                    break
+            if inside:
+                leader[u] = place
+
+
+@njit
 def find_parents(indptr, indices, order, place, parent, ancestor):
     """Fill the elimination tree: the parent of each column, -1 at a root (Liu 1990).
 

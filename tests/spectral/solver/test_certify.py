@@ -8,7 +8,9 @@ from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.solver import certify as certify_module
 from eigenshape.spectral.solver import inertia as count
-from eigenshape.spectral.solver.certify import certify
+from eigenshape.spectral.solver.certify import certify, prove
+from eigenshape.spectral.solver.eigenpairs import Pairs
+from eigenshape.spectral.solver.pencil import normalize, residual_norms
 
 
 @pytest.fixture(scope="module")
@@ -124,3 +126,20 @@ def test_arrays_that_do_not_fit_are_refused(bumpy):
         certify(laplacian, values, np.where(vectors == vectors[3, 3], np.nan, vectors))
     with pytest.raises(InvalidParameterError, match=r"must ascend; 1 is"):
         certify(laplacian, values[::-1].copy(), vectors)
+
+
+def test_a_value_that_follows_lets_the_count_stand_in_the_gap_before_it(bumpy):
+    laplacian, spectrum = bumpy
+    pencil = normalize(laplacian)
+    values = np.ldexp(spectrum.eigenvalues, -pencil.value_exponent)
+    vectors = np.ldexp(spectrum.eigenvectors, -pencil.vector_exponent)
+    pairs = Pairs(values, vectors, residual_norms(pencil, values, vectors)).select(slice(10))
+    near = prove(pencil, pairs)
+    halfway = prove(pencil, pairs, following=values[10:])
+    assert halfway.complete
+    assert halfway.shift == pytest.approx((values[9] + values[10]) / 2, rel=1e-9)
+    assert (halfway.n_split, halfway.clusters) == (near.n_split, near.clusters)
+    # If others lie between, the count is made again just above the last.
+    again = prove(pencil, pairs, following=values[20:])
+    assert again.count == 10
+    assert again.shift == pytest.approx(near.shift, rel=1e-9)

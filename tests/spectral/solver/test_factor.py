@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -5,7 +7,9 @@ from pencils import dense_eigenvalues, graph, path, wild
 
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.cotangent import cotangent_laplacian
+from eigenshape.operators.fem import fem_laplacian
 from eigenshape.operators.laplacian import Laplacian
+from eigenshape.shapes.domains import box
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.sparse.front_loops import WIDE
 from eigenshape.spectral.solver import shift as shift_module
@@ -120,6 +124,17 @@ def test_residual_bounds_hold_for_a_full_mass():
     nearest = np.abs(reference[:, None] - values).min(axis=0)
     assert (nearest <= residual_norms(pencil, values, vectors)).all()
     assert 0.2 < pencil.mass_floor < 0.5
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("mesh", [icosphere(1), box(2, 2, 2)])
+def test_the_floor_of_the_mass_that_elements_know_is_the_one_that_a_factor_proves(mesh, order):
+    known = fem_laplacian(mesh, order)
+    unknown = Laplacian(known.stiffness, known.mass)
+    assert known.mass_floor > 0 == unknown.mass_floor
+    assert normalize(known).mass_floor == normalize(unknown).mass_floor < 0.5
+    # Of another mass nothing is known.
+    assert replace(known, mass=known.mass + known.stiffness).mass_floor == 0
 
 
 def test_an_indefinite_mass_is_refused():

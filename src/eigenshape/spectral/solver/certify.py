@@ -118,10 +118,16 @@ def certify(
     return certificate
 
 
-def prove(pencil: Pencil, pairs: Pairs, factor: Factor | None = None) -> Certificate:
+def prove(
+    pencil: Pencil,
+    pairs: Pairs,
+    factor: Factor | None = None,
+    following: Float[np.ndarray, " j"] | tuple[()] = (),
+) -> Certificate:
     """Count the eigenvalues up to just above the last pair, or up to its cluster if more copies follow.
 
-    A factor at any shift, which is spent, may save a trial: its rounding tells what to expect. The
+    A factor at any shift, which is spent, may save a trial: its rounding tells what to expect. So
+    may values that follow the last pair: first the count is made halfway to the first of them. The
     certificate, in the pencil's units, may be incomplete: then `count` differs from `n_found`.
 
     Raises a ConvergenceError if the pairs are not B-orthonormal eigenvectors, or no factor is good
@@ -130,6 +136,13 @@ def prove(pencil: Pencil, pairs: Pairs, factor: Factor | None = None) -> Certifi
     k, certificate = len(pairs.values), quality(pencil, pairs)
     if k == pencil.n:
         return certificate
+    for value in following[:1]:
+        step = (float(value) - float(pairs.values[-1])) / 2
+        if step > certificate.resolution:
+            factor = count_beside(pencil, pairs, k - 1, step, factor)
+            if factor.count <= k:
+                counted = with_count(certificate, pairs, factor.shift, factor.count)
+                return replace(counted, resolution=certificate.resolution)
     above = count_beside(pencil, pairs, k - 1, certificate.resolution, factor)
     certificate = with_count(certificate, pairs, above.shift, above.count)
     if above.count <= k:

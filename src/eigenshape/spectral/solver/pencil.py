@@ -117,12 +117,14 @@ def normalize(laplacian: Laplacian) -> Pencil:
     """
     _require_range("stiffness", laplacian.stiffness.diagonal())
     _require_range("mass", laplacian.mass.diagonal())
-    return _pencil(laplacian.stiffness, laplacian.mass, laplacian.kernel)
+    return _pencil(
+        laplacian.stiffness, laplacian.mass, laplacian.kernel, known_floor=laplacian.mass_floor
+    )
 
 
 def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
     """Return the pencil of one part, given by its W and B, scaled to its own units."""
-    part = _pencil(stiffness, mass, whole.kernel)
+    part = _pencil(stiffness, mass, whole.kernel, known_floor=whole.mass_floor)
     return replace(
         part,
         value_exponent=whole.value_exponent + part.value_exponent,
@@ -139,13 +141,18 @@ def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
 
 
 def _pencil(
-    stiffness: sp.sparray, mass: sp.sparray, kernel: GaussianKernel | None, *, scaled: bool = True
+    stiffness: sp.sparray,
+    mass: sp.sparray,
+    kernel: GaussianKernel | None,
+    *,
+    scaled: bool = True,
+    known_floor: float = 0.0,
 ) -> Pencil:
     up_w, up_b = (_exponent(stiffness), _exponent(mass)) if scaled else (0, 0)
     up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
     stiffness, mass = _scale(stiffness, -up_w), _scale(mass, -up_b)
     diagonal = mass.diagonal()
-    mass_floor = _mass_floor(mass, diagonal)
+    mass_floor = _mass_floor(mass, diagonal, known_floor)
     pattern = abs(stiffness) if mass_floor == 1.0 else abs(stiffness) + abs(mass)
     labels = connected_components(pattern, directed=False)[1].astype(np.int64)
     return Pencil(
@@ -234,14 +241,16 @@ def _keys(matrix: sp.csc_array) -> Int[np.ndarray, " e"]:
     return np.repeat(np.arange(n) * n, np.diff(matrix.indptr)) + matrix.indices
 
 
-def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"]) -> float:
-    # B - cD is positive definite exactly when all its pivots are positive. Linear elements have c =
-    # 1/2.
+def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"], known: float) -> float:
     if (mass - sp.diags_array(diagonal)).count_nonzero() == 0:
         return 1.0
+    # Linear elements have c = 1/2. The first of these that holds is used.
+    floors = 0.49 * 0.5 ** np.arange(12)
+    if known >= floors[-1]:
+        return float(floors[floors <= known].max())
+    # B - cD is positive definite exactly when all its pivots are positive.
     pattern = _shift_pattern(mass, sp.csc_array(sp.diags_array(diagonal)))
-    for halvings in range(12):
-        floor = 0.49 * 0.5**halvings
+    for floor in floors.tolist():
         lower = factorize_symmetric(pattern.elimination, pattern.stiffness - floor * pattern.mass)
         if lower and (lower.pivots > 0).all():
             return floor

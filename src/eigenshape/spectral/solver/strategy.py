@@ -33,6 +33,9 @@ DENSE_LIMIT = 6000
 # Pairs up to which one shift is used; more are found slice by slice, because orthogonalization
 # grows with the square of the pairs.
 ONE_SHIFT_PAIRS = 400
+# Entries a column of a factor from which on, as in solids of quadratic and cubic elements, another
+# factor costs more than one more pair.
+HEAVY_ENTRIES = 250
 # Runs of block Lanczos before giving up. Each run finds at least one missing pair or is the last.
 MOST_RUNS = 40
 # Groups of eight columns in a block at most; wider blocks find more copies of an eigenvalue at
@@ -135,21 +138,26 @@ def _solve_sparse(
 ) -> tuple[Pairs, Certificate]:
     """Find the pairs by block Lanczos around one shift, or slice by slice, and what is missing by further runs."""
     require_memory_for_pairs(pencil, k)
+    # Where factors are costly, one pair more is sought: in the middle of the gap before it rounding
+    # does not matter, so that the first count serves.
+    heavy = pencil.shift_pattern.elimination.n_entries > HEAVY_ENTRIES * pencil.n
+    n_sought = min(k + heavy, pencil.n)
     report(0.02, "looking for a shift")
     if in_slices:
-        vectors, factor = walk(pencil, k, _in_run(report, 0))
+        vectors, factor = walk(pencil, n_sought, _in_run(report, 0))
     else:
         factor = shift_inside(pencil, k)
-        wanted = Wanted(below=factor.count, above=k - factor.count)
+        wanted = Wanted(below=factor.count, above=n_sought - factor.count)
         none = np.empty((pencil.n, 0))
         _, vectors = block_lanczos(pencil, factor, wanted, locked=none, report=_in_run(report, 0))
 
     for run in range(1, MOST_RUNS + 1):
-        pairs = polish(pencil, factor, lowest_pairs(pencil, vectors, k))
+        found = polish(pencil, factor, lowest_pairs(pencil, vectors, n_sought))
+        pairs, following = found.select(slice(k)), found.values[k:]
         report(0.9, "counting eigenvalues")
         n_found, count_shift, missing = len(pairs.values), np.inf, k - len(pairs.values)
         if n_found == k:
-            certificate = prove(pencil, pairs, factor)
+            certificate = prove(pencil, pairs, factor, following)
             if certificate.complete:
                 return pairs, certificate
             count_shift, missing = certificate.shift, min(max(certificate.n_missing, 0), k)
@@ -163,7 +171,7 @@ def _solve_sparse(
         if n_found == k:
             # The count has spent the factor, which saves much memory where nothing is missing.
             factor = factorize_near(pencil, factor.shift)
-        _, found = block_lanczos(
+        _, more = block_lanczos(
             pencil,
             factor,
             wanted,
@@ -171,9 +179,9 @@ def _solve_sparse(
             groups=_groups_for(missing),
             report=_in_run(report, run),
         )
-        if not found.shape[1]:
+        if not more.shape[1]:
             break
-        vectors = np.hstack([pairs.vectors, found])
+        vectors = np.hstack([pairs.vectors, more])
     raise ConvergenceError(
         f"Every eigenvalue that inertia counts must be found; {len(pairs.values)} of {k} were found in {run} runs "
         f"and {missing} are missing."
