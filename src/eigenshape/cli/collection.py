@@ -29,6 +29,7 @@ def collection(
     output: Path,
     landmarks: Path | None = None,
     template: str | None = None,
+    unmirrored: bool = False,
     workers: Annotated[int | None, typer.Option(min=1)] = None,
     timeout: Annotated[float, typer.Option(min=1)] = 300.0,
     memory: Annotated[float | None, typer.Option(min=0.1)] = None,
@@ -37,8 +38,9 @@ def collection(
 ) -> None:
     """Bring all specimens of a folder into correspondence, and carry the landmarks of some to all.
 
-    The output has the mean shape (mean.ply), the landmarks of all specimens (landmarks.csv) and a
-    page that any browser opens (report.html). A specimen that fails is named, and the others go on.
+    The output has the mean shape (mean.ply), the landmarks of all specimens (landmarks.csv), their
+    sizes, sides and what was noticed (specimens.csv) and a page that any browser opens
+    (report.html). A specimen that fails is named, and the others go on.
     After Ctrl-C or a crash the same command continues where it stopped. The exit code is 3 if some
     specimens failed.
 
@@ -57,6 +59,9 @@ def collection(
     template
         Name of the specimen that is fitted to all others first. By default that of the collection in
         the output folder, or of a new one the specimen with the median area.
+    unmirrored
+        No specimen is a mirror image of another. Without this, mirror images are tried, and the
+        landmarks of two or more specimens tell where both sides of the form are alike.
     workers
         Number of processes that fit specimens at the same time. By default one for each core.
     timeout
@@ -78,11 +83,13 @@ def collection(
             folder,
             output,
             template=template,
+            landmarks=labelled,
+            unmirrored=unmirrored,
             workers=processes,
             callback=batch_reporter(progress, "failed"),
         )
     known = {name: points for name, points in labelled.items() if name in built.names}
-    written = [output / "mean.ply"]
+    written = [output / "mean.ply", output / "specimens.csv"]
     carried = None
     warnings = steps.landmarks_outside(built, known)
     warnings += [
@@ -104,6 +111,8 @@ def collection(
                 "output": output,
                 "specimens": built.names,
                 "template": built.template,
+                "sides": dict(zip(built.names, built.sides, strict=True)),
+                "methods": dict(zip(built.names, built.methods, strict=True)),
                 "labelled": list(known),
                 "doubtful": doubtful,
                 "notes": {name: notes for name, notes in built.notes.items() if notes},
@@ -131,5 +140,7 @@ def collection(
             print_written(path)
     for warning in warnings:
         err.print(f"[yellow]landmarks:[/] {escape_text(warning)}")
+    if unsure := steps.unsure_sides(built):
+        err.print(f"[yellow]mirror images:[/] {escape_text(unsure)}")
     if built.failures:
         raise typer.Exit(SOME_FAILED)

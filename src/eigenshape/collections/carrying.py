@@ -1,7 +1,5 @@
 """Landmarks carried from some specimens of a collection to all."""
 
-import csv
-import io
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from eigenshape.collections.spread_points import mean_radius
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
+from eigenshape.morphometrics.landmark_files import csv_text
 from eigenshape.morphometrics.landmarks import Landmarks, require_same_names
 
 # Expected error of a landmark from a single labelled specimen, where there is no second one to
@@ -67,14 +66,14 @@ class CarriedLandmarks(ReadOnly):
         OSError
             If the system cannot write there.
         """
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(["specimen", "landmark", "x", "y", "z", "spread", "doubtful"])
+        rows: list[list[object]] = [
+            ["specimen", "landmark", "x", "y", "z", "spread", "doubtful"]
+        ]
         for i, specimen in enumerate(self.specimens):
             for j, name in enumerate(self.names):
                 numbers = [*self.points[i, j].tolist(), float(self.spread[i, j])]
-                table.writerow([specimen, name, *numbers, int(self.doubtful[i, j])])
-        replace_file(as_path(path), text.getvalue().encode())
+                rows.append([specimen, name, *numbers, int(self.doubtful[i, j])])
+        replace_file(as_path(path), csv_text(rows).encode())
 
 
 @one_blas_thread()

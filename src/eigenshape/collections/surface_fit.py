@@ -11,7 +11,14 @@ from scipy.spatial import cKDTree
 from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import EigenshapeError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
-from eigenshape.collections.alignment import ON_SURFACE, Similarity, align_surfaces
+from eigenshape.collections.alignment import (
+    CLEAR_SIDE,
+    MIRROR,
+    ON_SURFACE,
+    Side,
+    Similarity,
+    align_surfaces,
+)
 from eigenshape.collections.spread_points import (
     join_normals,
     mean_radius,
@@ -74,8 +81,9 @@ class SurfaceFit(ReadOnly):
         Share of the source's area that is beyond a rim of the target, or more than 0.1 r away.
     excess : float
         Share of the target's area that is more than 0.1 r from the source.
-    reflected : bool
-        Whether the source was reflected first.
+    side : "same", "mirrored" or "cannot be told"
+        Whether the target is a mirror image of the source's kind. It cannot be told if both sides
+        of the form are alike; the source is not mirrored then.
     method : "position" or "intrinsic"
         Whether a similarity was the start, or `match_shapes`, since the poses differ.
 
@@ -91,7 +99,7 @@ class SurfaceFit(ReadOnly):
     strain: float
     missing: float
     excess: float
-    reflected: bool
+    side: Side
     method: Literal["position", "intrinsic"]
 
     @property
@@ -99,9 +107,16 @@ class SurfaceFit(ReadOnly):
         """The gap and the square of the strain: 0.01 to 0.02 between skulls of mice, 0.25 to a hand."""
         return self.gap + self.strain**2
 
+    @property
+    def reflected(self) -> bool:
+        """Whether the source was reflected first."""
+        return self.side == "mirrored"
+
 
 @one_blas_thread()
-def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
+def fit_surface(
+    source: MeshLike, target: MeshLike, *, mirrored: bool | None = None
+) -> SurfaceFit:
     """Bend a surface onto another of nearly its form, as a bone onto that of another animal.
 
     1. `align_surfaces` places the target on the source: any unit, any turn, mirror images too.
@@ -112,8 +127,8 @@ def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
        and with the angle of their normals, so that what has no partner hardly acts: loose pieces,
        pores, what is missing.
     3. If parts of the target are not reached or the source is strained, the poses may differ:
-       `match_shapes` gives another start, and the result with the smaller `misfit` is returned.
-       `method` says which.
+       `match_shapes` gives another start, for the mirror image, too. The result with the smaller
+       `misfit` is returned; `method` and `side` say which.
 
     Parameters
     ----------
@@ -121,6 +136,8 @@ def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
         Complete, of about 2,000 to 20,000 vertices; `es.geometry.decimate` makes a smaller one.
     target : MeshLike
         Of any number of faces and any topology. Parts may be missing. Faces of both look outward.
+    mirrored : bool, optional
+        Whether the target is a mirror image, where that is known. By default both are tried.
 
     Returns
     -------
@@ -144,25 +161,41 @@ def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
     ...     es.make_creature("hand", individual=i, n_vertices=1000) for i in (0, 1)
     ... )
     >>> fit = es.collections.fit_surface(one, other)
-    >>> bool(np.median(fit.gaps) < 0.01), fit.method, fit.reflected
-    (True, 'position', False)
+    >>> bool(np.median(fit.gaps) < 0.01), fit.method, fit.side
+    (True, 'position', 'same')
     """
     source, target = as_mesh(source, "source"), as_mesh(target, "target")
-    fit = bend_placed(source, align_surfaces(target, source), target, LEVELS)
+    placing = align_surfaces(target, source, mirrored=mirrored)
+    fit = replace(bend_placed(source, placing, target, LEVELS), side=placing.side)
     if fit.misfit > POSES_DIFFER:
-        try:
-            image = match_shapes(source, target).pull(target.vertices)
-        except EigenshapeError:  # what it refuses, such as needles, is no fault here
-            image = None
-        if image is not None:
-            other = replace(bend_onto(source, image, target, LEVELS), method="intrinsic")
-            fit = min(fit, other, key=lambda each: each.misfit)
+        sides = (False, True) if mirrored is None else (mirrored,)
+        posed = [found for side in sides if (found := _fit_posed(source, target, side))]
+        if len(posed) == 2:
+            upright, reflected = (each.misfit for each in posed)
+            is_clear = upright < CLEAR_SIDE * reflected or reflected < CLEAR_SIDE * upright
+            # Of two that fit as well, the one that is not mirrored
+            posed = [min(posed, key=lambda each: each.misfit)] if is_clear else [
+                replace(posed[0], side="cannot be told")
+            ]
+        fit = min([fit, *posed], key=lambda each: each.misfit)
     if fit.misfit > NOT_ALIKE:
         raise InvalidShapeError(
             "The target must have about the form of the source, and half of it at least; after "
             f"bending the misfit is {fit.misfit:.2f}, and the most is {NOT_ALIKE}."
         )
     return fit
+
+
+def _fit_posed(source: TriangleMesh, target: TriangleMesh, mirrored: bool) -> SurfaceFit | None:
+    """Bend a source, or its mirror image, onto a target in another pose, from where `match_shapes` puts it."""
+    if mirrored:
+        source = TriangleMesh(source.vertices @ MIRROR, source.faces[:, ::-1])
+    try:
+        image = match_shapes(source, target).pull(target.vertices)
+    except EigenshapeError:  # what it refuses, such as needles, is no fault here
+        return None
+    fit = bend_onto(source, image, target, LEVELS)
+    return replace(fit, method="intrinsic", side="mirrored" if mirrored else "same")
 
 
 def bend_placed(
@@ -172,8 +205,7 @@ def bend_placed(
     start = found.inverse().move(source.vertices)
     # A reflected surface faces outward if its faces are turned.
     faces = source.faces[:, ::-1] if found.reflected else source.faces
-    fit = bend_onto(TriangleMesh(source.vertices, faces), start, target, levels)
-    return replace(fit, reflected=found.reflected)
+    return bend_onto(TriangleMesh(source.vertices, faces), start, target, levels)
 
 
 def bend_onto(
@@ -247,7 +279,7 @@ def bend_onto(
         strain=float(np.std(stretch)) if len(stretch) else 1.0,
         missing=float(areas @ unmatched / areas.sum()),
         excess=float(np.mean(far > UNMATCHED)),
-        reflected=False,
+        side="same",
         method="position",
     )
 
