@@ -83,18 +83,20 @@ def collection(
             folder,
             output,
             template=template,
-            landmarks=labelled,
-            unmirrored=unmirrored,
+            mirrored=not unmirrored and (labelled or True),
             workers=processes,
             callback=batch_reporter(progress, "failed"),
         )
     known = {name: points for name, points in labelled.items() if name in built.names}
     written = [output / "mean.ply", output / "specimens.csv"]
     carried = None
-    warnings = steps.landmarks_outside(built, known)
+    warnings = [f"landmarks: {text}" for text in steps.landmarks_outside(built, known)]
     warnings += [
-        f"those of {name} are not used: it failed" for name in labelled if name not in known
+        f"landmarks: those of {name} are not used: it failed"
+        for name in labelled
+        if name not in known
     ]
+    warnings += steps.unsure_sides(built)
     if known:
         carried = es.collections.carry_landmarks(built, known)
         carried.save(output / "landmarks.csv")
@@ -139,8 +141,6 @@ def collection(
         for path in written:
             print_written(path)
     for warning in warnings:
-        err.print(f"[yellow]landmarks:[/] {escape_text(warning)}")
-    if unsure := steps.unsure_sides(built):
-        err.print(f"[yellow]mirror images:[/] {escape_text(unsure)}")
+        err.print(f"[yellow]{escape_text(warning)}[/]")
     if built.failures:
         raise typer.Exit(SOME_FAILED)

@@ -70,8 +70,7 @@ def build_collection(
     folder: str | Path,
     *,
     template: str | None = None,
-    landmarks: Mapping[str, Landmarks] | None = None,
-    unmirrored: bool = False,
+    mirrored: bool | Mapping[str, Landmarks] = True,
     workers: Workers | None = None,
     callback: Callback | None = None,
 ) -> Collection:
@@ -97,11 +96,10 @@ def build_collection(
     template : str, optional
         Name of a complete specimen. By default that of the collection in the folder, or of a new
         one the specimen with the median area.
-    landmarks : mapping of str to Landmarks, optional
-        Of two or more specimens, the same ones. They tell mirror images where the surfaces do not,
-        since both sides of the form are alike.
-    unmirrored : bool
-        No specimen is a mirror image of another: none is tried.
+    mirrored : bool or mapping of str to Landmarks
+        Whether a specimen may be a mirror image of another. If it is False, none is tried. Where
+        both sides of the form are alike, surfaces do not tell, and landmarks do: the same ones on
+        two or more specimens.
     workers : Workers, optional
         Processes, or the tasks of a cluster, that fit files side by side. By default all work is
         done by this process; `es.retrieval.Workers()` uses all cores.
@@ -154,11 +152,7 @@ def build_collection(
         raise InvalidParameterError(
             f"The template must be a specimen; there is none named {template!r}."
         )
-    if landmarks:
-        require_same_names(landmarks, "landmarks")
-    for name in landmarks or {}:
-        if name not in names:
-            raise InvalidParameterError(f"Landmarks must be of specimens; {name!r} is none.")
+    labelled = _checked_landmarks(mirrored, names)
     run = _Run(folder, workers, callback, len(items))
 
     found = run.over(items, _measure_file)
@@ -177,10 +171,10 @@ def build_collection(
     paths = {item.name: item.path for item in items}
     surface = _template_surface(paths[template])
     key = _digest(surface.vertices, surface.faces)
-    told = sides_of_landmarks(landmarks or {}, template)
-    states = {name: f"{digest} {unmirrored} {told.get(name)}" for name, digest in digests.items()}
-    mirrored = {paths[name]: is_one for name, is_one in told.items()}
-    work = partial(_fit_file, surface, False if unmirrored else None, mirrored)
+    told = sides_of_landmarks(labelled, template)
+    known = False if mirrored is False else None
+    states = {name: f"{digest} {known} {told.get(name)}" for name, digest in digests.items()}
+    work = partial(_fit_file, surface, known, {paths[name]: told[name] for name in told})
     fits = run.fit(items, work, "first", states, key)
     run.require_two(fits)
 
@@ -196,7 +190,18 @@ def build_collection(
     for name, fit in posed.items():
         write_fit(fit_file(folder, name), **asdict(fit))
     run.require_two(fits)
+    return _collect(folder, template, fits, notes, paths, run.failures)
 
+
+def _collect(
+    folder: Path,
+    template: str,
+    fits: Mapping[str, SurfaceFit],
+    notes: dict[str, list[str]],
+    paths: Mapping[str, Path],
+    failures: Mapping[str, str],
+) -> Collection:
+    """Make a collection of the last fits, and write it to its folder."""
     ordered = {name: fits[name] for name in sorted(fits)}
     reflected = tuple(fit.reflected for fit in ordered.values())
     points = np.stack([fit.vertices for fit in ordered.values()])
@@ -218,7 +223,7 @@ def build_collection(
         sources=tuple(paths[name].absolute() for name in ordered),
         template=template,
         notes={name: tuple(notes[name]) for name in ordered},
-        failures=dict(sorted(run.failures.items())),
+        failures=dict(sorted(failures.items())),
     )
     save_collection(collection)
     return collection
@@ -349,6 +354,20 @@ def _find_specimens(
             write_mesh(as_mesh(value, f"specimens[{name!r}]"), path)
         items.append(Item(str(name), path))
     return items
+
+
+def _checked_landmarks(
+    mirrored: bool | Mapping[str, Landmarks], names: set[str]
+) -> Mapping[str, Landmarks]:
+    if isinstance(mirrored, bool):
+        return {}
+    require_type(mirrored, Mapping, "mirrored")
+    for name in mirrored:
+        if name not in names:
+            raise InvalidParameterError(f"Landmarks must be of specimens; {name!r} is none.")
+    if mirrored:
+        require_same_names(mirrored, "mirrored")
+    return mirrored
 
 
 def _last_template(folder: Path) -> str | None:

@@ -66,9 +66,7 @@ class CarriedLandmarks(ReadOnly):
         OSError
             If the system cannot write there.
         """
-        rows: list[list[object]] = [
-            ["specimen", "landmark", "x", "y", "z", "spread", "doubtful"]
-        ]
+        rows: list[list[object]] = [["specimen", "landmark", "x", "y", "z", "spread", "doubtful"]]
         for i, specimen in enumerate(self.specimens):
             for j, name in enumerate(self.names):
                 numbers = [*self.points[i, j].tolist(), float(self.spread[i, j])]

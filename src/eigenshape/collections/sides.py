@@ -28,9 +28,7 @@ def sides_of_landmarks(labelled: Mapping[str, Landmarks], template: str) -> dict
     return found if len(found) > 1 else {}
 
 
-def _residuals(
-    one: Float[np.ndarray, "k 3"], two: Float[np.ndarray, "k 3"]
-) -> tuple[float, float]:
+def _residuals(one: Float[np.ndarray, "k 3"], two: Float[np.ndarray, "k 3"]) -> tuple[float, float]:
     """Return the least distances of two forms of unit size, by a proper and by a reflected turn."""
     known = np.isfinite(one).all(axis=1) & np.isfinite(two).all(axis=1)
     one, two = (points[known] - points[known].mean(axis=0) for points in (one, two))

@@ -114,9 +114,7 @@ class SurfaceFit(ReadOnly):
 
 
 @one_blas_thread()
-def fit_surface(
-    source: MeshLike, target: MeshLike, *, mirrored: bool | None = None
-) -> SurfaceFit:
+def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = None) -> SurfaceFit:
     """Bend a surface onto another of nearly its form, as a bone onto that of another animal.
 
     1. `align_surfaces` places the target on the source: any unit, any turn, mirror images too.
@@ -174,9 +172,11 @@ def fit_surface(
             upright, reflected = (each.misfit for each in posed)
             is_clear = upright < CLEAR_SIDE * reflected or reflected < CLEAR_SIDE * upright
             # Of two that fit as well, the one that is not mirrored
-            posed = [min(posed, key=lambda each: each.misfit)] if is_clear else [
-                replace(posed[0], side="cannot be told")
-            ]
+            posed = (
+                [min(posed, key=lambda each: each.misfit)]
+                if is_clear
+                else [replace(posed[0], side="cannot be told")]
+            )
         fit = min([fit, *posed], key=lambda each: each.misfit)
     if fit.misfit > NOT_ALIKE:
         raise InvalidShapeError(

@@ -75,22 +75,22 @@ def landmarks_outside(collection: Collection, labelled: Mapping[str, Landmarks])
     return found
 
 
-def unsure_sides(collection: Collection) -> str | None:
-    """Say of which specimens it cannot be told whether they are mirror images, and what would help."""
+def unsure_sides(collection: Collection) -> list[str]:
+    """Say, in one message or none, of which specimens it cannot be told whether they are mirrored."""
     unsure = [
         name
         for name, side in zip(collection.names, collection.sides, strict=True)
         if side == "cannot be told"
     ]
     if not unsure:
-        return None
+        return []
     n_all = len(collection.names)
     who = ", ".join(unsure) if len(unsure) <= MOST_NAMED else f"{len(unsure)} of {n_all} specimens"
-    return (
-        f"of {who} it cannot be told whether they are mirrored, since both sides of the form are "
-        "alike. Where one is, left and right are exchanged. The same landmarks on it and on another "
-        "specimen tell; if none is mirrored, say so with --unmirrored."
-    )
+    return [
+        f"mirror images: of {who} it cannot be told whether they are mirrored, since both sides of "
+        "the form are alike. Where one is, left and right are exchanged. The same landmarks on it "
+        "and on another specimen tell; if none is mirrored, say so with --unmirrored."
+    ]
 
 
 def doubtful_landmarks(carried: CarriedLandmarks) -> dict[str, list[str]]:
