@@ -17,7 +17,7 @@ from frame import rounded
 from outputs import give_out, options_of
 from real_shapes import DATA, require_data
 
-JUDGED = slice(0, 15, 5)  # three of the reporting strains
+JUDGED = slice(0, 15, 8)  # two of the reporting strains
 KEPT = 0.6  # share of the area that cuts leave
 N_HOLES, HOLE = 400, 1.5  # holes at most, and their radius in mm
 KNOWN = slice(0, 51, 9)  # landmarks that tell a mirror image

@@ -25,6 +25,9 @@ ERROR_OF_ONE = 0.037
 # Labelled specimens that the mean error of all landmarks counts for in the error of each
 N_PRIOR = 2.0
 FAR = 0.05  # gap from which a person should look, in root mean square radii
+NO_PLACE = (
+    0.02  # confidence below which the specimen has no such place; on whole skulls 0.1 or more
+)
 # Median errors between a given landmark and its carried place, from which a person should look
 WRONG_LABEL = 5.0
 
@@ -148,9 +151,12 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     errors = np.sqrt((np.nansum(squares, axis=0) + N_PRIOR * common) / (n_known + N_PRIOR))
 
     corners = faces[places.simplices]
-    gaps = np.einsum("kc,skc->sk", places.weights, collection.gaps[:, corners])
+    gaps, sure = (
+        np.einsum("kc,skc->sk", places.weights, values[:, corners])
+        for values in (collection.gaps, collection.confidence)
+    )
     spread = np.hypot(radii[:, None] * errors, gaps)
-    doubtful = gaps > FAR * radii[:, None]
+    doubtful = (gaps > FAR * radii[:, None]) | (sure < NO_PLACE)
     for number, row in enumerate(rows):
         known = np.isfinite(given[number]).all(axis=1)
         away = np.linalg.norm(carried[number] - given[number], axis=1)
