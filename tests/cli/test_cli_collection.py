@@ -2,12 +2,14 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from running import run, run_json
 
 import eigenshape as es
+from eigenshape.cli import steps
 
 CHOSEN = [100, 200, 300, 400]
 NAMES = [f"point {i}" for i in CHOSEN]
@@ -95,8 +97,28 @@ def test_the_same_command_goes_on_and_says_the_same(scans, output):
     assert (output / "landmarks.csv").read_bytes() == before
     assert facts["specimens"] == ["hand 0", "hand 1", "hand 2", ODD]
     assert facts["labelled"] == ["hand 0", "hand 1"]
+    assert facts["sides"] == dict.fromkeys(facts["specimens"], "same")
+    assert facts["methods"] == dict.fromkeys(facts["specimens"], "position")
+    rows = (output / "specimens.csv").read_text().splitlines()
+    assert rows[0] == "specimen,side,method,size,notes"
+    assert [row.split(",")[:3] for row in rows[1:]] == [
+        *([name, "same", "position"] for name in facts["specimens"]), ["broken", "", "failed"],
+    ]  # fmt: skip
     assert facts["failures"].keys() == {"broken"}
     assert facts["warnings"] == []
+
+
+def test_it_is_said_where_mirror_images_cannot_be_told(output):
+    built = es.collections.open_collection(output)
+    assert steps.unsure_sides(built) == []
+    one = replace(built, sides=("same", "cannot be told", "same", "same"))
+    assert steps.unsure_sides(one)[0].startswith(
+        "mirror images: of hand 1 it cannot be told whether"
+    )
+    many = replace(built, names=tuple("abcdefg"), sides=("cannot be told",) * 6 + ("same",))
+    assert steps.unsure_sides(many)[0].startswith(
+        "mirror images: of 6 of 7 specimens it cannot be told"
+    )
 
 
 def test_landmarks_in_another_frame_are_noted(scans, output, tmp_path):

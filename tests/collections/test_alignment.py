@@ -16,7 +16,7 @@ def test_a_turned_specimen_in_another_unit_comes_back():
     mesh = make_specimen(0)
     moved = move(mesh, 1000.0)
     found = es.collections.align_surfaces(moved, mesh)
-    assert not found.reflected
+    assert found.side == "same"
     assert found.scale == pytest.approx(0.001, rel=0.02)
     assert error(found, mesh, moved) < 0.03
     back = found.inverse().move(found.move(moved.vertices))
@@ -32,9 +32,13 @@ def test_a_mirror_image_of_a_form_without_symmetry_is_noticed():
     assert error(found, mesh, moved) < 0.2
 
 
-def test_a_symmetric_form_is_not_called_reflected():
+def test_of_a_symmetric_form_it_cannot_be_told_whether_it_is_reflected_unless_it_is_known():
     fish, other = (es.make_creature("fish", individual=i, n_vertices=500) for i in (0, 1))
-    assert not es.collections.align_surfaces(mirror(other), fish).reflected
+    found = es.collections.align_surfaces(mirror(other), fish)
+    assert (found.side, found.reflected) == ("cannot be told", False)
+    known = es.collections.align_surfaces(mirror(other), fish, mirrored=True)
+    assert (known.side, known.reflected) == ("mirrored", True)
+    assert known.gap < found.gap / 0.7
 
 
 def test_half_of_a_specimen_and_a_crumb_far_away_are_placed():

@@ -358,18 +358,21 @@ def test_every_row_runs(page, tmp_path):
     assert not complaints, "\n".join(complaints)
 
 
-def names_for_alpaca(folder: Path) -> dict[str, Any]:
-    """What our code beside ALPACA's may use, which runs in 3D Slicer only."""
+def names_for_collections(folder: Path) -> dict[str, Any]:
+    """What our code beside that of ALPACA and ShapeWorks may use, which are programs of their own."""
     mesh = bumpy_ball()
     other = es.TriangleMesh(mesh.vertices * [1.1, 1.0, 0.9], mesh.faces)
     (folder / "scans").mkdir()
     given = {}
-    for name, scan in (("a", mesh), ("b", other), ("c", mesh)):
+    third = es.TriangleMesh(mesh.vertices * [1.0, 0.9, 1.1], mesh.faces)
+    for name, scan in (("a", mesh), ("b", other), ("c", third)):
         es.write_mesh(scan, folder / "scans" / f"{name}.ply")
         given[name] = es.morphometrics.Landmarks(["1", "2", "3", "4"], scan.vertices[::50])
     es.morphometrics.write_landmarks(given["a"], folder / "a.mrk.json")
     return {
         "es": es,
+        "np": np,
+        "discriminant_analysis": import_module("sklearn.discriminant_analysis"),
         "folder": folder / "scans",
         "output": folder / "out",
         "landmarks_path": folder / "a.mrk.json",
@@ -380,17 +383,26 @@ def names_for_alpaca(folder: Path) -> dict[str, Any]:
         "other": other,
         "points": mesh.vertices[:5],
         "rows": [3, 7],
+        "mesh_path": folder / "scans" / "a.ply",
+        "new_mesh_path": folder / "new.ply",
+        "particles_path": folder / "a_local.particles",
+        "shapes": mesh.vertices[:20] + 0.01 * np.random.default_rng(0).standard_normal((4, 20, 3)),
+        "groups": ["broad", "broad", "slim", "slim"],
+        "labels": ["broad", "slim", "broad"],
     }
 
 
-def test_every_row_beside_alpaca_runs(tmp_path):
-    names = names_for_alpaca(tmp_path)
-    n_values = 0
-    for _, cell in rows_of("alpaca"):
-        n_values += len(run(cell, names))
-    assert n_values > 12
-    assert names["new_path"].exists()
-    assert names["table_path"].exists()
+def test_every_row_beside_alpaca_and_shapeworks_runs(tmp_path):
+    names = names_for_collections(tmp_path)
+    # The collection of the first page is that of the second.
+    n_values = {
+        page: sum(len(run(cell, names)) for _, cell in rows_of(page))
+        for page in ("alpaca", "shapeworks")
+    }
+    assert n_values["alpaca"] > 12
+    assert n_values["shapeworks"] > 20
+    for path in ("new_path", "table_path", "new_mesh_path", "particles_path"):
+        assert names[path].exists()
 
 
 def test_every_row_beside_geomorph_runs(tmp_path):
@@ -401,7 +413,7 @@ def test_every_row_beside_geomorph_runs(tmp_path):
     assert n_values > 25
 
 
-@pytest.mark.parametrize("page", [*PEERS, "geomorph", "alpaca"])
+@pytest.mark.parametrize("page", [*PEERS, "geomorph", "alpaca", "shapeworks"])
 def test_few_rows_have_no_code_and_they_say_what_is_missing(page):
     rows = rows_of(page)
     prose = [cells for cells in rows if "`" not in cells[1]]

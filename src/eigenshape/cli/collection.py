@@ -29,6 +29,7 @@ def collection(
     output: Path,
     landmarks: Path | None = None,
     template: str | None = None,
+    unmirrored: bool = False,
     workers: Annotated[int | None, typer.Option(min=1)] = None,
     timeout: Annotated[float, typer.Option(min=1)] = 300.0,
     memory: Annotated[float | None, typer.Option(min=0.1)] = None,
@@ -37,8 +38,9 @@ def collection(
 ) -> None:
     """Bring all specimens of a folder into correspondence, and carry the landmarks of some to all.
 
-    The output has the mean shape (mean.ply), the landmarks of all specimens (landmarks.csv) and a
-    page that any browser opens (report.html). A specimen that fails is named, and the others go on.
+    The output has the mean shape (mean.ply), the landmarks of all specimens (landmarks.csv), their
+    sizes, sides and what was noticed (specimens.csv) and a page that any browser opens
+    (report.html). A specimen that fails is named, and the others go on.
     After Ctrl-C or a crash the same command continues where it stopped. The exit code is 3 if some
     specimens failed.
 
@@ -57,6 +59,9 @@ def collection(
     template
         Name of the specimen that is fitted to all others first. By default that of the collection in
         the output folder, or of a new one the specimen with the median area.
+    unmirrored
+        No specimen is a mirror image of another. Without this, mirror images are tried, and the
+        landmarks of two or more specimens tell where both sides of the form are alike.
     workers
         Number of processes that fit specimens at the same time. By default one for each core.
     timeout
@@ -78,16 +83,20 @@ def collection(
             folder,
             output,
             template=template,
+            mirrored=not unmirrored and (labelled or True),
             workers=processes,
             callback=batch_reporter(progress, "failed"),
         )
     known = {name: points for name, points in labelled.items() if name in built.names}
-    written = [output / "mean.ply"]
+    written = [output / "mean.ply", output / "specimens.csv"]
     carried = None
-    warnings = steps.landmarks_outside(built, known)
+    warnings = [f"landmarks: {text}" for text in steps.landmarks_outside(built, known)]
     warnings += [
-        f"those of {name} are not used: it failed" for name in labelled if name not in known
+        f"landmarks: those of {name} are not used: it failed"
+        for name in labelled
+        if name not in known
     ]
+    warnings += steps.unsure_sides(built)
     if known:
         carried = es.collections.carry_landmarks(built, known)
         carried.save(output / "landmarks.csv")
@@ -104,6 +113,8 @@ def collection(
                 "output": output,
                 "specimens": built.names,
                 "template": built.template,
+                "sides": dict(zip(built.names, built.sides, strict=True)),
+                "methods": dict(zip(built.names, built.methods, strict=True)),
                 "labelled": list(known),
                 "doubtful": doubtful,
                 "notes": {name: notes for name, notes in built.notes.items() if notes},
@@ -130,6 +141,6 @@ def collection(
         for path in written:
             print_written(path)
     for warning in warnings:
-        err.print(f"[yellow]landmarks:[/] {escape_text(warning)}")
+        err.print(f"[yellow]{escape_text(warning)}[/]")
     if built.failures:
         raise typer.Exit(SOME_FAILED)

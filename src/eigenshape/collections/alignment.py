@@ -1,6 +1,7 @@
 """The similarity transformation that places one surface on another, found from the surfaces alone."""
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 from jaxtyping import Float
@@ -33,10 +34,11 @@ N_KEPT, N_REFINED = 126, 10  # of 504 starts: after half of the rough rounds, an
 ROUGH_REACH = np.geomspace(0.6, 0.2, 10)
 FINE_REACH = np.geomspace(0.2, 0.05, 40)
 ON_SURFACE = 0.1
-# Share of the gap of a surface below which the gap of its mirror image means that it is reflected.
-# Forms with two equal sides have about the same gap both ways.
-REFLECTED = 0.7
+# The gap of a surface, as a share of that of its mirror image, below which it is no mirror image, or
+# the other way round. Forms with two equal sides have about the same gap both ways.
+CLEAR_SIDE = 0.7
 MIRROR = np.diag([-1.0, 1.0, 1.0])
+Side: TypeAlias = Literal["same", "mirrored", "cannot be told"]
 
 
 @record
@@ -55,6 +57,8 @@ class Similarity(ReadOnly):
         0 if the surface lies on the other one, 1 if it lies nowhere near it: the mean of
         d² / (d² + 0.1²) over its points, with d the distance to the nearest point of the other
         surface that faces the same way, in units of the root mean square radius.
+    mirror_gap : float
+        The least gap of the mirror image of the surface; infinite if it was not tried.
 
     See Also
     --------
@@ -75,11 +79,23 @@ class Similarity(ReadOnly):
     rotation: Float[np.ndarray, "3 3"]
     translation: Float[np.ndarray, " 3"]
     gap: float = 0.0
+    mirror_gap: float = np.inf
 
     @property
     def reflected(self) -> bool:
         """Whether it turns left into right."""
         return bool(np.linalg.det(self.rotation) < 0)
+
+    @property
+    def side(self) -> Side:
+        """Whether one surface is a mirror image of the other's kind: "same", "mirrored", "cannot be told".
+
+        It cannot be told if the gap is above 0.7 of that of the mirror image, as of forms whose two
+        sides are alike.
+        """
+        if not self.gap < CLEAR_SIDE * self.mirror_gap:
+            return "cannot be told"
+        return "mirrored" if self.reflected else "same"
 
     def move(self, points: ArrayLike) -> Float[np.ndarray, "n 3"]:
         """Return the places of points of the first surface on the second."""
@@ -89,18 +105,20 @@ class Similarity(ReadOnly):
         """Return the similarity that places the second surface on the first."""
         back = self.rotation.T / self.scale
         away = -back @ self.translation
-        return Similarity(1 / self.scale, self.rotation.T.copy(), away, self.gap)
+        turn = self.rotation.T.copy()
+        return Similarity(1 / self.scale, turn, away, self.gap, self.mirror_gap)
 
 
 @one_blas_thread()
-def align_surfaces(surface: MeshLike, whole: MeshLike) -> Similarity:
+def align_surfaces(
+    surface: MeshLike, whole: MeshLike, *, mirrored: bool | None = None
+) -> Similarity:
     """Find the similarity that places a surface, or a part of one, on a whole one of nearly its form.
 
     Points of the surface are paired with the nearest ones of the whole that face the same way, and
     the similarity of least weighted squares moves them there, again and again (iterated closest
     points: Besl and McKay 1992; here with sizes and with weights against what has no partner). It
-    starts from many turns, places and sizes; the ten with the smallest gaps are refined. The mirror
-    image of the surface is tried as well.
+    starts from many turns, places and sizes; the ten with the smallest gaps are refined.
 
     Parameters
     ----------
@@ -109,13 +127,16 @@ def align_surfaces(surface: MeshLike, whole: MeshLike) -> Similarity:
         pieces are left out; any topology will do.
     whole : MeshLike
         Without large gaps. Faces of both should look outward.
+    mirrored : bool, optional
+        Whether the surface is a mirror image, where that is known. By default both are tried, and
+        the mirror image is taken if it has less than 0.7 of the gap.
 
     Returns
     -------
     Similarity
         It places `surface` on `whole`. A `gap` above about 0.4 means that no good place is known.
-        It is `reflected` only where the mirror image has less than 0.7 of the gap. A form with two
-        equal sides lies as well both ways, so that nothing tells whether it is reflected.
+        `side` says whether the surface is a mirror image. A form with two equal sides lies as well
+        both ways, so that it cannot be told.
 
     Raises
     ------
@@ -153,23 +174,26 @@ def align_surfaces(surface: MeshLike, whole: MeshLike) -> Similarity:
         starts = _refine(points[::n], rough_tree, starts, ROUGH_REACH[half:]).best(N_REFINED)
         return _refine(points, tree, starts, FINE_REACH).best(1)
 
-    mirrored = ours @ np.kron(np.eye(2), MIRROR)  # places and normals
-    found, reflected = search(ours), search(mirrored)
-    # A form with two equal sides lies as well on itself in a mirror: each place, mirrored by the
-    # planes of the principal axes of the whole, is a start of the other one.
-    axes = np.linalg.svd(theirs[:, :3], full_matrices=False)[2]
-    planes = np.eye(3) - 2 * axes[:, :, None] * axes[:, None]
-    found, reflected = (
-        own.joined(_refine(points, tree, other.mirrored(planes), FINE_REACH)).best(1)
-        for points, own, other in ((ours, found, reflected), (mirrored, reflected, found))
-    )
-    turned = reflected.gaps[0] < REFLECTED * found.gaps[0]
-    best = (reflected if turned else found).similarity()
-    if turned:
-        best = Similarity(best.scale, best.rotation @ MIRROR, best.translation, best.gap)
+    image = ours @ np.kron(np.eye(2), MIRROR)  # places and normals
+    if mirrored is not None:
+        best, mirror_gap = search(image if mirrored else ours).similarity(), np.inf
+    else:
+        upright, reflected = search(ours), search(image)
+        # A form with two equal sides lies as well on itself in a mirror: each place, mirrored by
+        # the planes of the principal axes of the whole, is a start of the other one.
+        axes = np.linalg.svd(theirs[:, :3], full_matrices=False)[2]
+        planes = np.eye(3) - 2 * axes[:, :, None] * axes[:, None]
+        upright, reflected = (
+            own.joined(_refine(points, tree, other.mirrored(planes), FINE_REACH)).best(1)
+            for points, own, other in ((ours, upright, reflected), (image, reflected, upright))
+        )
+        gaps = float(upright.gaps[0]), float(reflected.gaps[0])
+        mirrored = gaps[1] < CLEAR_SIDE * gaps[0]
+        best, mirror_gap = (reflected if mirrored else upright).similarity(), gaps[not mirrored]
+    turn = best.rotation @ MIRROR if mirrored else best.rotation
     scale = best.scale * size / our_size
-    away = middle + size * best.translation - scale * best.rotation @ our_middle
-    return Similarity(scale, best.rotation, away, best.gap)
+    away = middle + size * best.translation - scale * turn @ our_middle
+    return Similarity(scale, turn, away, best.gap, mirror_gap)
 
 
 def best_similarity(

@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,7 +18,7 @@ from eigenshape._files import as_path
 from eigenshape._progress import Callback
 from eigenshape._threads import one_blas_thread
 from eigenshape._workers import Item, Outcome, Workers, run_in_workers
-from eigenshape.collections.alignment import MIRROR, Similarity, best_similarity
+from eigenshape.collections.alignment import MIRROR, Side, Similarity, best_similarity
 from eigenshape.collections.collection import (
     TABLE,
     Collection,
@@ -29,6 +29,7 @@ from eigenshape.collections.collection import (
     unreflect,
     write_fit,
 )
+from eigenshape.collections.sides import sides_of_landmarks
 from eigenshape.collections.surface_fit import (
     LEVELS,
     SurfaceFit,
@@ -42,6 +43,7 @@ from eigenshape.geometry.repairs.repair import repair, suggest_repairs
 from eigenshape.geometry.resolution.decimation import decimate
 from eigenshape.io.folders import find_items
 from eigenshape.io.mesh_files import write_mesh
+from eigenshape.morphometrics.landmarks import Landmarks, require_same_names
 from eigenshape.morphometrics.procrustes import fit_procrustes
 from eigenshape.retrieval.building.batch import content_digest
 
@@ -57,7 +59,7 @@ SECOND_LEVELS = tuple((width, reach, stiffness, 4) for width, reach, stiffness, 
 # lacks more gives no evidence for the mean.
 NOTABLE = 0.1
 OTHER_UNIT = 3.0  # factor from the median size from which a unit is suspected
-RECIPE = "1"  # changes when fits of an older version must not be used again
+RECIPE = "2"  # changes when fits of an older version must not be used again
 SURE = 0.25  # confidence of a vertex that determines where the second round starts
 ROUNDS = 20  # of finding the place and the shape of a start in turn
 
@@ -68,6 +70,7 @@ def build_collection(
     folder: str | Path,
     *,
     template: str | None = None,
+    mirrored: bool | Mapping[str, Landmarks] = True,
     workers: Workers | None = None,
     callback: Callback | None = None,
 ) -> Collection:
@@ -93,6 +96,10 @@ def build_collection(
     template : str, optional
         Name of a complete specimen. By default that of the collection in the folder, or of a new
         one the specimen with the median area.
+    mirrored : bool or mapping of str to Landmarks
+        Whether a specimen may be a mirror image of another. If it is False, none is tried. Where
+        both sides of the form are alike, surfaces do not tell, and landmarks do: the same ones on
+        two or more specimens.
     workers : Workers, optional
         Processes, or the tasks of a cluster, that fit files side by side. By default all work is
         done by this process; `es.retrieval.Workers()` uses all cores.
@@ -140,10 +147,12 @@ def build_collection(
         raise InvalidParameterError(
             f"A collection must have at least two specimens; there are {len(items)}."
         )
-    if template is not None and template not in {item.name for item in items}:
+    names = {item.name for item in items}
+    if template is not None and template not in names:
         raise InvalidParameterError(
             f"The template must be a specimen; there is none named {template!r}."
         )
+    labelled = _checked_landmarks(mirrored, names)
     run = _Run(folder, workers, callback, len(items))
 
     found = run.over(items, _measure_file)
@@ -162,7 +171,11 @@ def build_collection(
     paths = {item.name: item.path for item in items}
     surface = _template_surface(paths[template])
     key = _digest(surface.vertices, surface.faces)
-    fits = run.fit(items, partial(_fit_file, surface), "first", digests, key)
+    told = sides_of_landmarks(labelled, template)
+    known = False if mirrored is False else None
+    states = {name: f"{digest} {known} {told.get(name)}" for name, digest in digests.items()}
+    work = partial(_fit_file, surface, known, {paths[name]: told[name] for name in told})
+    fits = run.fit(items, work, "first", states, key)
     run.require_two(fits)
 
     starts, modes = _starts_from_modes(fits)
@@ -172,32 +185,45 @@ def build_collection(
     again = [item for item in items if item.name in fits.keys() - posed.keys()]
     by_path = {item.path: starts[item.name] for item in again}
     work = partial(_fit_again, surface.faces, modes, by_path)
-    fits = run.fit(again, work, "fits", digests, key) | posed
+    states = {item.name: f"{digests[item.name]} {fits[item.name].side}" for item in again}
+    fits = run.fit(again, work, "fits", states, key) | posed
     for name, fit in posed.items():
         write_fit(fit_file(folder, name), **asdict(fit))
     run.require_two(fits)
+    return _collect(folder, template, fits, notes, paths, run.failures)
 
-    names = tuple(sorted(fits))
-    reflected = tuple(fits[name].reflected for name in names)
-    points = np.stack([fits[name].vertices for name in names])
-    complete = _complete([fits[name] for name in names])
+
+def _collect(
+    folder: Path,
+    template: str,
+    fits: Mapping[str, SurfaceFit],
+    notes: dict[str, list[str]],
+    paths: Mapping[str, Path],
+    failures: Mapping[str, str],
+) -> Collection:
+    """Make a collection of the last fits, and write it to its folder."""
+    ordered = {name: fits[name] for name in sorted(fits)}
+    reflected = tuple(fit.reflected for fit in ordered.values())
+    points = np.stack([fit.vertices for fit in ordered.values()])
+    complete = _complete(list(ordered.values()))
     together = fit_procrustes(unreflect(points, reflected)[complete])
     size = float(np.median(together.sizes))
     mean = TriangleMesh(together.mean * size, surface.faces)
-    for name in names:
-        notes[name] += _noticed(fits[name], size)
+    for name, fit in ordered.items():
+        notes[name] += _noticed(fit, size)
     collection = Collection(
         folder=folder,
-        names=names,
+        names=tuple(ordered),
         mean=mean,
         points=points,
-        gaps=np.stack([fits[name].gaps for name in names]),
-        confidence=np.stack([fits[name].confidence for name in names]),
-        reflected=reflected,
-        sources=tuple(paths[name].absolute() for name in names),
+        gaps=np.stack([fit.gaps for fit in ordered.values()]),
+        confidence=np.stack([fit.confidence for fit in ordered.values()]),
+        sides=tuple(fit.side for fit in ordered.values()),
+        methods=tuple(fit.method for fit in ordered.values()),
+        sources=tuple(paths[name].absolute() for name in ordered),
         template=template,
-        notes={name: tuple(notes[name]) for name in names},
-        failures=dict(sorted(run.failures.items())),
+        notes={name: tuple(notes[name]) for name in ordered},
+        failures=dict(sorted(failures.items())),
     )
     save_collection(collection)
     return collection
@@ -214,10 +240,11 @@ class _Measured:
 
 @dataclass(frozen=True)
 class _Start:
-    """Where the second fit of a specimen starts: a shape in modes, and its place."""
+    """Where the second fit of a specimen starts: a shape in modes, its place, and its side."""
 
     coefficients: Float[np.ndarray, " q"]
     placing: Similarity
+    side: Side
 
 
 class _Run:
@@ -241,13 +268,13 @@ class _Run:
         items: Sequence[Item],
         work: Callable[[Path], SurfaceFit],
         room: str,
-        digests: Mapping[str, str],
+        states: Mapping[str, str],
         key: str,
     ) -> dict[str, SurfaceFit]:
         """Return the fit of each item, from the folder if it was made of the same input."""
         self._begin(len(items))
         fits: dict[str, SurfaceFit] = {}
-        keys = {item.name: f"{RECIPE} {key} {digests[item.name]}" for item in items}
+        keys = {item.name: f"{RECIPE} {key} {states[item.name]}" for item in items}
         for item in items:
             try:
                 kept = read_fit(fit_file(self.folder, item.name, room))
@@ -329,6 +356,20 @@ def _find_specimens(
     return items
 
 
+def _checked_landmarks(
+    mirrored: bool | Mapping[str, Landmarks], names: set[str]
+) -> Mapping[str, Landmarks]:
+    if isinstance(mirrored, bool):
+        return {}
+    require_type(mirrored, Mapping, "mirrored")
+    for name in mirrored:
+        if name not in names:
+            raise InvalidParameterError(f"Landmarks must be of specimens; {name!r} is none.")
+    if mirrored:
+        require_same_names(mirrored, "mirrored")
+    return mirrored
+
+
 def _last_template(folder: Path) -> str | None:
     try:
         return str(json.loads((folder / TABLE).read_bytes())["template"])
@@ -348,8 +389,15 @@ def _template_surface(path: Path) -> TriangleMesh:
     return decimate(mesh, N_FACES).mesh if mesh.n_faces > N_FACES else mesh
 
 
-def _fit_file(source: TriangleMesh, path: Path) -> SurfaceFit:
-    return fit_surface(source, read_specimen(path)[0])
+def _fit_file(
+    source: TriangleMesh, mirrored: bool | None, told: Mapping[Path, bool], path: Path
+) -> SurfaceFit:
+    """Fit the template to a file; where its surface tells no side, landmarks may have told it."""
+    target = read_specimen(path)[0]
+    fit = fit_surface(source, target, mirrored=mirrored)
+    if fit.side != "cannot be told" or path not in told:
+        return fit
+    return fit_surface(source, target, mirrored=True) if told[path] else replace(fit, side="same")
 
 
 def _fit_again(
@@ -358,7 +406,8 @@ def _fit_again(
     start = starts[path]
     source = TriangleMesh(np.tensordot(start.coefficients, modes, 1), faces)
     target = read_specimen(path)[0]
-    return bend_placed(source, start.placing.inverse(), target, SECOND_LEVELS)
+    fit = bend_placed(source, start.placing.inverse(), target, SECOND_LEVELS)
+    return replace(fit, side=start.side)
 
 
 def _digest(*arrays: np.ndarray) -> str:
@@ -397,7 +446,7 @@ def _starts_from_modes(
             placing = Similarity(
                 placing.scale, MIRROR @ placing.rotation, MIRROR @ placing.translation
             )
-        starts[name] = _Start(coefficients, placing)
+        starts[name] = _Start(coefficients, placing, fit.side)
     return starts, modes
 
 

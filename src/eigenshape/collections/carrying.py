@@ -1,7 +1,5 @@
 """Landmarks carried from some specimens of a collection to all."""
 
-import csv
-import io
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from eigenshape.collections.spread_points import mean_radius
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
+from eigenshape.morphometrics.landmark_files import csv_text
 from eigenshape.morphometrics.landmarks import Landmarks, require_same_names
 
 # Expected error of a landmark from a single labelled specimen, where there is no second one to
@@ -26,6 +25,9 @@ ERROR_OF_ONE = 0.037
 # Labelled specimens that the mean error of all landmarks counts for in the error of each
 N_PRIOR = 2.0
 FAR = 0.05  # gap from which a person should look, in root mean square radii
+NO_PLACE = (
+    0.02  # confidence below which the specimen has no such place; on whole skulls 0.1 or more
+)
 # Median errors between a given landmark and its carried place, from which a person should look
 WRONG_LABEL = 5.0
 
@@ -67,14 +69,12 @@ class CarriedLandmarks(ReadOnly):
         OSError
             If the system cannot write there.
         """
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(["specimen", "landmark", "x", "y", "z", "spread", "doubtful"])
+        rows: list[list[object]] = [["specimen", "landmark", "x", "y", "z", "spread", "doubtful"]]
         for i, specimen in enumerate(self.specimens):
             for j, name in enumerate(self.names):
                 numbers = [*self.points[i, j].tolist(), float(self.spread[i, j])]
-                table.writerow([specimen, name, *numbers, int(self.doubtful[i, j])])
-        replace_file(as_path(path), text.getvalue().encode())
+                rows.append([specimen, name, *numbers, int(self.doubtful[i, j])])
+        replace_file(as_path(path), csv_text(rows).encode())
 
 
 @one_blas_thread()
@@ -151,9 +151,12 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     errors = np.sqrt((np.nansum(squares, axis=0) + N_PRIOR * common) / (n_known + N_PRIOR))
 
     corners = faces[places.simplices]
-    gaps = np.einsum("kc,skc->sk", places.weights, collection.gaps[:, corners])
+    gaps, sure = (
+        np.einsum("kc,skc->sk", places.weights, values[:, corners])
+        for values in (collection.gaps, collection.confidence)
+    )
     spread = np.hypot(radii[:, None] * errors, gaps)
-    doubtful = gaps > FAR * radii[:, None]
+    doubtful = (gaps > FAR * radii[:, None]) | (sure < NO_PLACE)
     for number, row in enumerate(rows):
         known = np.isfinite(given[number]).all(axis=1)
         away = np.linalg.norm(carried[number] - given[number], axis=1)

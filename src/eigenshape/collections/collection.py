@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import quote
 from zipfile import BadZipFile
 
@@ -12,16 +12,17 @@ from jaxtyping import Float
 from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, StoreError
 from eigenshape._files import as_path, replace_file, replacing
-from eigenshape.collections.alignment import MIRROR
+from eigenshape.collections.alignment import MIRROR, Side
 from eigenshape.collections.spread_points import main_pieces
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward, outward_vote
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.io.surface_files import read_surface
+from eigenshape.morphometrics.landmark_files import csv_text
 
-VERSION = 1  # of the folder's layout
-TABLE, MEAN = "collection.json", "mean.ply"
+VERSION = 2  # of the folder's layout
+TABLE, MEAN, SPECIMENS = "collection.json", "mean.ply", "specimens.csv"
 
 
 @record
@@ -42,8 +43,13 @@ class Collection(ReadOnly):
         Distance of each place to the specimen's surface, in its unit.
     confidence : (s, n) float
         0 to 1, as of `SurfaceFit`: low where the specimen has no such place.
-    reflected : tuple of bool
-        Whether each specimen is a mirror image of the template's kind.
+    sides : tuple of str
+        Whether each specimen is a mirror image of the template's kind: "same", "mirrored" or "cannot
+        be told", if both sides of the form are alike; it counts as "same" then, and if it is a
+        mirror image, its left and right are exchanged.
+    methods : tuple of str
+        How each was reached: by "position", or by "intrinsic" evidence (`match_shapes`), since its
+        pose differs.
     sources : tuple of Path
         The file of each specimen.
     template : str
@@ -65,11 +71,17 @@ class Collection(ReadOnly):
     points: Float[np.ndarray, "s n 3"]
     gaps: Float[np.ndarray, "s n"]
     confidence: Float[np.ndarray, "s n"]
-    reflected: tuple[bool, ...]
+    sides: tuple[Side, ...]
+    methods: tuple[Literal["position", "intrinsic"], ...]
     sources: tuple[Path, ...]
     template: str
     notes: dict[str, tuple[str, ...]]
     failures: dict[str, str]
+
+    @property
+    def reflected(self) -> tuple[bool, ...]:
+        """Whether each specimen is a mirror image of the template's kind, as far as it can be told."""
+        return tuple(side == "mirrored" for side in self.sides)
 
     @property
     def unreflected(self) -> Float[np.ndarray, "s n 3"]:
@@ -159,7 +171,8 @@ def open_collection(folder: str | Path) -> Collection:
         points=np.stack([fit["vertices"] for fit in fits]),
         gaps=np.stack([fit["gaps"] for fit in fits]),
         confidence=np.stack([fit["confidence"] for fit in fits]),
-        reflected=tuple(row["reflected"] for row in rows),
+        sides=tuple(row["side"] for row in rows),
+        methods=tuple(row["method"] for row in rows),
         sources=tuple(Path(row["source"]) for row in rows),
         template=table["template"],
         notes={row["name"]: tuple(row["notes"]) for row in rows},
@@ -168,19 +181,33 @@ def open_collection(folder: str | Path) -> Collection:
 
 
 def save_collection(collection: Collection) -> None:
-    """Write all but the fits, which are there already; the table comes last."""
+    """Write all but the fits, which are there already; collection.json comes last."""
     write_mesh(collection.mean, collection.folder / MEAN)
     rows = [
         {
             "name": name,
             "source": str(source),
-            "reflected": reflected,
+            "side": side,
+            "method": method,
+            "size": float(np.linalg.norm(points - points.mean(axis=0))),
             "notes": collection.notes[name],
         }
-        for name, source, reflected in zip(
-            collection.names, collection.sources, collection.reflected, strict=True
+        for name, source, side, method, points in zip(
+            collection.names,
+            collection.sources,
+            collection.sides,
+            collection.methods,
+            collection.points,
+            strict=True,
         )
     ]
+    header = ["specimen", "side", "method", "size", "notes"]
+    lines = [
+        [row["name"], row["side"], row["method"], row["size"], "; ".join(row["notes"])]
+        for row in rows
+    ]
+    lines += [[name, "", "failed", "", reason] for name, reason in collection.failures.items()]
+    replace_file(collection.folder / SPECIMENS, csv_text([header, *lines]).encode())
     table = {
         "version": VERSION,
         "template": collection.template,

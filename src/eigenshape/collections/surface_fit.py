@@ -4,14 +4,21 @@ from dataclasses import replace
 from typing import Literal, TypeAlias
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.linalg import solve
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import EigenshapeError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
-from eigenshape.collections.alignment import ON_SURFACE, Similarity, align_surfaces
+from eigenshape.collections.alignment import (
+    CLEAR_SIDE,
+    MIRROR,
+    ON_SURFACE,
+    Side,
+    Similarity,
+    align_surfaces,
+)
 from eigenshape.collections.spread_points import (
     join_normals,
     mean_radius,
@@ -45,6 +52,10 @@ SPACING = 0.7  # of centers of displacements, in widths
 FAR = 0.05  # gap at which the confidence is at most a quarter
 ON_RIM = 1e-9  # weight of inner vertices below which a point lies on the rim of a surface
 UNMATCHED = 0.1  # distance from which a point has no counterpart
+# Root mean square of the logarithms by which edges at a vertex became longer, from which it has no
+# counterpart: skulls and creatures in other poses have at most 0.2 (0.26 if 40 % are cut off), a side
+# that is folded onto the other one, since it is missing, 0.34 in the median.
+FOLDED = 0.3
 # Misfit after bending from which the poses may differ, so that another start is tried, and from
 # which a form is of another kind: skulls of mice have 0.01 to 0.02, creatures in another pose 0.01
 # to 0.04, other kinds 0.25 to 0.55.
@@ -64,18 +75,20 @@ class SurfaceFit(ReadOnly):
     confidence : (n,) float
         From 1, on the target and facing the same way, to 0: min(2 cos⁺, 1) / (1 + (gap / 0.05 r)²)²,
         with the angle of the normals there and the root mean square radius r. 0 beyond a rim of the
-        target.
+        target, or where the source is folded.
     gap : float
         0 to 1: the mean of d² / (d² + (0.1 r)²), with the distance d of the target's points to the
         bent source.
     strain : float
         Standard deviation of the logarithms by which edges became longer, where nothing is missing.
     missing : float
-        Share of the source's area that is beyond a rim of the target, or more than 0.1 r away.
+        Share of the source's area that is beyond a rim of the target, more than 0.1 r away, or
+        folded: lengths changed by a third.
     excess : float
         Share of the target's area that is more than 0.1 r from the source.
-    reflected : bool
-        Whether the source was reflected first.
+    side : "same", "mirrored" or "cannot be told"
+        Whether the target is a mirror image of the source's kind. It cannot be told if both sides
+        of the form are alike; the source is not mirrored then.
     method : "position" or "intrinsic"
         Whether a similarity was the start, or `match_shapes`, since the poses differ.
 
@@ -91,7 +104,7 @@ class SurfaceFit(ReadOnly):
     strain: float
     missing: float
     excess: float
-    reflected: bool
+    side: Side
     method: Literal["position", "intrinsic"]
 
     @property
@@ -99,9 +112,14 @@ class SurfaceFit(ReadOnly):
         """The gap and the square of the strain: 0.01 to 0.02 between skulls of mice, 0.25 to a hand."""
         return self.gap + self.strain**2
 
+    @property
+    def reflected(self) -> bool:
+        """Whether the source was reflected first."""
+        return self.side == "mirrored"
+
 
 @one_blas_thread()
-def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
+def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = None) -> SurfaceFit:
     """Bend a surface onto another of nearly its form, as a bone onto that of another animal.
 
     1. `align_surfaces` places the target on the source: any unit, any turn, mirror images too.
@@ -112,8 +130,8 @@ def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
        and with the angle of their normals, so that what has no partner hardly acts: loose pieces,
        pores, what is missing.
     3. If parts of the target are not reached or the source is strained, the poses may differ:
-       `match_shapes` gives another start, and the result with the smaller `misfit` is returned.
-       `method` says which.
+       `match_shapes` gives another start, for the mirror image, too. The result with the smaller
+       `misfit` is returned; `method` and `side` say which.
 
     Parameters
     ----------
@@ -121,6 +139,8 @@ def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
         Complete, of about 2,000 to 20,000 vertices; `es.geometry.decimate` makes a smaller one.
     target : MeshLike
         Of any number of faces and any topology. Parts may be missing. Faces of both look outward.
+    mirrored : bool, optional
+        Whether the target is a mirror image, where that is known. By default both are tried.
 
     Returns
     -------
@@ -144,25 +164,43 @@ def fit_surface(source: MeshLike, target: MeshLike) -> SurfaceFit:
     ...     es.make_creature("hand", individual=i, n_vertices=1000) for i in (0, 1)
     ... )
     >>> fit = es.collections.fit_surface(one, other)
-    >>> bool(np.median(fit.gaps) < 0.01), fit.method, fit.reflected
-    (True, 'position', False)
+    >>> bool(np.median(fit.gaps) < 0.01), fit.method, fit.side
+    (True, 'position', 'same')
     """
     source, target = as_mesh(source, "source"), as_mesh(target, "target")
-    fit = bend_placed(source, align_surfaces(target, source), target, LEVELS)
+    placing = align_surfaces(target, source, mirrored=mirrored)
+    fit = replace(bend_placed(source, placing, target, LEVELS), side=placing.side)
     if fit.misfit > POSES_DIFFER:
-        try:
-            image = match_shapes(source, target).pull(target.vertices)
-        except EigenshapeError:  # what it refuses, such as needles, is no fault here
-            image = None
-        if image is not None:
-            other = replace(bend_onto(source, image, target, LEVELS), method="intrinsic")
-            fit = min(fit, other, key=lambda each: each.misfit)
+        sides = (False, True) if mirrored is None else (mirrored,)
+        posed = [found for side in sides if (found := _fit_posed(source, target, side))]
+        if len(posed) == 2:
+            upright, reflected = (each.misfit for each in posed)
+            is_clear = upright < CLEAR_SIDE * reflected or reflected < CLEAR_SIDE * upright
+            # Of two that fit as well, the one that is not mirrored
+            posed = (
+                [min(posed, key=lambda each: each.misfit)]
+                if is_clear
+                else [replace(posed[0], side="cannot be told")]
+            )
+        fit = min([fit, *posed], key=lambda each: each.misfit)
     if fit.misfit > NOT_ALIKE:
         raise InvalidShapeError(
             "The target must have about the form of the source, and half of it at least; after "
             f"bending the misfit is {fit.misfit:.2f}, and the most is {NOT_ALIKE}."
         )
     return fit
+
+
+def _fit_posed(source: TriangleMesh, target: TriangleMesh, mirrored: bool) -> SurfaceFit | None:
+    """Bend a source, or its mirror image, onto a target in another pose, from where `match_shapes` puts it."""
+    if mirrored:
+        source = TriangleMesh(source.vertices @ MIRROR, source.faces[:, ::-1])
+    try:
+        image = match_shapes(source, target).pull(target.vertices)
+    except EigenshapeError:  # what it refuses, such as needles, is no fault here
+        return None
+    fit = bend_onto(source, image, target, LEVELS)
+    return replace(fit, method="intrinsic", side="mirrored" if mirrored else "same")
 
 
 def bend_placed(
@@ -172,8 +210,7 @@ def bend_placed(
     start = found.inverse().move(source.vertices)
     # A reflected surface faces outward if its faces are turned.
     faces = source.faces[:, ::-1] if found.reflected else source.faces
-    fit = bend_onto(TriangleMesh(source.vertices, faces), start, target, levels)
-    return replace(fit, reflected=found.reflected)
+    return bend_onto(TriangleMesh(source.vertices, faces), start, target, levels)
 
 
 def bend_onto(
@@ -230,26 +267,43 @@ def bend_onto(
     inside = ~np.isin(np.arange(target.n_vertices), boundary_vertices(target))
     beyond = np.sum(nearest.weights * inside[target.faces[nearest.simplices]], axis=1) < ON_RIM
     confidence = np.clip(2 * cosines, 0, 1) * (1 + (gaps / (FAR * size)) ** 2) ** -2
-    unmatched = beyond | (gaps > UNMATCHED * size)
+    edges, stretch, strains = _stretches(source, vertices)
+    folded = strains > FOLDED
+    unmatched = beyond | folded | (gaps > UNMATCHED * size)
     areas = dual_volumes(placed)
+    stretch = stretch[~unmatched[edges].any(axis=1)]
+    return SurfaceFit(
+        vertices=moved,
+        gaps=gaps,
+        confidence=np.where(beyond | folded, 0, confidence),
+        gap=float(np.mean(far**2 / (far**2 + ON_SURFACE**2))),
+        strain=float(np.std(stretch)) if len(stretch) else 1.0,
+        missing=float(areas @ unmatched / areas.sum()),
+        excess=float(np.mean(far > UNMATCHED)),
+        side="same",
+        method="position",
+    )
+
+
+def _stretches(
+    source: TriangleMesh, vertices: Float[np.ndarray, "n 3"]
+) -> tuple[Int[np.ndarray, "e 2"], Float[np.ndarray, " e"], Float[np.ndarray, " n"]]:
+    """Return edges, the logarithms by which they became longer, and these in the mean at vertices.
+
+    They are less their median. The means are roots of mean squares.
+    """
     edges = edge_table(source).edges
     before, after = (
         np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
         for points in (source.vertices, vertices)
     )
-    kept = ~unmatched[edges].any(axis=1) & (before > 0) & (after > 0)
-    stretch = np.log(after[kept] / before[kept])
-    return SurfaceFit(
-        vertices=moved,
-        gaps=gaps,
-        confidence=np.where(beyond, 0, confidence),
-        gap=float(np.mean(far**2 / (far**2 + ON_SURFACE**2))),
-        strain=float(np.std(stretch)) if len(stretch) else 1.0,
-        missing=float(areas @ unmatched / areas.sum()),
-        excess=float(np.mean(far > UNMATCHED)),
-        reflected=False,
-        method="position",
-    )
+    known = (before > 0) & (after > 0)
+    stretch = np.log(after[known] / before[known])
+    stretch -= np.median(stretch) if len(stretch) else 0.0
+    edges = edges[known]
+    degrees = np.bincount(edges.ravel(), minlength=len(vertices))
+    squares = np.bincount(edges.ravel(), np.repeat(stretch**2, 2), len(vertices))
+    return edges, stretch, np.sqrt(squares / np.maximum(degrees, 1))
 
 
 def _kernel(

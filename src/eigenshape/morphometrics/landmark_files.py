@@ -321,10 +321,11 @@ def _format_fcsv(specimens: Table) -> str:
         place = [text.replace("NA", "0.0") for text in place]  # noqa: PLW2901
         rows.append([number + 1, *place, 0, 0, 0, 1, 1, 1, 0, name, "", "", status, 0])
     head = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"
-    return f"{head}# columns = {FCSV_COLUMNS},positionStatus,autoCreated\n{_csv_text(rows)}"
+    return f"{head}# columns = {FCSV_COLUMNS},positionStatus,autoCreated\n{csv_text(rows)}"
 
 
-def _csv_text(rows: Iterable[Iterable[object]]) -> str:
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return a table of comma-separated values."""
     lines = io.StringIO()
     csv.writer(lines, lineterminator="\n").writerows(rows)
     return lines.getvalue()
@@ -436,7 +437,7 @@ def _format_csv(specimens: Table) -> str:
             landmarks.names, _texts(landmarks), widths.tolist(), strict=True
         ):
             rows.append([specimen, name, *place, "NA" if np.isnan(width) else width])
-    return _csv_text(rows)
+    return csv_text(rows)
 
 
 FORMATS: dict[str, tuple[Callable[[str, str], Table], Callable[[Table], str]]] = {

@@ -15,6 +15,7 @@ from eigenshape.io.folders import find_items
 from eigenshape.morphometrics.landmark_files import OF_ONE, read_landmarks, read_specimens
 from eigenshape.morphometrics.landmarks import Landmarks, require_same_names
 
+MOST_NAMED = 5  # specimens that a sentence names
 OUTSIDE = 0.1  # distance of landmarks from their surface to be noted, in root mean square radii
 
 
@@ -72,6 +73,24 @@ def landmarks_outside(collection: Collection, labelled: Mapping[str, Landmarks])
                 "frame or unit than the mesh"
             )
     return found
+
+
+def unsure_sides(collection: Collection) -> list[str]:
+    """Say, in one message or none, of which specimens it cannot be told whether they are mirrored."""
+    unsure = [
+        name
+        for name, side in zip(collection.names, collection.sides, strict=True)
+        if side == "cannot be told"
+    ]
+    if not unsure:
+        return []
+    n_all = len(collection.names)
+    who = ", ".join(unsure) if len(unsure) <= MOST_NAMED else f"{len(unsure)} of {n_all} specimens"
+    return [
+        f"mirror images: of {who} it cannot be told whether they are mirrored, since both sides of "
+        "the form are alike. Where one is, left and right are exchanged. The same landmarks on it "
+        "and on another specimen tell; if none is mirrored, say so with --unmirrored."
+    ]
 
 
 def doubtful_landmarks(carried: CarriedLandmarks) -> dict[str, list[str]]:

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from matplotlib.image import imsave
 
 from eigenshape._files import replace_file
+from eigenshape.cli.steps.collecting import unsure_sides
 from eigenshape.collections.alignment import best_similarity
 from eigenshape.collections.carrying import CarriedLandmarks
 from eigenshape.collections.collection import Collection, unreflect
@@ -53,6 +54,8 @@ def write_collection_report(
         specimens.append(
             {
                 "name": name,
+                "side": collection.sides[number],
+                "method": collection.methods[number],
                 "notes": collection.notes[name],
                 "picture": _picture(collection, number, unreflected[number], mean.vertices, camera),
                 "scores": scores[number].tolist(),
@@ -63,6 +66,7 @@ def write_collection_report(
         "template": collection.template,
         "specimens": specimens,
         "failures": collection.failures,
+        "unsure": unsure_sides(collection),
         "mean": _numbers(mean.vertices),
         "modes": [_numbers(mode) for mode in modes],
         "faces": _text(mean.faces.astype("<u4"), None),
