@@ -203,7 +203,7 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
         else:
             pairs, certificate = approximate_pairs(pencil, wanted, error, residual, report)
     report(1.0, "proved complete" if certificate.complete else "accurate enough")
-    spectrum = _in_user_units(operator, pencil, pairs, certificate)
+    spectrum = spectrum_of(operator, pencil, pairs, certificate)
     if cache is not None:
         keep(spectrum, cache, key)
     return _on_all_points(spectrum, laplacian, free)
@@ -258,7 +258,7 @@ def _requested_pairs(
     return 0, to_pencil(operator.kernel, np.array([low, high]))
 
 
-def _in_user_units(
+def spectrum_of(
     laplacian: Laplacian, pencil: Pencil, pairs: Pairs, certificate: Certificate
 ) -> Spectrum:
     """Convert pairs of the pencil to a spectrum in the user's units, corrected if the kernel is."""

@@ -1,0 +1,122 @@
+"""The cotangent operator as a differentiable function of the vertices."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import require_sound
+from eigenshape.geometry.simplices import size_one
+
+
+def as_tensor(array: Any) -> Tensor:
+    """Return an array as a tensor of double precision, without a copy where DLPack or NumPy can.
+
+    Tensors keep their graph and device. Arrays of JAX and others come in by DLPack.
+    """
+    if not isinstance(array, Tensor):
+        writable = not isinstance(array, np.ndarray) or array.flags.writeable
+        array = (
+            torch.from_dlpack(array)
+            if hasattr(array, "__dlpack__") and writable
+            else torch.tensor(array)
+        )
+    return array.to(torch.float64)
+
+
+def to_numpy(tensor: Tensor) -> np.ndarray:
+    """Return the values of a tensor as an array; on the CPU it shares their memory."""
+    return tensor.detach().cpu().numpy()
+
+
+def checked_mesh(vertices: Tensor, faces: Tensor) -> TriangleMesh:
+    """Return a mesh that can carry an operator; raise InvalidShapeError for one that cannot."""
+    mesh = TriangleMesh(to_numpy(vertices), to_numpy(faces))
+    require_sound(mesh)
+    return mesh
+
+
+def as_faces(faces: Any) -> Tensor:
+    """Return faces as a tensor of int64."""
+    if not isinstance(faces, Tensor):
+        faces = torch.tensor(np.asarray(faces))
+    return faces.to(torch.int64)
+
+
+def face_products(vertices: Tensor, faces: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the cotangent at each corner of each face, (f, 3), and the areas of the faces, (f,)."""
+    corners = vertices[faces]
+    following, before = corners.roll(-1, dims=1) - corners, corners.roll(1, dims=1) - corners
+    doubled = torch.linalg.cross(following[:, 0], before[:, 0], dim=1).norm(dim=1)
+    return (following * before).sum(dim=2) / doubled[:, None], doubled / 2
+
+
+def cotangent_entries(vertices: Tensor, faces: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Return the places (2, e) and values (e,) of W, row by row, and the diagonal of B.
+
+    Raise InvalidShapeError for a mesh that cannot carry an operator.
+    """
+    checked_mesh(vertices, faces)
+    n = len(vertices)
+    # Divided by a power of two, which costs no digit: squares of any coordinates are floats.
+    _, scale = size_one(to_numpy(vertices))
+    cotangents, areas = face_products(vertices / scale, faces)
+    # The side opposite to each corner; a side of several faces has the sum of their weights.
+    ends = torch.stack([faces.roll(-1, dims=1), faces.roll(1, dims=1)]).flatten(1).sort(dim=0)
+    sides = ends.values.cpu().numpy()
+    keys, number = np.unique(sides[0] * n + sides[1], return_inverse=True)
+    low, high = keys // n, keys % n
+    diagonal = np.arange(n)
+    rows, columns = np.concatenate([[low, high], [high, low], [diagonal] * 2], axis=1)
+    order = torch.from_numpy(np.argsort(rows * n + columns)).to(vertices.device)
+
+    def gather(places: Any, values: Tensor, size: int) -> Tensor:
+        where = torch.as_tensor(places, device=vertices.device)
+        return values.new_zeros(size).index_add(0, where, values)
+
+    weights = gather(number, cotangents.flatten() / 2, len(keys))
+    sums = gather(np.concatenate([low, high]), torch.cat([weights, weights]), n)
+    values = torch.cat([-weights, -weights, sums])[order]
+    places = torch.from_numpy(np.stack([rows, columns])).to(vertices.device)[:, order]
+    mass = gather(faces.flatten(), (areas / 3).repeat_interleave(3), n) * scale**2
+    return places, values, mass
+
+
+def cotangent_laplacian(vertices: Any, faces: Any) -> tuple[Tensor, Tensor]:
+    """Build the cotangent operator W and its lumped mass B, differentiable in the vertices.
+
+    The values are those of `es.cotangent_laplacian`, to rounding.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float tensor
+        Or any array that DLPack or NumPy takes. Computed in double precision.
+    faces : (f, 3) int tensor
+
+    Returns
+    -------
+    stiffness : (n, n) sparse COO tensor
+        W, coalesced.
+    mass : (n,) tensor
+        The diagonal of B, in length².
+
+    Raises
+    ------
+    InvalidShapeError
+        As in `es.cotangent_laplacian`.
+
+    Examples
+    --------
+    >>> import eigenshape as es, eigenshape.torch as et
+    >>> ball = es.icosphere(1)
+    >>> W, mass = et.cotangent_laplacian(ball.vertices, ball.faces)
+    >>> abs(W.to_dense().numpy() - es.cotangent_laplacian(ball).stiffness).max().round(9).item()
+    0.0
+    """
+    points = as_tensor(vertices)
+    places, values, mass = cotangent_entries(points, as_faces(faces))
+    size = (len(points), len(points))
+    options = {"is_coalesced": True, "check_invariants": False}
+    return torch.sparse_coo_tensor(places, values, size, **options), mass
