@@ -21,12 +21,13 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build", "README.md"]
 templates_path = ["_templates"]
 
-myst_enable_extensions = ["dollarmath"]
+myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 4
 
 autosummary_generate = True
@@ -36,6 +37,20 @@ napoleon_google_docstring = False
 napoleon_use_rtype = False
 napoleon_use_ivar = True
 default_role = "code"  # `name` in docstrings is code, as in numpydoc
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../gallery",
+    "gallery_dirs": "gallery",
+    "image_scrapers": ("matplotlib", "shown_figures.save_shown_figure"),
+    "capture_repr": ("_repr_html_",),
+    "ignore_repr_types": "matplotlib|eigenshape.plot",
+    "doc_module": ("eigenshape",),
+    "backreferences_dir": "gallery/backreferences",
+    "show_signature": False,
+    "write_computation_times": False,
+    "download_all_examples": False,
+    "abort_on_example_error": True,
+}
 
 html_theme = "pydata_sphinx_theme"
 html_title = "eigenshape"
@@ -135,11 +150,12 @@ def write_experiment_pages() -> None:
 
 
 def link_experiment_pages(_app: object, _name: str, text: list[str]) -> None:
-    """Lead links to the READMEs of experiments, which lie outside the docs, to their pages."""
+    """Lead links to READMEs of experiments and scripts of the gallery to their pages."""
     text[0] = re.sub(
         r"\]\(\.\./((?:\.\./)?)experiments/(\w+)/README\.md", r"](\1experiments/\2.md", text[0]
     )
     text[0] = text[0].replace("](../experiments/README.md", "](experiments/index.md")
+    text[0] = re.sub(r"\]\(\.\./(gallery/\w+/\w+)\.py\)", r"](\1.rst)", text[0])
 
 
 def escape_bars(
@@ -153,10 +169,21 @@ def escape_bars(
             )
 
 
+def name_short_door(app: object, env: object) -> list[str]:
+    """Let `es.name` lead to the page of the room that has the name."""
+    objects = env.domains["py"].objects  # type: ignore[attr-defined]
+    for name, entry in list(objects.items()):
+        alias = f"eigenshape.{name.rpartition('.')[2]}"
+        if name.startswith("eigenshape.") and hasattr(es, alias[11:]) and alias not in objects:
+            objects[alias] = entry._replace(aliased=True)
+    return []
+
+
 def setup(app: object) -> None:
     """Connect what is done to sources and docstrings."""
     app.connect("source-read", link_experiment_pages)  # type: ignore[attr-defined]
     app.connect("autodoc-process-docstring", escape_bars)  # type: ignore[attr-defined]
+    app.connect("env-updated", name_short_door)  # type: ignore[attr-defined]
 
 
 write_api_pages()

@@ -44,7 +44,7 @@ def test_files_in_docs_are_there(page):
 
 
 def test_every_public_name_is_mentioned_beside_the_api_pages():
-    files = [*PAGES, *(ROOT / "examples").rglob("*.py"), *(ROOT / "experiments").rglob("*.py")]
+    files = [*PAGES, *(ROOT / "gallery").rglob("*.py"), *(ROOT / "experiments").rglob("*.py")]
     words = {word for path in files for word in re.findall(r"\w+", path.read_text())}
     assert not sorted(public_things().keys() - words)
 

@@ -394,6 +394,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "winding_numbers.points": lambda: bent().vertices,
     "figure_cortex.surfaces": lambda: {"left": body()},
     "figure_cortex.values": lambda: {"left": height()},
+    "figure_fields.fields": lambda: {"body": (body(), height())},
     "n_vertices": lambda: 9,
     "Parcellation.labels": lambda: [0, 1, -1],
     "Parcellation.names": lambda: ["low", "high"],

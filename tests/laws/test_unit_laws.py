@@ -325,6 +325,7 @@ WITHOUT = {
     "figure_cortex",
     "figure_eigenfunctions",
     "figure_field",
+    "figure_fields",
     "figure_label_transfer",
     "figure_match",
     "figure_poses",

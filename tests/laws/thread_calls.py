@@ -502,6 +502,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "figure_field": lambda v: drawn(
         es.figure_field(v.ball, v.ball.vertices[:, 0], r"$x_1$", camera=v.camera)
     ),
+    "figure_fields": lambda v: drawn(
+        es.plot.figure_fields({"x": (v.ball, v.ball.vertices[:, 0])}, camera=v.camera)
+    ),
     "figure_label_transfer": lambda v: drawn(
         es.plot.figure_label_transfer(v.labeled, v.pose, v.transfer)
     ),

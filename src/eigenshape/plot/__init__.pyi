@@ -3,6 +3,7 @@ from .camera import aim_camera as aim_camera
 from .cortex import figure_cortex as figure_cortex
 from .fields import figure_eigenfunctions as figure_eigenfunctions
 from .fields import figure_field as figure_field
+from .fields import figure_fields as figure_fields
 from .fields import figure_segments as figure_segments
 from .fields import part_colors as part_colors
 from .fields import value_colors as value_colors

@@ -1,5 +1,7 @@
 """Figures of functions and parts on a shape."""
 
+from collections.abc import Mapping
+
 import matplotlib as mpl
 import numpy as np
 import scipy.sparse as sp
@@ -183,6 +185,88 @@ def figure_field(  # noqa: PLR0913 - what is drawn, and one keyword for each cho
     show(axes, draw(mesh, camera, vertex_colors=map_colors(field, scale, colors)))
     bar = figure.colorbar(ScalarMappable(scale, colors), ax=axes, shrink=0.8, extend=extend)
     bar.set_label(bar_label(label, field))
+    return figure
+
+
+def figure_fields(  # noqa: PLR0913 - what is drawn, and one keyword for each choice of how
+    fields: Mapping[str, tuple[MeshLike, ArrayLike]],
+    label: str = "",
+    *,
+    camera: Camera | None = None,
+    view: View = "auto",
+    up: Up = "auto",
+    color_map: str = "viridis",
+    limits: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw functions on one or several meshes side by side, with one color bar.
+
+    Parameters
+    ----------
+    fields : mapping of titles to (MeshLike, (n,) float)
+        For each drawing a mesh and one value for each of its n vertices, NaN where there is none.
+    label : str
+        Text beside the color bar, such as the name of the function and its unit.
+    camera : Camera, optional
+        Of all drawings, instead of `view` and `up`. Each mesh fills its picture.
+    view : str or (3,) float
+        The side from which each mesh is drawn, as in `aim_camera`.
+    up : str or (3,) float
+        The upward direction, as in `aim_camera`.
+    color_map : str
+        Name of a color map of matplotlib.
+    limits : (float, float), optional
+        Values at the ends of the color bar. The default is the lowest and the highest value of all.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InvalidParameterError
+        If there is no field, one is not a mesh and its values, or values, `limits` or the view are
+        not valid for `figure_field`.
+
+    See Also
+    --------
+    figure_field : Draw one function, larger.
+    figure_eigenfunctions : Draw eigenfunctions with their nodal lines.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> x, y, _ = ball.vertices.T
+    >>> figure = es.plot.figure_fields({"x": (ball, x), "y": (ball, y)}, "coordinate, length")
+    >>> [axes.get_title() for axes in figure.axes[:2]]
+    ['x', 'y']
+    """
+    require_type(fields, Mapping, "fields")
+    if not fields:
+        raise InvalidParameterError("fields must hold at least one field; it is empty.")
+    shapes = {}
+    for title, pair in fields.items():
+        if not isinstance(pair, tuple) or len(pair) != 2:
+            raise InvalidParameterError(
+                f"fields must hold pairs (mesh, values); {title!r} has a {type(pair).__name__}."
+            )
+        mesh = as_mesh(pair[0], title)
+        shapes[title] = (mesh, vertex_field(pair[1], mesh.n_vertices))
+    everything = np.ma.concatenate([field for _, field in shapes.values()])
+    scale, extend = value_scale(everything, limits)
+    colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
+    n_columns = 2 if len(shapes) == 4 else min(len(shapes), 3)
+    n_rows = -(-len(shapes) // n_columns)
+    figure = Figure(figsize=(PANEL * n_columns + 0.8, (PANEL + 0.3) * n_rows), layout="constrained")
+    grid = figure.subplots(n_rows, n_columns, squeeze=False)
+    for axes in grid.flat:
+        axes.set_axis_off()
+    for axes, (title, (mesh, field)) in zip(grid.flat, shapes.items(), strict=False):
+        aimed = choose_camera(mesh, camera, view, up, size=420)
+        show(axes, draw(mesh, aimed, vertex_colors=map_colors(field, scale, colors)))
+        axes.set_title(title)
+    bar = figure.colorbar(ScalarMappable(scale, colors), ax=grid, shrink=0.7, extend=extend)
+    bar.set_label(bar_label(label, everything))
     return figure
 
 

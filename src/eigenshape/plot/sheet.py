@@ -276,7 +276,7 @@ def figure_poses(
     camera = choose_camera(first, camera, view, up)
     columns = min(len(poses), POSES_IN_A_ROW)
     rows = -(-len(poses) // columns)
-    size = 1.5 * PANEL
+    size = 1.5 * PANEL if len(poses) <= 2 else PANEL  # a wider figure has titles too small to read
     figure = Figure(figsize=(size * columns + 0.8, (size + 0.3) * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False)
     # The corners of the box that holds all poses, along the axes of the camera
@@ -293,7 +293,7 @@ def figure_poses(
         colors = np.asarray(colormap(np.append(values, np.zeros(len(corners)))))[:, :3]
         framed = TriangleMesh(np.vstack([mesh.vertices, corners]), mesh.faces)
         show(axes, draw(framed, camera, vertex_colors=colors))
-        axes.set_title(title, fontsize=10)
+        axes.set_title(title)
     if shares is not None:
         scale = ScalarMappable(Normalize(0, 1), colormap)
         figure.colorbar(scale, ax=grid.ravel().tolist(), shrink=0.6, pad=0.01).set_label(
