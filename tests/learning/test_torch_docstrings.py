@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("torch.nn", reason="torch is not installed: pip install 'eigenshape[torch]'")
-pytest.importorskip("torch_geometric", reason="torch_geometric is not installed: pip install 'eigenshape[torch]'")
+pytest.importorskip(
+    "torch_geometric", reason="torch_geometric is not installed: pip install 'eigenshape[torch]'"
+)
 
 import eigenshape as es
 import eigenshape.torch as et

@@ -193,12 +193,12 @@ def condense(
     else:
         rows = [
             [
-                fact["shape"],
-                f"{fact['n_regions']:,}",
-                f"{fact['lost']:.1%}",
-                f"{fact['heat_error']:.1g}",
+                name,
+                f"{table.n_regions:,}",
+                f"{table.lost:.1%}",
+                f"{table.error:.1g}",
             ]
-            for fact in facts
+            for name, table in shapes
         ]
         print_table("Condensed", ["shape", "regions", "variance lost", "error of heat"], rows)
         for name, reason in () if out.is_terminal and err.is_terminal else failed.items():

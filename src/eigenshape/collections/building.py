@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import EigenshapeError, InvalidParameterError, InvalidShapeError
@@ -190,12 +190,13 @@ def build_collection(
     for name, fit in posed.items():
         write_fit(fit_file(folder, name), **asdict(fit))
     run.require_two(fits)
-    return _collect(folder, template, fits, notes, paths, run.failures)
+    return _collect(folder, template, surface.faces, fits, notes, paths, run.failures)
 
 
-def _collect(
+def _collect(  # noqa: PLR0913, PLR0917 - what is known when all fits are done
     folder: Path,
     template: str,
+    faces: Int[np.ndarray, "f 3"],
     fits: Mapping[str, SurfaceFit],
     notes: dict[str, list[str]],
     paths: Mapping[str, Path],
@@ -208,7 +209,7 @@ def _collect(
     complete = _complete(list(ordered.values()))
     together = fit_procrustes(unreflect(points, reflected)[complete])
     size = float(np.median(together.sizes))
-    mean = TriangleMesh(together.mean * size, surface.faces)
+    mean = TriangleMesh(together.mean * size, faces)
     for name, fit in ordered.items():
         notes[name] += _noticed(fit, size)
     collection = Collection(

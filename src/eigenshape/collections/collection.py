@@ -183,7 +183,7 @@ def open_collection(folder: str | Path) -> Collection:
 def save_collection(collection: Collection) -> None:
     """Write all but the fits, which are there already; collection.json comes last."""
     write_mesh(collection.mean, collection.folder / MEAN)
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "name": name,
             "source": str(source),

@@ -252,7 +252,7 @@ def figure_fields(  # noqa: PLR0913 - what is drawn, and one keyword for each ch
             )
         mesh = as_mesh(pair[0], title)
         shapes[title] = (mesh, vertex_field(pair[1], mesh.n_vertices))
-    everything = np.ma.concatenate([field for _, field in shapes.values()])
+    everything = np.ma.concatenate([field for _, field in shapes.values()])  # type: ignore[no-untyped-call]
     scale, extend = value_scale(everything, limits)
     colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
     n_columns = 2 if len(shapes) == 4 else min(len(shapes), 3)
