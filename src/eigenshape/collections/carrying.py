@@ -25,9 +25,8 @@ ERROR_OF_ONE = 0.037
 # Labelled specimens that the mean error of all landmarks counts for in the error of each
 N_PRIOR = 2.0
 FAR = 0.05  # gap from which a person should look, in root mean square radii
-NO_PLACE = (
-    0.02  # confidence below which the specimen has no such place; on whole skulls 0.1 or more
-)
+# Confidence below which the specimen has no such place; on whole skulls it is 0.1 or more
+NO_PLACE = 0.02
 # Median errors between a given landmark and its carried place, from which a person should look
 WRONG_LABEL = 5.0
 
