@@ -3,8 +3,8 @@
     python studio/tests/pictures.py docs/pictures
 
 A giraffe whose head and neck are turned, its eigenfunctions, and its parts; a horse and the scan of
-another pose, with the map between them. Then figures 6.3, 6.4 and 6.13
-of the thesis, by the mouse: knee, arm and waist of a biped, and a bar that is twisted.
+another pose, with the map between them. Then figures 6.3, 6.4 and 6.13 of the thesis, by the mouse:
+knee, arm and waist of a biped, and a bar that is twisted.
 """
 
 import math
@@ -51,9 +51,7 @@ def main(folder: Path, *, n_vertices: int = 8000) -> list[Path]:
     bar = es.geometry.boundary_surface(es.shapes.box(cells, 6 * cells, cells, sides=(1, 6, 1)))
     with tempfile.TemporaryDirectory() as work, start_browser() as browser:
         draw = partial(draw_shape, browser, folder, Path(work))
-        horse, running = (
-            es.make_creature("quadruped", pose, n_vertices=n_vertices) for pose in (0, 1)
-        )
+        horse, running = (es.make_creature("quadruped", pose) for pose in (0, 1))
         scan = Path(work) / "scan of a running horse.ply"
         es.write_mesh(es.partial_scan(running, [1, 0, 0.3]).mesh, scan)
         compare = partial(show_second, path=scan)

@@ -24,18 +24,9 @@ pytestmark = pytest.mark.long
 
 N_VERTICES = 800
 BOTH = ("eigenshape.viewer", "eigenshape.second.viewer")
-# The way from the middle to the eye, in the coordinates of right, up and front of each shape
-EYE = """(() => {
-    const sides = [[eigenshape.viewer, eigenshape.state], [eigenshape.second.viewer, eigenshape.state.beside]];
-    return sides.map(([viewer, {up, towards}]) => {
-        const { camera, controls } = viewer;
-        const vector = () => camera.position.clone();
-        const upward = vector().fromArray(up);
-        const right = upward.clone().cross(vector().fromArray(towards)).normalize();
-        const eye = vector().sub(controls.target).normalize();
-        return [right, upward, right.clone().cross(upward)].map((axis) => axis.dot(eye));
-    });
-})()"""
+# Where both cameras stand, in the coordinates of their shapes
+EYES = """[eigenshape.viewer, eigenshape.second.viewer].map(({ camera, space }) =>
+    camera.position.clone().applyMatrix4(space.matrixWorld.clone().invert()).toArray())"""
 
 
 def attribute(page, name, side):
@@ -91,11 +82,12 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     wait_until_still(page)
 
     # One camera follows the other, in both directions.
+    laid = np.reshape(page.evaluate("eigenshape.state.beside.similarity"), (3, 4))
     for side in (0, 1):
         page.locator('[data-test="canvas"]').nth(side).press("ArrowLeft")
         page.locator('[data-test="canvas"]').nth(side).press("ArrowUp")
-        eyes = np.array(page.evaluate(EYE))
-        np.testing.assert_allclose(eyes[0], eyes[1], atol=1e-6)
+        ours, theirs = np.array(page.evaluate(EYES))
+        np.testing.assert_allclose(theirs, laid[:, :3] @ ours + laid[:, 3], atol=1e-5)
 
     # Equal colors correspond; what is not sure is gray.
     compare = "eigenshape.panels.find(({ id }) => id === 'compare').map"

@@ -134,7 +134,11 @@ def test_what_lies_elsewhere_is_seen_from_the_same_side(poses):
     found = map_of_match(part, whole, match_of(whole, np.arange(part.n_vertices)))
     beside = Beside(part, whole, "turned", 1, found)
     assert beside.job.wait(10)
-    np.testing.assert_allclose(np.reshape(beside.facts()["turn"], (3, 3)), turn, atol=1e-12)
+    laid = np.reshape(beside.facts()["similarity"], (3, 4))
+    np.testing.assert_allclose(laid, np.column_stack([3 * turn, [1, 2, 3]]), atol=1e-12)
+    back = found.similarity(1)
+    np.testing.assert_allclose(back[:, :3] @ laid[:, :3], np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(back[:, :3] @ laid[:, 3] + back[:, 3], 0, atol=1e-12)
     np.testing.assert_allclose(beside.carry(part.vertices[:3]), whole.vertices[:3], atol=1e-9)
 
 

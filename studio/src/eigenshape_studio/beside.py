@@ -102,7 +102,10 @@ class Beside:
             "n_faces": self.meshes[1].n_faces,
             **self._view,
             "map": NO_JOB if self.job is None else self.job.facts(),
-            "turn": None if found is None else self._turn(found),
+            # How the shape is laid on the second one, row by row
+            "similarity": None
+            if found is None
+            else found.similarity(self._side(0)).ravel().tolist(),
             "lines": [] if found is None else self._describe(found),
             "pairs": self.pairs.tolist(),
         }
@@ -178,11 +181,6 @@ class Beside:
             return first
         ordered = pairs[:, ::-1] if self._flipped else pairs
         return correct_map(first, first.match, ordered, progress)
-
-    def _turn(self, found: DenseMap) -> list[float]:
-        """Return the rotation from the first shape to the second, row by row."""
-        turn = found.turn()
-        return (turn.T if self._flipped else turn).ravel().tolist()
 
     def _describe(self, found: DenseMap) -> list[str]:
         """Return what a person should know of the map, in sentences."""

@@ -76,15 +76,19 @@ class DenseMap:
         found[(self.placed[side].partners[corners] < 0).all(axis=1)] = np.nan
         return found
 
-    def turn(self) -> np.ndarray:
-        """Return the rotation that takes directions of the part to those of the whole."""
-        ours, theirs = self.meshes[0].vertices, self.placed[0].points
-        sure = self.placed[0].confidence[:, None] + LEAST_WEIGHT
-        center, center_there = (
-            (points * sure).sum(axis=0) / sure.sum() for points in (ours, theirs)
-        )
-        product = ((theirs - center_there) * sure).T @ (ours - center)
-        return nearest_rotations(product[None])[0]
+    def similarity(self, side: int) -> np.ndarray:
+        """Return the similarity that lays one shape best on the other, (3, 4): [s R | t]."""
+        placed, ours = self.placed[0], self.meshes[0].vertices
+        weights = placed.confidence[:, None] + LEAST_WEIGHT
+        center = (weights * ours).sum(axis=0) / weights.sum()
+        center_there = (weights * placed.points).sum(axis=0) / weights.sum()
+        arms = ours - center
+        product = (weights * (placed.points - center_there)).T @ arms
+        turn = nearest_rotations(product[None])[0]
+        linear = turn * np.sum(turn * product) / np.sum(weights * arms**2)
+        if side == 1:
+            linear, center, center_there = np.linalg.inv(linear), center_there, center
+        return np.column_stack([linear, center_there - linear @ center])
 
     def colors(self) -> tuple[np.ndarray, np.ndarray]:
         """Return red, green, blue of the vertices of both: equal where they correspond.

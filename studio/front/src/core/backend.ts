@@ -58,7 +58,7 @@ export interface Second {
   up: Vec3;
   towards: Vec3;
   map: Progress;
-  turn: number[] | null; // rotation from the shape to this one by the map, row by row
+  similarity: number[] | null; // lays the shape on this one, by the map: three rows of four
   lines: string[]; // what is known of the map
   pairs: [number, number][]; // vertices of both that correspond, by hand
 }

@@ -9,14 +9,6 @@ import { Viewer, type Colors } from "./viewer";
 
 const GRAY = [150, 150, 150, 255]; // what corresponds to nothing
 
-/** Where the camera of a picture stood when its shape filled the picture. */
-interface Seat {
-  viewer: Viewer;
-  turn: three.Matrix4; // from right, up and front to the coordinates of the shape
-  target: three.Vector3;
-  distance: number;
-}
-
 /** How a shape stands. */
 export interface Stand {
   up: Vec3;
@@ -27,9 +19,9 @@ export class Beside {
   readonly viewer: Viewer;
   readonly stage = h("div", { class: "stage", "data-test": "beside" });
   private readonly watch: ResizeObserver;
-  private seats: [Seat, Seat] | null = null;
+  private link: three.Matrix4 | null = null; // from the scene of the first to that of the second
+  private similarity: number[] | null = null; // lays the first shape on the second
   private following = false;
-  private turn: three.Matrix4 | null = null; // from the first shape to the second, if it is known
   private partners: Int32Array | null = null; // vertex of the first for each of the second
   private marks: Uint8Array | null = null; // of the first
 
@@ -60,47 +52,44 @@ export class Beside {
 
   /** Show both shapes whole; from now on one camera follows the other. */
   fit(): void {
-    this.seats = null;
-    this.first.resize();
-    this.viewer.resize();
-    if (!this.viewer.vertices.length) return;
-    const stands = this.stands();
-    this.seats = [this.first, this.viewer].map((viewer, side) => {
-      viewer.fit();
-      const { up, towards } = stands[side]!;
-      const upward = new three.Vector3(...up);
-      const right = upward.clone().cross(new three.Vector3(...towards)).normalize();
-      const turn = new three.Matrix4().makeBasis(right, upward, right.clone().cross(upward));
-      const { target } = viewer.controls;
-      const distance = viewer.camera.position.distanceTo(target);
-      return { viewer, turn, target: target.clone(), distance };
-    }) as [Seat, Seat];
+    const { first, viewer } = this;
+    this.link = null;
+    first.resize();
+    viewer.resize();
+    if (!viewer.vertices.length) return;
+    first.fit();
+    viewer.fit();
+    if (this.similarity) {
+      const rows = [...this.similarity, 0, 0, 0, 1] as Parameters<three.Matrix4["set"]>;
+      this.link = viewer.space.matrixWorld
+        .clone()
+        .multiply(new three.Matrix4().set(...rows))
+        .multiply(first.space.matrixWorld.clone().invert());
+    } else {
+      const [one, two] = this.stands().map((stand, side) => seatOf(stand, [first, viewer][side]!));
+      this.link = two!.multiply(one!.invert());
+    }
     this.follow(0);
   }
 
-  /** Let the cameras see corresponding sides, by a rotation from the first shape to the second. */
-  turnBy(rows: number[] | null): void {
-    const [a, b, c, d, e, f, g, h, i] = rows ?? [];
-    this.turn = rows && new three.Matrix4().set(a!, b!, c!, 0, d!, e!, f!, 0, g!, h!, i!, 0, 0, 0, 0, 1);
-    this.follow(0);
+  /** Let the cameras see corresponding places, once it is known which correspond. */
+  layOn(similarity: number[]): void {
+    const before = this.similarity;
+    this.similarity = similarity;
+    if (!before) this.fit(); // a corrected map leaves the cameras where they are
   }
 
   /** Move the other camera as that of a side has moved. */
   private follow(side: 0 | 1): void {
-    if (!this.seats || this.following) return;
-    const [from, to] = side === 0 ? this.seats : ([this.seats[1], this.seats[0]] as const);
-    const turn = this.turn
-      ? this.turn.clone()
-      : this.seats[1].turn.clone().multiply(this.seats[0].turn.clone().transpose());
-    if (side === 1) turn.transpose();
-    const scale = to.distance / from.distance;
-    const place = (point: three.Vector3) =>
-      point.clone().sub(from.target).applyMatrix4(turn).multiplyScalar(scale).add(to.target);
+    if (!this.link || this.following) return;
+    const views = [this.first, this.viewer] as const;
+    const [from, to] = [views[side], views[1 - side]!];
+    const link = side === 0 ? this.link : this.link.clone().invert();
     this.following = true;
-    to.viewer.camera.position.copy(place(from.viewer.camera.position));
-    to.viewer.controls.target.copy(place(from.viewer.controls.target));
-    to.viewer.controls.update();
-    to.viewer.invalidate();
+    to.camera.position.copy(from.camera.position).applyMatrix4(link);
+    to.controls.target.copy(from.controls.target).applyMatrix4(link);
+    to.controls.update();
+    to.invalidate();
     this.following = false;
   }
 
@@ -141,4 +130,15 @@ export class Beside {
     this.first.resize();
     this.first.fit();
   }
+}
+
+/** Return how right, up and front of a shape, at its place and distance, lie in the scene. */
+function seatOf({ up, towards }: Stand, { camera, controls }: Viewer): three.Matrix4 {
+  const upward = new three.Vector3(...up);
+  const right = upward.clone().cross(new three.Vector3(...towards)).normalize();
+  const distance = camera.position.distanceTo(controls.target);
+  return new three.Matrix4()
+    .makeBasis(right, upward, right.clone().cross(upward))
+    .scale(new three.Vector3().setScalar(distance))
+    .setPosition(controls.target);
 }

@@ -167,7 +167,8 @@ export class ComparePanel implements Panel {
     const [partners, confidence, colors] = loaded;
     this.map = { partners, confidence, colors } as Arrays;
     this.form.get("map-results").hidden = false;
-    this.app.second?.turnBy(this.app.state.beside?.turn ?? null);
+    const { similarity } = this.app.state.beside ?? {};
+    if (similarity) this.app.second?.layOn(similarity);
     this.paint();
   }
 
