@@ -45,14 +45,43 @@ def test_examples_run(name, tmp_path, monkeypatch):
         assert not runner.run(test, out=printed.append).failed, "".join(printed)
 
 
-def test_every_name_of_the_short_door_has_an_example():
-    short = {name for name in es.__all__ if name in THINGS}
-    errors = {
-        name
-        for name in short
-        if isinstance(THINGS[name], type) and issubclass(THINGS[name], Exception)
+def is_error(thing):
+    return isinstance(thing, type) and issubclass(thing, Exception)
+
+
+def test_every_public_name_has_an_example():
+    wanted = {name for name, thing in THINGS.items() if not is_error(thing)}
+    assert not sorted(wanted - set(WITH_EXAMPLES))
+
+
+def documented_names(text):
+    """Return the names in the sections of parameters and attributes of a docstring."""
+    found, section = set(), ""
+    lines = text.splitlines()
+    for line, next_line in zip(lines, [*lines[1:], ""], strict=True):
+        if next_line and set(next_line) == {"-"}:
+            section = line
+        elif section in ("Parameters", "Attributes") and line and not line[0].isspace():
+            found |= {name.strip().lstrip("*") for name in line.split(" : ")[0].split(",")}
+    return found
+
+
+def test_every_parameter_is_documented():
+    callables = {name: thing for name, thing in THINGS.items() if not is_error(thing)}
+    methods = {
+        f"{name}.{each}": getattr(thing, each)
+        for name, thing in callables.items()
+        if inspect.isclass(thing)
+        for each in vars(thing)
+        if not each.startswith("_") and callable(getattr(thing, each))
     }
-    assert not sorted(short - errors - set(WITH_EXAMPLES))
+    missing = {}
+    for name, thing in (callables | methods).items():
+        asked = set(inspect.signature(inspect.unwrap(thing)).parameters) - {"self", "cls"}
+        asked = {each for each in asked if not each.startswith("_")}
+        if left := asked - documented_names(inspect.getdoc(thing)):
+            missing[name] = sorted(left)
+    assert not missing
 
 
 def test_every_public_function_and_class_has_a_docstring_of_one_sentence_first():

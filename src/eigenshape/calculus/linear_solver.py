@@ -180,7 +180,13 @@ class LinearSolver(ReadOnly):
             )
 
     def floating_sums(self, load: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "u k"]:
-        """Return the sums of loads over each component that is determined up to a constant."""
+        """Return the sums of loads over each component that is determined up to a constant.
+
+        Parameters
+        ----------
+        load : (n, k) float
+            One load in each column.
+        """
         points = np.flatnonzero(self.floating >= 0)
         count = int(self.floating.max(initial=-1)) + 1
         members = sp.csr_array(

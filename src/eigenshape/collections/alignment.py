@@ -98,7 +98,12 @@ class Similarity(ReadOnly):
         return "mirrored" if self.reflected else "same"
 
     def move(self, points: ArrayLike) -> Float[np.ndarray, "n 3"]:
-        """Return the places of points of the first surface on the second."""
+        """Return the places of points of the first surface on the second.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+        """
         return self.scale * finite_rows(points, "points", 3) @ self.rotation.T + self.translation
 
     def inverse(self) -> "Similarity":

@@ -52,6 +52,23 @@ class CarriedLandmarks(ReadOnly):
     See Also
     --------
     carry_landmarks
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> found = es.collections.CarriedLandmarks(
+    ...     ("hand",),
+    ...     ("tip",),
+    ...     np.zeros((1, 1, 3)),
+    ...     np.zeros((1, 1)),
+    ...     np.zeros((1, 1), dtype=bool),
+    ... )
+    >>> found.save("landmarks.csv")
+    >>> print(Path("landmarks.csv").read_text().strip())
+    specimen,landmark,x,y,z,spread,doubtful
+    hand,tip,0.0,0.0,0.0,0.0,0
     """
 
     specimens: tuple[str, ...]
@@ -62,6 +79,11 @@ class CarriedLandmarks(ReadOnly):
 
     def save(self, path: str | Path) -> None:
         """Write a table of comma-separated values: specimen, landmark, x, y, z, spread, doubtful.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where the table is written.
 
         Raises
         ------

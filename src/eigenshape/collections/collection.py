@@ -63,6 +63,15 @@ class Collection(ReadOnly):
     See Also
     --------
     build_collection, open_collection, carry_landmarks
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> import eigenshape as es
+    >>> fish = [es.make_creature("fish", individual=i, n_vertices=500) for i in (0, 1)]
+    >>> collection = es.collections.build_collection(dict(zip("ab", fish)), mkdtemp())
+    >>> collection.number("b"), collection.points.shape == (2, collection.mean.n_vertices, 3)
+    (1, True)
     """
 
     folder: Path
@@ -91,6 +100,11 @@ class Collection(ReadOnly):
     def read_specimen(self, name: str) -> TriangleMesh:
         """Read the surface of a specimen, facing outward.
 
+        Parameters
+        ----------
+        name : str
+            One of `names`.
+
         Raises
         ------
         InvalidParameterError
@@ -102,6 +116,11 @@ class Collection(ReadOnly):
 
     def number(self, name: str) -> int:
         """Return the row of a specimen.
+
+        Parameters
+        ----------
+        name : str
+            One of `names`.
 
         Raises
         ------

@@ -80,6 +80,12 @@ class Rotation(ReadOnly):
         """Return the displacement of each point under its share of the angle.
 
         Rodrigues' formula, with 1 - cos x = 2 sin²(x/2) for small angles.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+        share : (n,) float
+            Share of the motion that each point follows, usually 0 to 1.
         """
         from_pivot = points - self.pivot
         angle = share[:, None] * self.angle
@@ -126,7 +132,14 @@ class Translation(ReadOnly):
     def carry(
         self, points: Float[np.ndarray, "n 3"], share: Float[np.ndarray, " n"]
     ) -> Float[np.ndarray, "n 3"]:
-        """Return the displacement of each point: its share of the vector."""
+        """Return the displacement of each point: its share of the vector.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+        share : (n,) float
+            Share of the motion that each point follows, usually 0 to 1.
+        """
         return share[:, None] * self.vector
 
 

@@ -289,6 +289,11 @@ class DeformationSession:
     def apply(self, edit: Edit) -> TriangleMesh:
         """Apply an edit in its own mode, and drop the present drag.
 
+        Parameters
+        ----------
+        edit : Edit
+            Such as an entry of `edits`.
+
         Returns
         -------
         TriangleMesh

@@ -65,6 +65,12 @@ class Material:
         The PNG or JPEG file of the base color.
     image_name : str
         Name of the image file, without a folder.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> es.io.Material("bone", color=(0.9, 0.85, 0.7, 1.0)).name
+    'bone'
     """
 
     name: str = ""

@@ -81,7 +81,12 @@ class Registration(ReadOnly):
     score: float
 
     def move(self, points: ArrayLike) -> Float[np.ndarray, "n 3"]:
-        """Return points of the first scan, placed on the second."""
+        """Return points of the first scan, placed on the second.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+        """
         return finite_rows(points, "points", 3) @ self.rotation.T + self.translation
 
     def inverse(self) -> "Registration":
@@ -90,7 +95,13 @@ class Registration(ReadOnly):
         return Registration(back.copy(), -back @ self.translation, self.score)
 
     def after(self, first: "Registration") -> "Registration":
-        """Return the motion that does another one first; its score is the lower of the two."""
+        """Return the motion that does another one first; its score is the lower of the two.
+
+        Parameters
+        ----------
+        first : Registration
+            The motion that is done before this one.
+        """
         require_type(first, Registration, "first")
         place = self.rotation @ first.translation + self.translation
         return Registration(self.rotation @ first.rotation, place, min(self.score, first.score))

@@ -122,5 +122,11 @@ class ShapeMatch(ReadOnly):
         return np.einsum("nc,nc...->n...", self.weights, table[self.corners])
 
     def sure(self, least: float = 0.5) -> Bool[np.ndarray, " n"]:
-        """Return which vertices have at least this confidence."""
+        """Return which vertices have at least this confidence.
+
+        Parameters
+        ----------
+        least : float
+            0 to 1.
+        """
         return self.confidence >= least

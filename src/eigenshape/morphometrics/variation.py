@@ -67,7 +67,13 @@ class PrincipalComponents(ReadOnly):
         return self.variances / self.variances.sum()
 
     def shape(self, scores: ArrayLike) -> Float[np.ndarray, "k 3"]:
-        """Return the shape with given scores in the first modes."""
+        """Return the shape with given scores in the first modes.
+
+        Parameters
+        ----------
+        scores : (j,) float
+            Of the first j modes; the others have score 0.
+        """
         values = np.atleast_1d(real_numbers(scores, "scores"))
         if values.ndim != 1 or len(values) > len(self.modes):
             raise InvalidParameterError(
@@ -147,6 +153,15 @@ class GroupComparison(ReadOnly):
     See Also
     --------
     compare_groups
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> shapes = np.random.default_rng(0).standard_normal((6, 4, 3))
+    >>> found = es.morphometrics.compare_groups(shapes, ["a", "a", "a", "b", "b", "b"])
+    >>> found.names, found.distances.shape
+    (('a', 'b'), (2, 2))
     """
 
     names: tuple[str, ...]
@@ -241,6 +256,19 @@ class Allometry(ReadOnly):
     See Also
     --------
     fit_allometry
+
+    Examples
+    --------
+    Shapes that become longer as they grow:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> sizes = np.array([1.0, 1.2, 1.5, 2.0])
+    >>> corners = es.shapes.box(1, 1, 1).points
+    >>> shapes = np.array([corners * [1, 1, np.log(size)] for size in sizes])
+    >>> growth = es.morphometrics.fit_allometry(shapes, sizes)
+    >>> round(growth.share, 3), growth.shapes([1.5]).shape
+    (1.0, (1, 8, 3))
     """
 
     mean: Float[np.ndarray, "k 3"]
@@ -252,7 +280,13 @@ class Allometry(ReadOnly):
     residuals: Float[np.ndarray, "n k 3"]
 
     def shapes(self, sizes: ArrayLike) -> Float[np.ndarray, "m k 3"]:
-        """Return the shapes that are expected at centroid sizes (m,)."""
+        """Return the shapes that are expected at centroid sizes.
+
+        Parameters
+        ----------
+        sizes : (m,) float
+            In length, each positive.
+        """
         steps = np.log(positive_values(sizes, "sizes")) - self.mean_log_size
         return self.mean + steps[:, None, None] * self.slope
 
@@ -337,6 +371,15 @@ class SymmetricComponents(ReadOnly):
     See Also
     --------
     symmetric_components
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> face = np.array([[-1, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 1.0]])
+    >>> found = es.morphometrics.symmetric_components([face, face + [[0.1], [0], [0], [0]]], [[0, 1]])
+    >>> round(found.share_individual + found.share_directional + found.share_fluctuating, 9)
+    1.0
     """
 
     symmetric: Float[np.ndarray, "n k 3"]

@@ -45,7 +45,13 @@ class Rate:
     _repr_html_ = html_repr
 
     def at(self, delta: ArrayLike, t: ArrayLike) -> Float[np.ndarray, "..."]:
-        """Return the value of the law at each closeness and heat time."""
+        """Return the value of the law at each closeness and heat time.
+
+        Parameters
+        ----------
+        delta, t : float, or arrays that broadcast
+            Closeness and heat time.
+        """
         return np.asarray(self.constant * np.asarray(delta) ** self.delta * np.asarray(t) ** self.t)
 
 

@@ -68,6 +68,15 @@ class CoarseRows(ReadOnly):
         shapes that were removed belong to none.
     n_fitted : int
         How many shapes there were when the axes were fitted.
+
+    Examples
+    --------
+    An engine of your own is made from them; `FaissEngine` and `QdrantEngine` show how:
+
+    >>> import eigenshape as es
+    >>> class Engine:
+    ...     def __init__(self, coarse: es.retrieval.CoarseRows) -> None:
+    ...         self.rows = coarse.numbers.reshape(-1, coarse.numbers.shape[2])
     """
 
     axes: PatchAxes
@@ -78,7 +87,13 @@ class CoarseRows(ReadOnly):
     n_fitted: int
 
     def scores(self, codes: Int8[np.ndarray, "b s v"]) -> Float32[np.ndarray, " n"]:
-        """Return distances of a query to all whole shapes, as far as the axes show them."""
+        """Return distances of a query to all whole shapes, as far as the axes show them.
+
+        Parameters
+        ----------
+        codes : (b, s, v) int8
+            Codes of the query, as a `PatchDescriptor` has them.
+        """
         query, unit = self.axes.coarse_query(codes)
         found = np.empty(len(self.checksums), dtype=np.float32)
         scan(query, self.numbers, unit, SIZE_PRICE, found[: len(self.numbers)])
@@ -88,14 +103,28 @@ class CoarseRows(ReadOnly):
     def scores_at(
         self, codes: Int8[np.ndarray, "b s v"], places: Int[np.ndarray, " k"]
     ) -> Float32[np.ndarray, " k"]:
-        """Return `scores` of some shapes."""
+        """Return `scores` of some shapes.
+
+        Parameters
+        ----------
+        codes : (b, s, v) int8
+            Codes of the query.
+        places : (k,) int
+            Numbers of shapes.
+        """
         query, unit = self.axes.coarse_query(codes)
         found = np.empty(len(places), dtype=np.float32)
         scan(query, self.numbers_at(places), unit, SIZE_PRICE, found)
         return found
 
     def numbers_at(self, places: Int[np.ndarray, " k"]) -> Int8[np.ndarray, "k s q"]:
-        """Return the rows of some shapes."""
+        """Return the rows of some shapes.
+
+        Parameters
+        ----------
+        places : (k,) int
+            Numbers of shapes.
+        """
         rows, n_kept = self.rows[places], len(self.numbers)
         found = np.empty((len(rows), *self.numbers.shape[1:]), dtype=np.int8)
         is_added = rows >= n_kept

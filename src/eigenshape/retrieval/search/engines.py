@@ -106,7 +106,15 @@ class FaissEngine:
         return f"FaissEngine({self._index.ntotal} vectors)"
 
     def nearest(self, queries: Float32[np.ndarray, "p q"], count: int) -> Int[np.ndarray, "p c"]:
-        """Return the numbers of the vectors with the largest products."""
+        """Return the numbers of the vectors with the largest products.
+
+        Parameters
+        ----------
+        queries : (p, q) float32
+            One vector in each row.
+        count : int
+            How many numbers to return for each query; -1 fills up what is missing.
+        """
         _, numbers = self._index.search(np.ascontiguousarray(queries), count)
         return np.asarray(numbers)
 
@@ -119,6 +127,12 @@ class QdrantEngine:
     client : qdrant_client.QdrantClient
     collection : str
         Its name. `fill` makes it.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> from qdrant_client import QdrantClient  # doctest: +SKIP
+    >>> engine = es.retrieval.QdrantEngine(QdrantClient(":memory:"), "shapes")  # doctest: +SKIP
     """
 
     _repr_html_ = html_repr
@@ -131,6 +145,11 @@ class QdrantEngine:
 
     def fill(self, coarse: CoarseRows) -> None:
         """Make the collection anew, and add the vectors of all shapes.
+
+        Parameters
+        ----------
+        coarse : CoarseRows
+            Of all shapes.
 
         Raises
         ------
@@ -154,7 +173,15 @@ class QdrantEngine:
             )
 
     def nearest(self, queries: Float32[np.ndarray, "p q"], count: int) -> Int[np.ndarray, "p c"]:
-        """Return the numbers of the vectors with the largest products."""
+        """Return the numbers of the vectors with the largest products.
+
+        Parameters
+        ----------
+        queries : (p, q) float32
+            One vector in each row.
+        count : int
+            How many numbers to return for each query; -1 fills up what is missing.
+        """
         found = np.full((len(queries), count), -1, dtype=np.int64)
         for row, query in zip(found, queries, strict=True):
             answer = self.client.query_points(

@@ -43,6 +43,12 @@ class IndexReader:
     processes add or remove is seen after `refresh`, and a query sees one state from begin to end.
     A pickle holds the folder and the engine alone: another process opens the index as it is then.
 
+    Parameters
+    ----------
+    folder : Path
+    engine : callable, optional
+        What finds candidates among very many shapes, such as `FaissEngine`.
+
     Examples
     --------
     >>> import eigenshape as es

@@ -44,6 +44,19 @@ class LatentBasis(ReadOnly):
     See Also
     --------
     latent_basis : Compute one.
+
+    Examples
+    --------
+    Two equal spheres differ from their limit shape in nothing:
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> ball = es.icosphere(2)
+    >>> spectrum = es.solve_spectrum(es.cotangent_laplacian(ball), 16)
+    >>> same = es.spectral.map_from_points(spectrum, spectrum, range(ball.n_vertices), n_modes=16)
+    >>> latent = es.spectral.latent_basis({(0, 1): same})
+    >>> bool(np.allclose(latent.differences("area"), np.eye(8), atol=1e-6))
+    True
     """
 
     matrices: Float[np.ndarray, "s k m"]

@@ -105,7 +105,15 @@ class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
         self.n_neighbors = n_neighbors
 
     def fit(self, X: Any, y: object = None) -> SpectralEmbedder:
-        """Compute the embedding of (n, d) points; `y` is ignored."""
+        """Compute the embedding of points.
+
+        Parameters
+        ----------
+        X : (n, d) float
+            Data points.
+        y
+            Not used; scikit-learn passes it.
+        """
         del y
         points = _data_points(self, X)
         require_choice(self.method, EmbeddingMethod, "method")
@@ -121,7 +129,15 @@ class SpectralEmbedder(BaseEstimator):  # type: ignore[misc]
         return self
 
     def fit_transform(self, X: Any, y: object = None) -> Float[np.ndarray, "n d"]:
-        """Compute the embedding of (n, d) points and return it."""
+        """Compute the embedding of points and return it.
+
+        Parameters
+        ----------
+        X : (n, d) float
+            Data points.
+        y
+            Not used; scikit-learn passes it.
+        """
         return self.fit(X, y).embedding_
 
 
@@ -189,7 +205,15 @@ class SpectralClusterer(ClusterMixin, BaseEstimator):  # type: ignore[misc]
         self.n_neighbors = n_neighbors
 
     def fit(self, X: Any, y: object = None) -> SpectralClusterer:
-        """Compute the clusters of (n, d) points; `y` is ignored."""
+        """Compute the clusters of points.
+
+        Parameters
+        ----------
+        X : (n, d) float
+            Data points.
+        y
+            Not used; scikit-learn passes it.
+        """
         del y
         points = _data_points(self, X)
         wanted = 1 if self.n_clusters is None else self.n_clusters
@@ -203,7 +227,15 @@ class SpectralClusterer(ClusterMixin, BaseEstimator):  # type: ignore[misc]
         return self
 
     def fit_predict(self, X: Any, y: object = None, **kwargs: Any) -> Int[np.ndarray, " n"]:
-        """Compute the clusters of (n, d) points and return the cluster of each."""
+        """Compute the clusters of points and return the cluster of each.
+
+        Parameters
+        ----------
+        X : (n, d) float
+            Data points.
+        y, kwargs
+            Not used; scikit-learn passes them.
+        """
         del kwargs
         return self.fit(X, y).labels_
 
