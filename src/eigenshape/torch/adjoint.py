@@ -17,12 +17,14 @@ from eigenshape.spectral.solver.shift import factorize_near
 # factors, more take more iterations since the shift is farther from their eigenvalues.
 COLUMNS_AT_ONCE = 16
 # Residual at which conjugate gradients stop, relative to the right-hand side,
-SOLVED = 1e-9
+SOLVED = 1e-8
 # and their iterations at most. Seven are usual.
 MOST_ITERATIONS = 200
-# Iterations after which rounding is taken out of the residuals: what they hold of known pairs grows
-# by up to a factor of 16 in each, and doing so in each takes as long as all the rest.
-CLEANED_EVERY = 4
+# Rounding adds a little of the known pairs to each direction, and near the shift it grows by a factor
+# of up to 16 an iteration. It is taken out each time for so many pairs on both sides,
+NEIGHBORS = 8
+# and for all pairs, which takes as long as the solves, after so many iterations.
+CLEANED_EVERY = 8
 # Parts of a gradient that differ by less than this share count as equal: first derivatives of a
 # smooth function at two eigenvalues of a group, which differ by 1e-6, do.
 EQUAL_SHARES = 1e-4
@@ -168,34 +170,38 @@ def _solve_outside(
     Conjugate gradients: beyond the known pairs W - λ_i B is positive definite, and so is the factor
     of W - σB with σ below the last known eigenvalue, which serves as preconditioner.
     """
-    pencil, bases = solved.pencil, solved.vectors
+    bases, W, B = solved.vectors, solved.laplacian.stiffness, solved.laplacian.mass
+    n, n_known = bases.shape
     found = np.zeros_like(by_vector)
-    if bases.shape[1] == len(bases):
+    if n_known == n:
         return found
-    W, B = solved.laplacian.stiffness, solved.laplacian.mass
-    right = B @ (bases @ products) - by_vector
     weighed = B @ bases
+    right = weighed @ products - by_vector
+    lumped = solved.pencil.mass_floor == 1.0
+    masses = B.diagonal()[:, None] if lumped else B
     for start in range(0, solved.n_shown, COLUMNS_AT_ONCE):
         columns = slice(start, min(start + COLUMNS_AT_ONCE, solved.n_shown))
         values, rest = solved.values[columns], right[:, columns].copy()
         if not rest.any():
             continue
-        factor = factorize_near(pencil, _shift_near(solved, columns))
+        factor = factorize_near(solved.pencil, _shift_near(solved, columns))
         goal = SOLVED**2 * _dots(rest, rest)
         solution, direction, slope = np.zeros_like(rest), np.zeros_like(rest), np.ones(len(values))
+        beside = slice(max(start - NEIGHBORS, 0), columns.stop + NEIGHBORS)
         for iteration in range(MOST_ITERATIONS):
             # A column that is solved, or was 0, stays as it is.
             is_open = _dots(rest, rest) > goal
             if not is_open.any():
                 break
-            if iteration % CLEANED_EVERY == CLEANED_EVERY - 1:
-                rest -= weighed @ (bases.T @ rest)
             near = factor.solve(rest)
             last, slope = slope, _dots(near, rest)
             direction *= np.where(is_open, slope / np.where(last == 0, 1.0, last), 0.0)
             direction += near
+            known = slice(0, n_known) if iteration % CLEANED_EVERY == 0 else beside
+            direction -= bases[:, known] @ (weighed[:, known].T @ direction)
+            scaled = direction * values
             image = W @ direction
-            image -= B @ (direction * values)
+            image -= masses * scaled if lumped else masses @ scaled
             curve = _dots(direction, image)
             step = np.where(is_open, slope / np.where(curve == 0, 1.0, curve), 0.0)
             solution += step * direction

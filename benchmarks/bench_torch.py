@@ -1,0 +1,352 @@
+"""Gradients of spectra, operators of many meshes, and encodings of many graphs, beside what else is done.
+
+    python benchmarks/bench_torch.py                    ten minutes
+    python benchmarks/bench_torch.py --quick            small shapes, seconds
+    python benchmarks/bench_torch.py --only encodings   one group
+
+Torch must be installed: pip install 'eigenshape[torch]'. Each group has a process of its own with one thread; encodings
+use two threads, and their peer two processes.
+"""
+
+import multiprocessing
+import os
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import potpourri3d as pp3d
+import scipy.linalg as sl
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+import torch
+from report import THREADS, Report, Row, in_process, options_of
+
+import eigenshape as es
+import eigenshape.torch as et
+
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+PACKAGES = ["eigenshape", "torch", "torch_geometric", "numpy", "scipy", "numba"]
+COLUMNS = ("what", "case", "ours", "beside it", "")
+
+
+def main() -> None:
+    """Measure all groups, or one."""
+    parser = options_of(__doc__)
+    parser.add_argument("--only", choices=GROUPS, action="append")
+    options = parser.parse_args()
+    report = Report(PACKAGES, options, COLUMNS, lambda row: row["cells"])
+    os.environ |= dict.fromkeys(THREADS, "1")
+    for name in options.only or GROUPS:
+        # Freed memory goes back at once, so that none is used twice unseen.
+        if name == "memory":
+            os.environ["MALLOC_MMAP_THRESHOLD_"] = "65536"
+        # Encodings start processes themselves.
+        run = measure if name == "encodings" else partial(in_process, measure)
+        for row in run(name, options.quick, options.repeats)["rows"]:
+            report.add(row)
+        os.environ.pop("MALLOC_MMAP_THRESHOLD_", None)
+
+
+def measure(name: str, quick: bool, repeats: int) -> Row:
+    """Return the rows of a group."""
+    torch.set_num_threads(1)
+    warnings.simplefilter("ignore")
+    return {"rows": list(GROUPS[name](quick, repeats))}
+
+
+def cpu_seconds(call: Callable[[], object], repeats: int) -> float:
+    """Return the median CPU time of a call."""
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        call()
+        times.append(time.process_time() - start)
+    return float(np.median(times))
+
+
+def peak_memory(call: Callable[[], object]) -> float:
+    """Return by how many MiB memory grows while a call runs (Linux)."""
+    status = Path("/proc/self/status")
+
+    def read(field: str) -> float:
+        line = next(each for each in status.read_text().splitlines() if each.startswith(field))
+        return int(line.split()[1]) / 1024
+
+    Path("/proc/self/clear_refs").write_text("5")
+    before = read("VmRSS")
+    call()
+    return read("VmHWM") - before
+
+
+def losses_of(quick: bool) -> tuple[es.Laplacian, int, dict[str, torch.Tensor]]:
+    """Return an operator, a number of pairs, and losses whose backward pass has run once."""
+    n, k = (1000, 20) if quick else (10_000, 100)
+    mesh = es.make_creature("quadruped", n_vertices=n)
+    vertices = torch.tensor(mesh.vertices, requires_grad=True)
+    times = np.geomspace(1e-3, 0.5, 20) * es.geometry.surface_area(mesh)
+    weights = torch.randn(len(mesh.vertices), 20, generator=torch.Generator().manual_seed(0))
+    spectrum = et.solve_spectrum(vertices, mesh.faces, k)
+    losses = {
+        "heat kernel signature": (weights * et.heat_kernel_signature(spectrum, times)).sum(),
+        "spectral loss": et.spectral_loss(spectrum, spectrum.eigenvalues.detach() * 1.1),
+    }
+    for loss in losses.values():
+        loss.backward(retain_graph=True)
+    return es.cotangent_laplacian(mesh), k, losses
+
+
+def gradients(quick: bool, repeats: int) -> Iterator[Row]:
+    """Yield the time of a backward pass beside that of the solve."""
+    laplacian, k, losses = losses_of(quick)
+    forward = cpu_seconds(lambda: es.solve_spectrum(laplacian, k), repeats)
+    for name, loss in losses.items():
+        seconds = cpu_seconds(partial(loss.backward, retain_graph=True), repeats)
+        yield {
+            "cells": [
+                f"backward of the {name}, time",
+                f"{laplacian.n_points:,} vertices, {k} pairs",
+                f"{seconds:.2f} CPU s",
+                f"`es.solve_spectrum`: {forward:.2f} CPU s",
+                f"{seconds / forward:.1f} times as much",
+            ],
+            "figure": f"time of {name}",
+            "ours": seconds,
+            "forward": forward,
+        }
+
+
+def memory(quick: bool, _repeats: int) -> Iterator[Row]:
+    """Yield the memory of a backward pass beside that of the solve."""
+    laplacian, k, losses = losses_of(quick)
+    forward = peak_memory(lambda: es.solve_spectrum(laplacian, k))
+    for name, loss in losses.items():
+        backward = peak_memory(partial(loss.backward, retain_graph=True))
+        yield {
+            "cells": [
+                f"backward of the {name}, memory",
+                f"{laplacian.n_points:,} vertices, {k} pairs",
+                f"{backward:.0f} MiB",
+                f"`es.solve_spectrum`: {forward:.0f} MiB",
+                f"{backward / forward:.1f} times as much",
+            ],
+            "figure": f"memory of {name}",
+            "ours": backward,
+            "forward": forward,
+        }
+
+
+def real_meshes(quick: bool) -> dict[str, list[es.TriangleMesh]]:
+    """Return sets of meshes: four of each class of real shapes, and awkward files."""
+    if quick or not DATA.is_dir():
+        return {"creatures": [es.make_creature(each, n_vertices=500) for each in ("hand", "biped")]}
+    sets = {
+        "real shapes": [
+            path
+            for folder in sorted((DATA / "retrieval").iterdir())
+            if folder.is_dir()
+            for path in sorted(folder.glob("*.ply"))[:4]
+        ],
+        "awkward files": sorted(each for each in (DATA / "nasty").rglob("*") if each.is_file()),
+    }
+    found: dict[str, list[es.TriangleMesh]] = {}
+    for name, paths in sets.items():
+        found[name] = []
+        for path in paths:
+            try:
+                mesh = es.read_mesh(path)
+            except (es.EigenshapeError, OSError, ValueError):
+                continue
+            if len(mesh.vertices) > 20:
+                found[name].append(mesh)
+    return found
+
+
+def operators(quick: bool, _repeats: int) -> Iterator[Row]:
+    """Yield the operators of sets of meshes, ours and as DiffusionNet publishes them."""
+    for name, meshes in real_meshes(quick).items():
+        ours, theirs, failures, parts = 0.0, 0.0, [0, 0], 0.0
+        es.spectral.operator_bundle(es.icosphere(3), 16)
+        es.spectral.operator_bundle(es.icosphere(3), 16, operator="robust")
+        for mesh in meshes:
+            k = min(128, len(mesh.vertices) - 2)
+            start = time.process_time()
+            failures[0] += bundle_of(mesh, k) is None
+            between = time.process_time()
+            part = operators_of_diffusion_net(mesh, k)
+            failures[1] += part is None
+            ours, theirs = ours + between - start, theirs + time.process_time() - between
+            parts += part or 0.0
+        yield {
+            "cells": [
+                "operators, 128 pairs",
+                f"{len(meshes)} {name}",
+                f"{ours:.0f} CPU s, {failures[0]} fail",
+                f"DiffusionNet's method: {theirs:.0f} CPU s, {parts:.0f} of them for eigenpairs; "
+                f"{failures[1]} fail",
+                f"{theirs / ours:.0f} times, eigenpairs alone {parts / ours:.1f}",
+            ],
+            "figure": f"operators of {name}",
+            "ours": ours,
+            "theirs": theirs,
+            "eigenpairs": parts,
+            "failures": failures,
+        }
+
+
+def bundle_of(mesh: es.TriangleMesh, k: int) -> es.spectral.OperatorBundle | None:
+    """Return our operators: cotangent ones, or robust ones where a mesh is refused."""
+    for operator in ("cotangent", "robust"):
+        try:
+            return es.spectral.operator_bundle(mesh, k, operator=operator)
+        except es.EigenshapeError:
+            continue
+    return None
+
+
+def operators_of_diffusion_net(mesh: es.TriangleMesh, k: int) -> float | None:
+    """Compute operators as Sharp, Attaiki, Crane and Ovsjanikov 2022 publish them.
+
+    Return the CPU time of the eigenpairs, or None where the method fails: an error, or eigenvalues
+    that are not finite.
+    """
+    shift = 1e-8
+    vertices, faces = np.array(mesh.vertices), np.array(mesh.faces)
+    try:
+        L = pp3d.cotan_laplacian(vertices, faces, denom_eps=1e-10)
+        masses = pp3d.vertex_areas(vertices, faces)
+        masses += shift * masses.mean()
+        start = time.process_time()
+        shifted = (L + sp.identity(len(masses)) * shift).tocsc()
+        for attempt in range(5):
+            try:
+                values, _ = sla.eigsh(shifted, k=k, M=sp.diags(masses), sigma=shift)
+                break
+            except Exception:  # as the published loop does, whatever it is
+                if attempt == 4:
+                    raise
+                shifted = shifted + sp.identity(len(masses)) * (shift * 10 ** (attempt + 1))
+        seconds = time.process_time() - start
+        fitted = fit_gradients(vertices, faces, L.tocoo())
+    except Exception:  # noqa: BLE001 - a failure is what is counted
+        return None
+    return seconds if np.isfinite(values).all() and np.isfinite(fitted.data).all() else None
+
+
+def fit_gradients(vertices: np.ndarray, faces: np.ndarray, L: sp.coo_matrix) -> sp.csr_array:
+    """Return complex gradients: at each vertex the least squares over its edges, regularized by 1e-5."""
+    corners = vertices[faces]
+    normal_of_face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(normal, faces[:, corner], normal_of_face)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-6
+    axis = np.where(np.abs(normal[:, :1]) < 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])
+    first = np.cross(axis, normal)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(normal, first)
+    neighbors: list[list[int]] = [[] for _ in vertices]
+    for tail, tip in zip(L.row, L.col, strict=True):
+        if tail != tip:
+            neighbors[tail].append(tip)
+    rows, columns, entries = [], [], []
+    for point, tips in enumerate(neighbors):
+        sides = vertices[tips] - vertices[point]
+        flat = np.stack([sides @ first[point], sides @ second[point]], axis=1)
+        solve = np.linalg.inv(flat.T @ flat + 1e-5 * np.identity(2)) @ flat.T
+        values = solve @ np.hstack([-np.ones((len(tips), 1)), np.identity(len(tips))])
+        rows += [point] * (len(tips) + 1)
+        columns += [point, *tips]
+        entries += (values[0] + 1j * values[1]).tolist()
+    return sp.csr_array((entries, (rows, columns)), shape=(len(vertices),) * 2)
+
+
+def encodings(quick: bool, _repeats: int) -> Iterator[Row]:
+    """Yield the encodings of many small graphs, beside SciPy's dense solver in a pool."""
+    from torch_geometric.data import Batch, Data  # noqa: PLC0415 - takes seconds
+    from torch_geometric.transforms import AddLaplacianEigenvectorPE  # noqa: PLC0415
+
+    n_graphs, generator = (300 if quick else 100_000), np.random.default_rng(0)
+    sizes = generator.integers(30, 61, n_graphs)
+    edges = [random_edges(n, generator) for n in sizes.tolist()]
+    graphs = [
+        Data(edge_index=torch.from_numpy(pairs), num_nodes=n)
+        for pairs, n in zip(edges, sizes.tolist(), strict=True)
+    ]
+    encode = et.ProjectorEncoding(8)
+    es.set_threads(2)
+    start = time.perf_counter()
+    for first in range(0, n_graphs, 10_000):
+        encode(Batch.from_data_list(graphs[first : first + 10_000]))
+    ours = time.perf_counter() - start
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
+        pool.map(solve_one, [(edges[0], int(sizes[0]))] * 2)  # imports
+        start = time.perf_counter()
+        work = zip(edges, sizes.tolist(), strict=True)
+        for _ in pool.imap(solve_one, work, chunksize=500):
+            pass
+        theirs = time.perf_counter() - start
+    yield {
+        "cells": [
+            "encodings by projectors",
+            f"{n_graphs:,} graphs of 30 to 60 nodes",
+            f"{ours:.0f} s, two threads",
+            f"`scipy.linalg.eigh` alone, two processes: {theirs:.0f} s",
+            f"{theirs / ours:.1f} times",
+        ],
+        "figure": "encodings",
+        "ours": ours,
+        "theirs": theirs,
+    }
+
+    # The same graphs with their nodes in another order.
+    worst, other = 0.0, 0
+    torch.set_default_dtype(torch.float64)
+    for graph in graphs[:100]:
+        order = torch.randperm(graph.num_nodes, generator=torch.Generator().manual_seed(0))
+        moved = Data(edge_index=order[graph.edge_index], num_nodes=graph.num_nodes)
+        one, two = encode(graph.clone()), encode(moved)
+        worst = max(worst, float((one.projector_nodes - two.projector_nodes[order]).abs().max()))
+        first, again = (
+            AddLaplacianEigenvectorPE(8, attr_name="pe", is_undirected=True)(graph.clone()).pe
+            for _ in range(2)
+        )
+        other += float((first - again).abs().max()) > 1e-6
+    yield {
+        "cells": [
+            "the same, renumbered or repeated",
+            "100 of them",
+            f"differ by {worst:.0e} at most, renumbered",
+            "`AddLaplacianEigenvectorPE` of PyG, same numbering, run twice",
+            f"{other} of 100 differ",
+        ],
+        "figure": "repeated",
+        "worst": worst,
+        "different": other,
+    }
+
+
+def random_edges(n: int, generator: np.random.Generator) -> np.ndarray:
+    """Return the edges of a random tree with n / 5 more edges, as molecules have them, both ways."""
+    parents = [(generator.integers(i), i) for i in range(1, n)]
+    more = [tuple(np.sort(generator.choice(n, 2, replace=False))) for _ in range(n // 5)]
+    pairs = np.unique(np.array(parents + more), axis=0)
+    return np.concatenate([pairs, pairs[:, ::-1]]).T.copy()
+
+
+def solve_one(work: tuple[np.ndarray, int]) -> np.ndarray:
+    """Return the eigenpairs of the normalized Laplacian of one graph."""
+    (rows, columns), n = work
+    adjacency = np.zeros((n, n))
+    adjacency[rows, columns] = 1.0
+    roots = adjacency.sum(axis=1) ** -0.5
+    _, vectors = sl.eigh(np.identity(n) - adjacency * roots * roots[:, None])
+    return vectors[:, :8]
+
+
+GROUPS = {"gradients": gradients, "memory": memory, "operators": operators, "encodings": encodings}
+
+if __name__ == "__main__":
+    main()
