@@ -57,7 +57,8 @@ def test_a_point_is_placed_where_its_distances_fit():
     misfits = np.empty(2)
     partners = np.arange(2)
     starts = np.zeros(2, dtype=np.int64)
-    found = place_by_distances(rows, partners, columns, near, starts, 0.03, 1.0, 0.5, misfits)
+    theirs = np.ascontiguousarray(columns.T)
+    found = place_by_distances(rows, partners, theirs, near, starts, 0.03, 1.0, 0.5, misfits)
     assert found.tolist() == [3, 7]
     assert np.allclose(misfits, 0, atol=1e-12)
 

@@ -64,11 +64,11 @@ def nearest_rows(rows, count):
 
 
 @njit
-def place_by_distances(rows, partners, columns, near, starts, softness, cap, longer, misfits):
+def place_by_distances(rows, partners, theirs, near, starts, softness, cap, longer, misfits):
     """Return, for each point of a part, the vertex of the whole that keeps its distances best.
 
     Row i of `rows` holds distances from the point of pair i to the points that are placed, and row
-    w of `columns` those from vertex w of the whole to the points that `partners` number. Squared
+    p of `theirs` those from the point of the whole that `partners` number to its vertices. Squared
     errors to the pairs `near` are capped, weigh 1 / (distance + softness)², and count `longer`
     times where the distance on the part is the longer one. `starts` are first guesses: a good one
     ends most sums early. Mean squared errors go to `misfits`.
@@ -77,6 +77,7 @@ def place_by_distances(rows, partners, columns, near, starts, softness, cap, lon
     found = np.empty(n_points, dtype=np.int64)
     lengths, weights = np.empty(count), np.empty(count)
     ends = np.empty(count, dtype=np.int64)
+    firsts = np.empty(theirs.shape[1])
     for v in range(n_points):
         k, total = 0, 0.0
         for place in range(count):
@@ -87,12 +88,20 @@ def place_by_distances(rows, partners, columns, near, starts, softness, cap, lon
                 total += weights[k]
                 k += 1
         best, at = np.inf, starts[v]
+        # The errors to the first pair, all in a row, end most sums.
+        for w in range(len(firsts)):
+            error = theirs[ends[0], w] - lengths[0] if k > 0 else 0.0
+            if error < 0:
+                error *= longer
+            firsts[w] = weights[0] * min(error * error, cap) if k > 0 else 0.0
         # The first guess comes first, then every vertex.
-        for number in range(-1, len(columns)):
+        for number in range(-1, len(firsts)):
             w = starts[v] if number < 0 else number
-            value = 0.0
-            for j in range(k):
-                error = columns[w, ends[j]] - lengths[j]
+            value = firsts[w]
+            if value >= best:
+                continue
+            for j in range(1, k):
+                error = theirs[ends[j], w] - lengths[j]
                 if error < 0:
                     error *= longer
                 value += weights[j] * min(error * error, cap)

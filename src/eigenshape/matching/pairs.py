@@ -191,7 +191,7 @@ def place_points(
     starts = whole.points[pairs.partners[near[:, 0]]]
     misfits = np.empty(len(vertices))
     found = place_by_distances(
-        rows, pairs.partners, whole.columns, near, starts, SOFTNESS, CAP**2, LONGER, misfits
+        rows, pairs.partners, whole.distances, near, starts, SOFTNESS, CAP**2, LONGER, misfits
     )
     return found, np.sqrt(misfits)
 
