@@ -59,9 +59,9 @@ def test_what_is_done_is_kept_and_what_is_damaged_is_done_again(folder, built, m
     fitted = []
     fit = building.fit_surface
 
-    def counted(source, target):
+    def counted(source, target, **options):
         fitted.append(target)
-        return fit(source, target)
+        return fit(source, target, **options)
 
     monkeypatch.setattr(building, "fit_surface", counted)
     (folder / "out" / "first" / "ball 1.npz").write_bytes(b"PK")
@@ -99,11 +99,11 @@ def test_what_is_no_collection_is_said(tmp_path, built):
     (tmp_path / "collection.json").write_text("{}")
     with pytest.raises(es.StoreError, match="files of a collection must be whole"):
         es.collections.open_collection(tmp_path)
-    text = (built.folder / "collection.json").read_text().replace('"version": 1', '"version": 9')
+    text = (built.folder / "collection.json").read_text().replace('"version": 2', '"version": 9')
     for kept in ("fits", "mean.ply"):
         (tmp_path / kept).symlink_to(built.folder / kept)
     (tmp_path / "collection.json").write_text(text)
-    with pytest.raises(es.StoreError, match="The version of a collection must be 1"):
+    with pytest.raises(es.StoreError, match="The version of a collection must be 2"):
         es.collections.open_collection(tmp_path)
     with pytest.raises(es.InvalidParameterError, match="must be that of a specimen of the coll"):
         built.read_specimen("broken")

@@ -190,17 +190,16 @@ def build_collection(
     for name, fit in posed.items():
         write_fit(fit_file(folder, name), **asdict(fit))
     run.require_two(fits)
-    return _collect(folder, template, surface.faces, fits, notes, paths, run.failures)
+    return _collect(run, template, surface.faces, fits, notes, paths)
 
 
-def _collect(  # noqa: PLR0913, PLR0917 - what is known when all fits are done
-    folder: Path,
+def _collect(
+    run: "_Run",
     template: str,
     faces: Int[np.ndarray, "f 3"],
     fits: Mapping[str, SurfaceFit],
     notes: dict[str, list[str]],
     paths: Mapping[str, Path],
-    failures: Mapping[str, str],
 ) -> Collection:
     """Make a collection of the last fits, and write it to its folder."""
     ordered = {name: fits[name] for name in sorted(fits)}
@@ -213,7 +212,7 @@ def _collect(  # noqa: PLR0913, PLR0917 - what is known when all fits are done
     for name, fit in ordered.items():
         notes[name] += _noticed(fit, size)
     collection = Collection(
-        folder=folder,
+        folder=run.folder,
         names=tuple(ordered),
         mean=mean,
         points=points,
@@ -224,7 +223,7 @@ def _collect(  # noqa: PLR0913, PLR0917 - what is known when all fits are done
         sources=tuple(paths[name].absolute() for name in ordered),
         template=template,
         notes={name: tuple(notes[name]) for name in ordered},
-        failures=dict(sorted(failures.items())),
+        failures=dict(sorted(run.failures.items())),
     )
     save_collection(collection)
     return collection
