@@ -292,8 +292,6 @@ def work_once(page: Page, turn: int) -> None:
     for step in range(20, 400, 60):
         studio.move_slider(page, "time", step)
     find(page, "tab-parts").click()
-    if find(page, "find-parts").is_visible():
-        find(page, "find-parts").click()
     find(page, "diagram").locator("canvas").wait_for(timeout=120_000)
     studio.move_slider(page, "n-parts", 2 + turn % 9)
     find(page, "tab-search").click()

@@ -40,12 +40,14 @@ from eigenshape_studio.server import serve
 
 mesh, index, view, up, port, sessions = sys.argv[1:]
 serve(
-    [mesh], index=index or None, view=view, up=up, port=int(port), sessions=Path(sessions),
+    [mesh] if mesh else [], index=index or None, view=view, up=up, port=int(port), sessions=Path(sessions),
     announce=lambda url: print(url, flush=True), browse=False,
 )
 """
 # The panel in which shapes are bent, in the code of the page.
 PANEL = "eigenshape.panels.find((panel) => panel.id === 'deform')"
+# Opens all that the page hides at first; there are panels soon after the shape.
+SHOW_MORE = "eigenshape.main.querySelectorAll('details').forEach((each) => (each.open = true))"
 HAS_SHAPE = "window.eigenshape?.viewer.vertices.length > 0"
 # Requests of each page that have no answer yet.
 UNDER_WAY: WeakKeyDictionary[Page, set[Request]] = WeakKeyDictionary()
@@ -74,7 +76,7 @@ def build_page() -> None:
 
 @contextmanager
 def start_server(
-    mesh: Path,
+    mesh: Path | None,
     index: Path | None = None,
     view: str = "auto",
     up: str = "auto",
@@ -85,7 +87,7 @@ def start_server(
     build_page()
     folder = tempfile.TemporaryDirectory()
     options = [str(index or ""), view, up, str(port), str(sessions or folder.name)]
-    command = [sys.executable, "-c", SERVE, str(mesh), *options]
+    command = [sys.executable, "-c", SERVE, str(mesh or ""), *options]
     with folder, subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             yield str(process.stdout.readline().strip()), process.pid  # type: ignore[union-attr]
@@ -95,7 +97,7 @@ def start_server(
 
 @contextmanager
 def serve_studio(
-    mesh: Path, index: Path | None = None, view: str = "auto", up: str = "auto"
+    mesh: Path | None, index: Path | None = None, view: str = "auto", up: str = "auto"
 ) -> Iterator[str]:
     """Serve the studio in a process of its own, and yield its address."""
     with start_server(mesh, index, view, up) as (url, _):
@@ -109,15 +111,23 @@ def open_page(
     *,
     dark: bool = False,
     ready: str = HAS_SHAPE,
+    more: bool = True,
+    size: tuple[int, int] = (1280, 800),
     expected: tuple[str, ...] = (),
 ) -> Iterator[Page]:
     """Open the studio as on a laptop, and wait until it shows a shape, or another condition.
+
+    With `more`, what the page hides at first is opened.
 
     At the end every error, warning and request to another machine fails the test, but for lines of the
     console with a text that is expected.
     """
     scheme = "dark" if dark else "light"
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme=scheme)
+    viewport = {"width": size[0], "height": size[1]}
+    phone = size[0] < 600
+    context = browser.new_context(
+        viewport=viewport, color_scheme=scheme, has_touch=phone, is_mobile=phone
+    )
     page = context.new_page()
     seen: list[str] = []
     page.on("pageerror", lambda error: seen.append(f"page error: {error}"))
@@ -140,6 +150,9 @@ def open_page(
     page.on("requestfailed", end)
     page.goto(url)
     wait_until(page, ready)
+    if more and ready == HAS_SHAPE:
+        wait_until(page, "eigenshape.active !== null")
+        page.evaluate(SHOW_MORE)
     yield page
     context.close()
     seen = [line for line in seen if not any(text in line for text in expected)]

@@ -106,9 +106,8 @@ def show_spectrum(page):
 
 
 def show_parts(page):
-    """Find the parts, and show them."""
+    """Show the parts."""
     find(page, "tab-parts").click()
-    find(page, "find-parts").click()
     find(page, "diagram").locator("canvas").wait_for(timeout=120_000)
 
 

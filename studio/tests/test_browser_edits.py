@@ -140,6 +140,7 @@ def test_a_broken_file_of_edits_is_named(page, tmp_path):
 
 
 def test_a_file_that_is_too_large_is_not_read(page, path):
+    wait_until(page, "eigenshape.state.parts.status === 'ready'")  # then the state stays
     page.evaluate("eigenshape.state.most_bytes = 2 ** 10")
     find(page, "tab-shape").click()
     open_file(page, "open", path)

@@ -103,9 +103,9 @@ def test_colors_of_the_picture_follow_the_slider(page):
     early = picture(page)
     move_slider(page, "time", 360)
     late = picture(page)
-    shape = early[..., 3] > 0
+    shape = early[..., 3] == 255  # its shadow on the ground is less
     assert 0.05 < shape.mean() < 0.9
-    assert np.array_equal(shape, late[..., 3] > 0)
+    assert np.array_equal(shape, late[..., 3] == 255)
     assert np.abs(early[shape].astype(int) - late[shape]).mean() > 10
 
 
@@ -143,7 +143,7 @@ def test_heat_starts_where_the_shape_is_clicked(page, spectrum):
 def click_shape(page):
     """Click the middle of what is drawn; return where, and the vertex there."""
     box = find(page, "canvas").bounding_box()
-    inside = picture(page)[..., 3] > 0
+    inside = picture(page)[..., 3] == 255
     rows, columns = np.nonzero(inside)
     row = int(np.median(rows))
     column = int(np.median(columns[rows == row]))
@@ -234,8 +234,7 @@ def test_solving_for_fewer_eigenpairs(page):
 
 
 def test_parts_equal_those_of_segment(page, mesh):
-    open_panel(page, "parts", "find-parts")
-    find(page, "find-parts").click()
+    open_panel(page, "parts")
     find(page, "diagram").locator("canvas").wait_for(timeout=120_000)
     wait_until_still(page)
     found = es.find_parts(mesh)
@@ -274,7 +273,7 @@ def assert_parts(page, cut, found):
 
 
 def check_picture_of_parts(page, mesh):
-    """Each face has the color of its most frequent part; light changes it only by a factor."""
+    """Away from borders a face has the color of its part; light changes it only by a factor."""
     image = picture(page).astype(float)
     inside = binary_erosion(image[..., 3] == 255, iterations=4)
     # A pixel across an edge has the mean of two colors.
@@ -287,14 +286,15 @@ def check_picture_of_parts(page, mesh):
     parts = vertex_labels(page)[mesh.faces[page.evaluate(code, places.tolist())]]
     n_inside, n_border = 0, 0
     for corners, pixel in zip(parts, image[rows[chosen], columns[chosen], :3], strict=True):
-        labels, counts = np.unique(corners, return_counts=True)
-        if counts.max() == 1 or pixel.max() == 255:
+        if pixel.max() == 255:
             continue
-        color = 255 * palette(labels[counts.argmax()][None])[0]
-        light = (pixel @ color) / (color @ color)
-        assert np.abs(pixel - light * color).max() < 3
-        n_inside += len(labels) == 1
-        n_border += len(labels) == 2
+        # The border is smooth, so in a face of two parts it has the color of either.
+        colors = 255 * palette(np.unique(corners))
+        light = (colors @ pixel) / (colors**2).sum(axis=1)
+        away = np.abs(pixel - light[:, None] * colors).max(axis=1)
+        assert away.min() < 3
+        n_inside += len(colors) == 1
+        n_border += len(colors) == 2
     assert n_inside > 100
     assert n_border > 0
 

@@ -141,6 +141,7 @@ def test_jupyterlab_shows_the_widget(lab, browser):
     canvas = page.locator(".jp-OutputArea canvas").first
     canvas.wait_for(timeout=120_000)
     find(page, "counts").get_by_text("642 vertices").wait_for(timeout=60_000)
+    find(page, "legend").get_by_text("height, m").wait_for()  # the values that were given
     find(page, "tab-spectrum").click()
     find(page, "panel-spectrum").get_by_text("none is missing").wait_for(timeout=60_000)
     shown = imread(BytesIO(canvas.screenshot()))

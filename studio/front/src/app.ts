@@ -4,9 +4,14 @@ import type { Backend, Change, State } from "./core/backend";
 import markup from "./app.html?raw";
 import type { Beside } from "./core/beside";
 import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile } from "./core/dom";
+import type { Film } from "./core/film";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
+import { DeformPanel } from "./panels/deform/deform";
+import { Strip } from "./strip";
 import style from "./style.css?inline";
+import { runTour } from "./tour";
+import { welcome } from "./welcome";
 
 /** What survives a reload of the page, in the storage of the tab. */
 export class Settings {
@@ -37,8 +42,11 @@ export interface Panel {
   refresh(state: State): void;
   shown?(): void;
   hidden?(): void;
+  /** What can be played of what the panel shows. */
+  films?(): Film[];
 }
 
+const SEEN = "eigenshape-tour=1"; // cookie: the ports of one machine share it, unlike storage
 const POLL = 300; // ms between two questions while the server computes
 
 export class Studio {
@@ -53,9 +61,11 @@ export class Studio {
   private active: Panel | null = null;
   second: Beside | null = null; // picture of the second shape
   secondShown: (second: Beside) => void = () => {}; // called when its shape is there
+  private strip: Strip | null = null;
+  private showing: Promise<void> = Promise.resolve(); // the newest state
   private busy = 0;
   private timer = 0;
-  private shown = { shape: -1, pose: -1 }; // what the viewer shows
+  private shown = { shape: -1, pose: -1, side: "" }; // what the viewer shows
   private mesh: Promise<[Float32Array, Uint32Array]>; // requested, of a shape not shown yet
   private readonly first: Promise<State>;
   private changing: Promise<unknown> = Promise.resolve(); // the last change
@@ -83,8 +93,13 @@ export class Studio {
     this.viewer.onView = (view) => settings.set("view", view);
     this.page.on({
       theme: () => this.switchTheme(),
+      sheet: () => this.showSheet(!this.main.classList.contains("sheet")),
       "help-button": () => this.showHelp(),
       "help-close": () => this.help.close(),
+      tour: () => {
+        this.help.close();
+        this.startTour();
+      },
     });
     keys.addEventListener("keydown", (event) => this.press(event as KeyboardEvent));
     this.page.get("tabs").addEventListener("keydown", (event) => this.walkTabs(event));
@@ -102,16 +117,44 @@ export class Studio {
     const view = this.settings.get<View | null>("view", null);
     if (view && view.shape === this.state.shape) this.viewer.setView(view);
     for (const panel of this.panels) this.addPanel(panel);
+    this.strip = new Strip(this);
     const usable = [...this.pages.keys()];
-    const last = this.settings.get("panel", "");
+    // Whoever brings values wants to see them.
+    const last = this.settings.get("panel", this.state.values.length ? "shape" : "");
     this.refreshPanels();
     this.open(usable.includes(last) ? last : usable[0]!);
+    this.findParts();
+    if (this.state.samples.length && !this.settings.get("welcomed", false)) welcome(this);
   }
 
   /** Ask for the state, load what changed, and refresh all panels; again while something runs. */
   async refresh(): Promise<void> {
     await this.show(await this.backend.meta());
     this.refreshPanels();
+    this.findParts();
+  }
+
+  /** Let the parts be found once the shape can be bent: they serve as limbs. */
+  private findParts(): void {
+    const { capabilities, deformation, parts } = this.state;
+    if (!capabilities.includes("finish") || deformation.status !== "ready") return;
+    if (parts.status !== "none") return;
+    const started = this.backend.finish({ kind: "parts" }).then(() => this.refresh());
+    started.catch((error) => this.fail(error));
+  }
+
+  /** Show how the studio works, unless this person has seen it. */
+  firstTour(): void {
+    if (document.cookie.includes(SEEN)) return;
+    document.cookie = `${SEEN}; max-age=${10 * 365 * 86400}; samesite=strict`;
+    this.startTour();
+  }
+
+  private startTour(): void {
+    const bend = this.pages.get("deform")?.panel;
+    if (!(bend instanceof DeformPanel)) return;
+    this.open("deform");
+    runTour(this, bend.limbs).catch((error) => this.fail(error));
   }
 
   /** Make a change on the server, show its result and its warnings; return whether it was made. */
@@ -234,6 +277,12 @@ export class Studio {
     this.active = next.panel;
     this.settings.set("panel", id);
     this.active.shown?.();
+    this.strip?.panelShown();
+  }
+
+  /** Return what can be played of what is shown. */
+  films(): Film[] {
+    return this.active?.films?.() ?? [];
   }
 
   private addPanel(panel: Panel): void {
@@ -241,7 +290,10 @@ export class Studio {
     if (!panel.needs.every((need) => capabilities.includes(need))) return;
     const number = this.pages.size + 1;
     const [tabId, pageId] = [`tab-${panel.id}`, `panel-${panel.id}`];
-    const click = () => this.open(panel.id);
+    const click = () => {
+      this.open(panel.id);
+      this.showSheet(true);
+    };
     const title = `${panel.title} (${number})`;
     const control = { id: tabId, "data-test": tabId, role: "tab", "aria-controls": pageId };
     const tab = h("button", { ...control, type: "button", title, click }, panel.title);
@@ -261,17 +313,28 @@ export class Studio {
   }
 
   /** Take a state, and load the mesh or the vertices if they are others than the viewer has. */
-  private async show(state: State, vertices?: Float32Array<ArrayBuffer>): Promise<void> {
+  private show(state: State, vertices?: Float32Array<ArrayBuffer>): Promise<void> {
     this.state = state;
+    return (this.showing = this.showNow(state, vertices));
+  }
+
+  private async showNow(state: State, vertices?: Float32Array<ArrayBuffer>): Promise<void> {
     const { shape, pose } = state;
     if (shape !== this.shown.shape) {
       if (this.shown.shape >= 0) this.mesh = this.requestMesh();
       const [points, faces] = await this.mesh;
+      if (state !== this.state) return this.showing; // a newer one has come meanwhile
       this.viewer.setMesh(points, faces, state.up, state.towards);
       this.viewer.shape = shape;
-    } else if (pose !== this.shown.pose)
-      this.viewer.setVertices(vertices ?? (await this.backend.array("vertices")));
-    this.shown = { shape, pose };
+    } else if (pose !== this.shown.pose) {
+      const points = vertices ?? (await this.backend.array<Float32Array<ArrayBuffer>>("vertices"));
+      if (state !== this.state) return this.showing;
+      this.viewer.setVertices(points);
+    }
+    const side = `${shape} ${state.up} ${state.towards}`;
+    if (shape === this.shown.shape && side !== this.shown.side)
+      this.viewer.face(state.up, state.towards);
+    this.shown = { shape, pose, side };
     this.page.text("name", state.name);
     this.page.get("name").title = state.name;
     const [nVertices, nFaces] = [state.n_vertices, state.n_faces].map((n) =>
@@ -306,6 +369,12 @@ export class Studio {
     return this.stepping;
   }
 
+  /** Slide the panel over the shape, or away, where the window is narrow. */
+  private showSheet(seen: boolean): void {
+    this.main.classList.toggle("sheet", seen);
+    this.page.get("sheet").ariaExpanded = String(seen);
+  }
+
   private setTheme(dark: boolean): void {
     this.main.dataset.theme = dark ? "dark" : "light";
   }
@@ -328,7 +397,7 @@ export class Studio {
     const target = event.composedPath()[0] as HTMLElement;
     const typing = target.matches?.("select, input:not([type=range], [type=checkbox])");
     if (typing || this.help.open) return;
-    if (target.tagName === "BUTTON" && event.key === "Enter") return; // it presses the button
+    if (["BUTTON", "SUMMARY"].includes(target.tagName) && event.key === "Enter") return; // it presses the button
     const letter = event.key.length === 1 ? event.key.toUpperCase() : event.key;
     const control = event.ctrlKey || event.metaKey;
     // Shift is part of "?" itself, but tells "Ctrl+Shift+Z" from "Ctrl+Z".

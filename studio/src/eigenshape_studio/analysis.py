@@ -10,6 +10,7 @@ import scipy.sparse as sp
 import eigenshape as es
 from eigenshape.plot.camera import Up, View, upward_direction
 from eigenshape_studio.jobs import NO_JOB, Job, Progress
+from eigenshape_studio.sides import recall_side
 
 # Modes that are solved for when a shape is opened, beside one for each further component: as many
 # as `es.rig_shape` takes, so that both give the same rig.
@@ -161,12 +162,17 @@ def _solve(mesh: es.TriangleMesh, k: int, progress: Progress) -> es.Spectrum:
 
 
 def frame_shape(mesh: es.TriangleMesh, view: View = "auto", up: Up = "auto") -> dict[str, Any]:
-    """Return center and diagonal of the box of a mesh, and how it stands upright."""
+    """Return center and diagonal of the box of a mesh, and how it stands upright.
+
+    Where no side is requested, it stands as a person has corrected it, if one has.
+    """
+    is_guessed = isinstance(view, str) and isinstance(up, str) and view == up == "auto"
+    corrected = recall_side(mesh) if is_guessed else None
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     return {
         "center": ((low + high) / 2).tolist(),
         "extent": float(np.linalg.norm(high - low)),
-        **upright_view(mesh, view, up),
+        **(corrected or upright_view(mesh, view, up)),
     }
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import eigenshape as es
 from eigenshape_studio.history import Shape
 from eigenshape_studio.loading import load_file
+from eigenshape_studio.samples import SAMPLES, sample_mesh
 from eigenshape_studio.specimens import Specimens, is_collection
 from eigenshape_studio.workspace import Workspace
 
@@ -52,8 +53,9 @@ def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = 
         workspace.specimens = specimens
         return workspace
     if not found:
-        creature = es.make_creature("quadruped", n_vertices=2500)
-        return Workspace(creature, "quadruped", index=index, shared=True)
+        workspace = Workspace(sample_mesh(SAMPLES[0]), SAMPLES[0], index=index, shared=True)
+        workspace.welcome = True
+        return workspace
     # All tabs share what is computed of the first one; of the others each tab has its own.
     listed = [
         Shape(number, name, partial(load_file, path), path=str(path), shared=number == 0)

@@ -21,10 +21,14 @@ from eigenshape_studio.company import Company
 from eigenshape_studio.history import History, Pose, Shape
 from eigenshape_studio.jobs import NO_JOB, PreparingError, window_message
 from eigenshape_studio.loading import Field, Loaded, check_fields
+from eigenshape_studio.onefile import N_MODES as N_REPORTED
+from eigenshape_studio.onefile import report_page
 from eigenshape_studio.parse import display_name, parse_surface
 from eigenshape_studio.poses import carry_pose
+from eigenshape_studio.samples import SAMPLES, sample_mesh, sample_picture
 from eigenshape_studio.search import Shelf
 from eigenshape_studio.sessions import SessionFile
+from eigenshape_studio.sides import remember_side
 from eigenshape_studio.specimens import Specimens
 from eigenshape_studio.wire import WireError, decode, encode
 
@@ -110,6 +114,7 @@ class Workspace:
         self._searched: tuple[Any, Reply] | None = None  # for what, and what was found
         self.specimens: Specimens | None = None  # of the collection that the studio was opened with
         self.mode = "graded"
+        self.welcome = False  # whether the page offers samples first
         self._begin()
 
     def _begin(self) -> None:
@@ -221,6 +226,7 @@ class Workspace:
             "selected": now.selected,
             "pose": now.pose.number,
             "shape": now.shape.number,
+            "samples": list(SAMPLES) if self.welcome else [],
         }
 
     def _deformation_facts(self) -> dict[str, Any]:
@@ -270,6 +276,7 @@ class Workspace:
             "file": self._file,
             "match": self._match_array,
             **self.company.families,
+            "sample": sample_picture,
         }
         if not tail and head in makers:
             return makers[head]()
@@ -373,10 +380,12 @@ class Workspace:
         return np.flatnonzero(wave(source, reach) <= reach).astype("<u4")
 
     def _file(self, tail: str) -> np.ndarray:
-        if tail not in ("ply", "obj", "glb", "edits"):
+        if tail not in ("ply", "obj", "glb", "html", "edits"):
             raise RequestError(
-                f"A file must be ply, obj, glb or edits; {tail[:80]!r} was requested."
+                f"A file must be ply, obj, glb, html or edits; {tail[:80]!r} was requested."
             )
+        if tail == "html":
+            return np.frombuffer(self._report(), np.uint8)
         with TemporaryDirectory() as folder:
             path = Path(folder, f"shape.{tail}")
             if tail == "edits":
@@ -386,6 +395,18 @@ class Workspace:
                 kept = None if tail == "obj" else self.attributes
                 es.write_mesh(self.mesh, path, attributes=kept)
             return np.frombuffer(path.read_bytes(), np.uint8)
+
+    def _report(self) -> bytes:
+        """Return a page of the present pose that opens without the studio."""
+        values = {name: field.values for name, field in self.fields.items()}
+        name = self.analysis.name
+        apart = type(self)(self.mesh, name, values=values, n_modes=N_REPORTED)
+        side = self.analysis.view()
+        apart.analysis.look_from(side["towards"], side["up"])
+        try:
+            return report_page(apart)
+        finally:
+            apart.close()
 
     def _session(self) -> es.DeformationSession:
         """Return a session in the present pose, which begins when the rig is ready."""
@@ -471,6 +492,7 @@ class Workspace:
             "transfer": self._transfer,
             "choose": self._choose,
             **self.company.works,
+            "face": self._face,
         }
         if not isinstance(kind, str) or kind not in works:
             raise RequestError(f"kind must be one of {', '.join(works)}; it is {kind!r:.80}.")
@@ -616,9 +638,13 @@ class Workspace:
         self._warnings += done.report
 
     def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
-        """Show the mesh of a file, or a shape of the index by its name."""
+        """Show the mesh of a file, a sample, or a shape of the index by its name."""
         if "match" in meta:
             self.show(*self.read_match(meta["match"]))
+            return
+        if "sample" in meta:
+            name = str(meta["sample"])
+            self.show(sample_mesh(name), name)
             return
         name = display_name(meta.get("name"))
         self.show(self.read_surface(name, file_bytes(arrays, "file")), name)
@@ -632,6 +658,13 @@ class Workspace:
     def warn(self, lines: list[str]) -> None:
         """Tell something with the answer to the present call."""
         self._warnings += lines
+
+    def _face(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+        """Let another direction be up and another side the front, now and later on."""
+        analysis = self.analysis
+        analysis.look_from(meta.get("towards", "auto"), meta.get("up", "auto"))
+        side = analysis.view()
+        remember_side(analysis.mesh, side["up"], side["towards"])
 
     def _solve(self, meta: dict[str, Any], _arrays: Arrays) -> None:
         most = min(MOST_MODES, self.analysis.mesh.n_vertices)

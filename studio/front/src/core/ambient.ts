@@ -16,6 +16,7 @@ const GROUND = 96; // points of a side of the ground
 const REACH = 2.2; // side of the ground, in radii of the shape
 const MOST_FACES = 400_000; // beyond, drawing the shape 48 times would take seconds
 const ROUNDS = 8; // in which neighbors are averaged: 48 directions leave steps
+const GROUND_ROUNDS = 60; // the same, on the ground, where shadows fall far
 
 /**
  * The shape is drawn from 48 directions, depth only, into the tiles of one texture. Then one pixel
@@ -168,7 +169,7 @@ export class Ambient {
     const { faces } = surface;
     surface.replace("ambient", average(this.count(surface), faces, ROUNDS));
     const grid = ground.geometry.index!.array;
-    sky.image.data!.set(average(this.count(ground), grid, ROUNDS));
+    sky.image.data!.set(average(this.count(ground), grid, GROUND_ROUNDS));
     sky.needsUpdate = ground.visible = true;
     this.onDone();
   }

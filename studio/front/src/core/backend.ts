@@ -46,6 +46,7 @@ export interface State {
   beside: Second | null;
   landmarks: Landmark[];
   collection: Collection | null;
+  samples: string[]; // offered where no file was opened
   shape: number;
 }
 
@@ -95,6 +96,8 @@ export interface Change {
   match?: number;
   specimen?: string;
   close?: boolean;
+  up?: Vec3;
+  towards?: Vec3;
 }
 export interface Finished {
   state: State;

@@ -31,6 +31,14 @@ export class Eye {
     this.controls = this.startControls(); // they read the upward direction only once
   }
 
+  /** Return where the picture's right and the viewer are, in the coordinates of the scene. */
+  get axes(): { right: three.Vector3; above: three.Vector3; towards: three.Vector3 } {
+    const [right, above, towards] = [0, 1, 2].map(() => new three.Vector3());
+    this.camera.updateMatrixWorld();
+    this.camera.matrixWorld.extractBasis(right!, above!, towards!);
+    return { right: right!, above: above!, towards: towards! };
+  }
+
   private startControls(): OrbitControls {
     const controls = new OrbitControls(this.camera, this.canvas);
     controls.zoomToCursor = true;

@@ -52,9 +52,17 @@ export function findRange(values: Float32Array): [number, number] {
   );
 }
 
-/** Return the bar of a color map with its title and unit, and the numbers below it. */
-export function buildLegend(drawn: Scale): HTMLElement {
-  const { title, unit, map, range: [low, high], partial } = drawn;
+const MAPS = { viridis: "Viridis", inferno: "Inferno", RdBu_r: "Blue to red" };
+
+/**
+ * Return the bar of a color map with its title and unit, and the numbers below it. Opened, it lets
+ * another map and range be chosen.
+ */
+export function buildLegend(
+  { title, unit, map, range: [low, high], partial }: Scale,
+  open: boolean,
+  choose: (choice: Partial<Scale>) => void,
+): HTMLDetailsElement {
   const bar = h("canvas", { class: "bar", width: 256, height: 1 });
   const image = new ImageData(new Uint8ClampedArray(colorMap(map)), 256, 1);
   bar.getContext("2d")!.putImageData(image, 0, 0);
@@ -64,5 +72,24 @@ export function buildLegend(drawn: Scale): HTMLElement {
   );
   const heading = h("div", {}, unit ? `${title}, ${unit}` : title);
   const scale = h("div", { class: "numbers" }, ...numbers);
-  return h("div", { class: "legend", "data-test": "legend" }, heading, bar, scale, partial && h("div", {}, "gray: no value"));
+  const select = h(
+    "select",
+    { "aria-label": "Colors", "data-test": "map", change: () => choose({ map: select.value }) },
+    ...Object.entries(MAPS).map(([value, name]) =>
+      h("option", { value, selected: value === map }, name),
+    ),
+  );
+  const read = () => {
+    const [from, to] = ends.map((end) => end.valueAsNumber);
+    if (from! < to!) choose({ range: [from!, to!] });
+  };
+  const ends = [low, high].map((value, i) => {
+    const label = ["Lowest value of the colors", "Highest value of the colors"][i];
+    const names = { "aria-label": label, title: label, "data-test": `range-${i}` };
+    const number = Number(value.toPrecision(4));
+    return h("input", { type: "number", step: "any", value: number, ...names, change: read });
+  });
+  const summary = h("summary", { title: "Choose colors and range" }, heading, bar, scale, partial && h("div", {}, "gray: no value"));
+  const form = h("div", { class: "row tight" }, select, ...ends);
+  return h("details", { class: "legend", "data-test": "legend", open }, summary, form);
 }

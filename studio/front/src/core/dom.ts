@@ -97,6 +97,12 @@ export class Form {
   }
 }
 
+/** Return the address of a picture of bytes; it is given back when an element has loaded it. */
+export function pictureOf(png: Uint8Array<ArrayBuffer> | undefined): HTMLImageElement {
+  const src = URL.createObjectURL(new Blob(png ? [png] : [], { type: "image/png" }));
+  return h("img", { src, alt: "", load: () => URL.revokeObjectURL(src) });
+}
+
 /** Offer bytes as a file. */
 export function download(data: BlobPart, name: string, type = "application/octet-stream"): void {
   const link = h("a", { download: name, href: URL.createObjectURL(new Blob([data], { type })) });

@@ -5,6 +5,15 @@ import type { Handle } from "./backend";
 import { MAX_REGIONS } from "./regions";
 import movedSource from "../shaders/moved.glsl?raw";
 
+/** Compile the shader of a material anew if a constant of it changes; undefined removes it. */
+export function define(material: three.ShaderMaterial, name: string, value: unknown): void {
+  material.defines ??= {};
+  if (material.defines[name] === value) return;
+  if (value === undefined) delete material.defines[name];
+  else material.defines[name] = value;
+  material.needsUpdate = true;
+}
+
 const vectors = () => Array.from({ length: MAX_REGIONS }, () => new three.Vector3());
 
 export class Motion {
@@ -14,6 +23,7 @@ export class Motion {
   readonly direction = { value: vectors() };
   readonly angle = { value: new Float32Array(MAX_REGIONS) };
   readonly blend = { value: 0 }; // of the exact result
+  readonly clip = { value: new three.Vector4() }; // of materials that are CLIPPED
 
   set(handles: Handle[]): void {
     this.n_moving.value = handles.some((handle) => handle) ? handles.length : 0;
@@ -26,6 +36,12 @@ export class Motion {
       } else if (handle) this.direction.value[region]!.set(...handle.vector);
     });
     this.blend.value = 0;
+  }
+
+  /** Cut off what lies beyond a plane, or nothing. */
+  cut(plane: three.Vector4 | null, materials: three.ShaderMaterial[]): void {
+    if (plane) this.clip.value.copy(plane);
+    for (const material of materials) define(material, "CLIPPED", plane ? 1 : undefined);
   }
 
   /** Return a material whose vertices move as `moved.glsl` says. */

@@ -22,7 +22,7 @@ export class Picker {
   constructor(
     private readonly renderer: three.WebGLRenderer,
     private readonly geometry: three.BufferGeometry,
-    private readonly material: three.ShaderMaterial, // of pick.vert.glsl
+    readonly material: three.ShaderMaterial, // of pick.vert.glsl
   ) {
     material.side = three.DoubleSide;
     material.blending = three.NoBlending;

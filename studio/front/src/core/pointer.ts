@@ -2,8 +2,12 @@
 
 import type { Hit } from "./picking";
 
-/** Takes over the pointer: `down` returns false to leave it to the camera. */
+/**
+ * Takes over the pointer: `down` returns false to leave it to the camera. `hover` hears what lies under a
+ * pointer that is not pressed.
+ */
 export interface PointerTool {
+  hover?(hit: Hit | null): void;
   down(event: PointerEvent): boolean;
   move(event: PointerEvent): void;
   up(): void;
@@ -11,10 +15,17 @@ export interface PointerTool {
 export type Click = (hit: Hit, event: PointerEvent) => void;
 
 const CLICK = 4; // pixels that a click may move
+const LOOK = 60; // ms between two looks at what lies under the pointer: each draws one pixel
 
 export class Pointer {
+  /** Takes all clicks on the shape before any tool, or null. */
+  first: Click | null = null;
+  /** Whether one finger turns the view, whatever the tool; the person may let it use the tool. */
+  fingerTurns = true;
   private tool: PointerTool | null = null;
   private click: Click | null = null;
+  /** Hears what lies under the pointer of a mouse that is not pressed, or null. */
+  onHover: (hit: Hit | null, x: number, y: number) => void = () => {};
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
@@ -25,7 +36,8 @@ export class Pointer {
     const take = (event: PointerEvent) => {
       if (event.button !== 0 || !event.isPrimary) return;
       from = [event.offsetX, event.offsetY];
-      holder = this.tool?.down(event) ? this.tool : null;
+      const turns = this.first || (event.pointerType === "touch" && this.fingerTurns);
+      holder = !turns && this.tool?.down(event) ? this.tool : null;
       if (!holder) return;
       canvas.setPointerCapture(event.pointerId);
       event.stopImmediatePropagation();
@@ -34,14 +46,32 @@ export class Pointer {
       const [x, y] = [event.offsetX, event.offsetY];
       const still = from && Math.hypot(x - from[0], y - from[1]) < CLICK;
       if (holder) holder.up();
-      else if (this.click && still && event.type === "pointerup") {
-        const hit = this.pick(x, y);
-        if (hit) this.click(hit, event);
+      else if (still && event.type === "pointerup") {
+        const click = this.first ?? this.click;
+        const hit = click && this.pick(x, y);
+        if (hit) click!(hit, event);
       }
       from = holder = null;
     };
     canvas.addEventListener("pointerdown", take, { capture: true });
-    canvas.addEventListener("pointermove", (event) => holder?.move(event));
+    let place: [number, number] | null = null; // of a pointer that hovers
+    let timer = 0;
+    const look = () => {
+      timer = 0;
+      const hit = place && this.pick(...place);
+      this.tool?.hover?.(hit);
+      this.onHover(hit, ...(place ?? ([0, 0] as const)));
+    };
+    canvas.addEventListener("pointermove", (event) => {
+      holder?.move(event);
+      if (event.buttons || event.pointerType === "touch") return;
+      place = [event.offsetX, event.offsetY];
+      timer ||= window.setTimeout(look, LOOK);
+    });
+    canvas.addEventListener("pointerleave", () => {
+      place = null;
+      timer ||= window.setTimeout(look, LOOK);
+    });
     canvas.addEventListener("pointerup", release);
     canvas.addEventListener("pointercancel", release);
   }

@@ -1,8 +1,9 @@
 /** The surface in the graphics card: its buffers, and how the shader colors it. */
 
 import * as three from "three";
-import { colorMap, rgbOf, type Scale } from "./colors";
-import type { Motion } from "./motion";
+import { softenBorders } from "./borders";
+import { colorMap, findRange, rgbOf, type Scale } from "./colors";
+import { define, type Motion } from "./motion";
 import { MAX_REGIONS } from "./regions";
 import surfaceFragment from "../shaders/surface.frag.glsl?raw";
 import surfaceVertex from "../shaders/surface.vert.glsl?raw";
@@ -21,6 +22,8 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
       range: { value: new three.Vector2(0, 1) },
       nodal: { value: false },
       line: { value: 1 },
+      swing: { value: 0 },
+      phase: { value: 1 },
       plain: { value: new three.Vector3(...rgbOf(plain)).divideScalar(255) },
       opacity: { value: 1 },
     });
@@ -41,6 +44,8 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
       shares: [new Float32Array(MAX_REGIONS * count), MAX_REGIONS],
       value: [new Float32Array(count), 1],
       paint: [new Uint8Array(3 * count), 3],
+      soft: [new Uint8Array(3 * count), 3],
+      beyond: [new Uint8Array(3 * count), 3],
       mark: [new Uint8Array(4 * count), 4],
       ambient: [new Uint8Array(count).fill(255), 1],
     } as const;
@@ -67,7 +72,7 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
   setScalars(values: Float32Array | null, scale?: Scale): void {
     const { table, range, nodal } = this.material.uniforms;
     this.labels = null;
-    this.define("COLORING", values ? BY_VALUE : UNCOLORED);
+    define(this.material, "COLORING", values ? BY_VALUE : UNCOLORED);
     if (!values || !scale) return;
     this.replace("value", values);
     table!.value?.dispose();
@@ -85,8 +90,11 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
       if (label >= 0) paint.set(palette.subarray(3 * label, 3 * label + 3), 3 * vertex);
     });
     this.replace("paint", paint);
+    const { soft, beyond } = softenBorders(this.faces, labels, paint);
+    this.replace("soft", soft);
+    this.replace("beyond", beyond);
     this.turnCorners(labels);
-    this.define("COLORING", BY_PAINT);
+    define(this.material, "COLORING", BY_PAINT);
   }
 
   /** Let each face end with a corner of its most frequent label: the shader takes that color. */
@@ -101,8 +109,17 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
 
   /** Tint vertices: red, green, blue and strength of each, in bytes. */
   setMarks(marks: Uint8Array): void {
-    this.define("MARKED", marks.some((byte) => byte > 0));
+    define(this.material, "MARKED", marks.some((byte) => byte > 0) ? 1 : undefined);
     this.replace("mark", marks);
+  }
+
+  /** Let the values swing along the normals: by `reach` at most, in a phase from -1 to 1. */
+  vibrate(reach: number, phase: number): void {
+    const { swing, phase: colors } = this.material.uniforms;
+    const values = this.geometry.getAttribute("value").array as Float32Array;
+    const [low, high] = findRange(values);
+    swing!.value = (reach * phase) / (Math.max(-low, high) || 1);
+    colors!.value = phase;
   }
 
   /** Let what lies behind be seen, or not. */
@@ -123,13 +140,6 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
     geometry.setIndex(new three.BufferAttribute(corners, 1));
     for (const [name, attribute] of Object.entries(this.geometry.attributes))
       geometry.setAttribute(name, attribute);
-  }
-
-  /** Compile the shader anew if a constant of it changes. */
-  private define(name: string, value: unknown): void {
-    const { material } = this;
-    if (material.defines[name] !== value) material.needsUpdate = true;
-    material.defines[name] = value;
   }
 }
 

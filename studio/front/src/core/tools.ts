@@ -129,19 +129,47 @@ export interface MotionEvents {
   pivoted(pivot: Vec3): void;
 }
 
+/** A drag of a point: it stays under the pointer, in the plane through it that faces the viewer. */
+export class PlainDrag {
+  private readonly start = new three.Vector3();
+  private readonly plane = new three.Plane();
+
+  constructor(private readonly viewer: Viewer) {}
+
+  begin(point: Vec3): void {
+    const facing = this.viewer.camera.getWorldDirection(new three.Vector3());
+    this.plane.setFromNormalAndCoplanarPoint(facing, this.start.set(...point));
+  }
+
+  /** Return the rotation about a pivot that brings the point towards the pointer. */
+  turn(event: PointerEvent, pivot: three.Vector3): Handle {
+    const end = this.end(event);
+    return end && rotationFromDrag(pivot, this.start, end);
+  }
+
+  shift(event: PointerEvent): Handle {
+    const end = this.end(event);
+    return end && { type: "translation", vector: end.sub(this.start).toArray() };
+  }
+
+  private end({ offsetX, offsetY }: PointerEvent): three.Vector3 | null {
+    return this.viewer.rayAt(offsetX, offsetY).intersectPlane(this.plane, new three.Vector3());
+  }
+}
+
 /** Rings and arrows about a pivot, or a plain drag of a point: turn, move, pull, swing. */
 export class MotionTool implements PointerTool {
   private readonly anchor = new three.Object3D(); // that the gizmo moves
   private readonly gizmo: TransformControls;
   private kind: MotionKind = "rotate";
   private pivot = new three.Vector3();
-  private readonly start = new three.Vector3(); // of a plain drag
-  private readonly plane = new three.Plane();
+  private readonly drag: PlainDrag;
 
   constructor(
     private readonly viewer: Viewer,
     private readonly events: MotionEvents,
   ) {
+    this.drag = new PlainDrag(viewer);
     this.gizmo = new TransformControls(viewer.camera, viewer.canvas);
     this.gizmo.size = 0.75;
     this.anchor.add(buildDots([new three.Vector3()], PIVOT_COLOR, 11));
@@ -182,19 +210,13 @@ export class MotionTool implements PointerTool {
     if (this.kind !== "pull" && this.kind !== "swing") return false;
     const hit = this.viewer.pick(event.offsetX, event.offsetY);
     if (!hit || !this.events.canDrag(hit.vertex)) return false;
-    const facing = this.viewer.camera.getWorldDirection(new three.Vector3());
-    this.plane.setFromNormalAndCoplanarPoint(facing, this.start.set(...hit.point));
+    this.drag.begin(hit.point);
     return true;
   }
 
-  /** The point stays under the pointer, in the plane through it that faces the viewer. */
   move(event: PointerEvent): void {
-    const ray = this.viewer.rayAt(event.offsetX, event.offsetY);
-    const end = ray.intersectPlane(this.plane, new three.Vector3());
-    if (!end) return;
-    const swing = this.kind === "swing";
-    const shift: Handle = { type: "translation", vector: end.clone().sub(this.start).toArray() };
-    const handle = swing ? rotationFromDrag(this.pivot, this.start, end) : shift;
+    const { drag, kind } = this;
+    const handle = kind === "swing" ? drag.turn(event, this.pivot) : drag.shift(event);
     if (handle) this.events.moved(handle);
   }
 

@@ -4,8 +4,9 @@ import * as three from "three";
 import { Ambient } from "./ambient";
 import type { Handle, Vec3 } from "./backend";
 import { Eye } from "./camera";
-import { buildLegend, rgbOf, type Scale } from "./colors";
+import { buildLegend, formatNumber, rgbOf, type Scale } from "./colors";
 import { h } from "./dom";
+import { Edges } from "./edges";
 import { Motion } from "./motion";
 import { Picker, type Hit } from "./picking";
 import { Pointer, type Click, type PointerTool } from "./pointer";
@@ -30,6 +31,7 @@ const FINE = 2; // pixels of the picture for each of the page, in both direction
 const REST = 250; // ms after which a picture drawn in software is drawn again with smooth edges
 const FADE = 160; // ms in which the exact result blends in
 const DISC = 14; // pixels of the page
+const SWING = 0.04; // how far a vibration reaches, of the extent
 
 export class Viewer {
   /** Number of the mesh that is shown; views of another mesh are not restored. */
@@ -45,6 +47,8 @@ export class Viewer {
   readonly surface = new Surface(this.motion);
   readonly box = new three.Box3(); // around the mesh, as it was loaded
   extent = 1; // its diagonal
+  readonly edges = new Edges(this.surface, this.motion);
+  readonly onDraw: (() => void)[] = [];
   private readonly skeleton = new Surface(this.motion, "#3f7fae");
   private readonly discs = new three.Points(
     new three.BufferGeometry(),
@@ -57,24 +61,29 @@ export class Viewer {
   private readonly eye: Eye;
   private readonly pointer: Pointer;
   private readonly watch = new ResizeObserver(() => this.resize());
-  private legend: HTMLElement | null = null;
+  private readonly tip = h("div", { class: "tip", "data-test": "tip", hidden: true });
+  private legend: HTMLDetailsElement | null = null;
+  private scalars: { values: Float32Array; scale: Scale } | null = null;
+  /** Color maps and ranges that the person chose, by the title of the function. */
+  private readonly chosen = new Map<string, Partial<Scale>>();
   private frame = 0;
   private resting = 0;
   private fading = 0;
   private up: Vec3 = [0, 1, 0];
   private solid = false;
   private folded = false;
+  private clipped = false;
 
   constructor(readonly stage: HTMLElement) {
     const { canvas, surface, skeleton, discs } = this;
-    stage.append(canvas);
+    stage.append(canvas, this.tip);
     canvas.setAttribute("aria-label", "The shape. Arrow keys turn it, + and - zoom.");
     skeleton.visible = discs.visible = false;
     skeleton.material.transparent = discs.material.transparent = true;
     // The skeleton is drawn over the veil of the surface, also where it lies behind it.
-    [surface, skeleton, discs].forEach((object, order) => (object.renderOrder = order));
+    [surface, skeleton, discs, this.edges].forEach((object, order) => (object.renderOrder = order));
     discs.frustumCulled = false;
-    this.space.add(surface, skeleton, discs);
+    this.space.add(surface, skeleton, discs, this.edges);
     this.scene.add(this.space);
     const started = startRenderer(canvas, stage, () => this.invalidate());
     if (started) {
@@ -95,6 +104,7 @@ export class Viewer {
       () => this.onView({ shape: this.shape, ...this.eye.view }),
     );
     this.pointer = new Pointer(canvas, (x, y) => this.pick(x, y));
+    this.pointer.onHover = (hit, x, y) => this.showTip(hit, x, y);
     this.watch.observe(stage);
     this.resize();
   }
@@ -104,6 +114,13 @@ export class Viewer {
   }
   get controls() {
     return this.eye.controls;
+  }
+  /** Whether one finger turns the view, whatever the tool. */
+  get fingerTurns() {
+    return this.pointer.fingerTurns;
+  }
+  set fingerTurns(turns: boolean) {
+    this.pointer.fingerTurns = turns;
   }
   get geometry() {
     return this.surface.geometry;
@@ -119,8 +136,10 @@ export class Viewer {
   }
 
   setMesh(vertices: Float32Array, faces: Uint32Array, up: Vec3, towards: Vec3): void {
-    [this.up, this.folded] = [up, false];
+    this.folded = false;
     this.surface.setMesh(vertices, faces);
+    this.edges.show(this.edges.visible);
+    this.cut(null);
     this.setPoints([], "#000000");
     this.setSkeleton(null);
     this.setScalars(null);
@@ -130,9 +149,19 @@ export class Viewer {
     this.space.scale.setScalar(1 / size);
     this.space.position.copy(this.box.getCenter(new three.Vector3())).multiplyScalar(-1 / size);
     this.space.updateMatrixWorld(true);
+    this.face(up, towards);
+  }
+
+  /** Let a direction be up and a side the front, and show the shape from there. */
+  face(up: Vec3, towards: Vec3): void {
+    this.up = up;
     this.eye.face(up, towards);
     this.fit();
     this.ambient?.start(up);
+  }
+
+  get axes() {
+    return this.eye.axes;
   }
 
   /**
@@ -175,11 +204,64 @@ export class Viewer {
 
   /** Color by a function; nodal lines mark where it is zero. */
   setScalars(values: Float32Array | null, scale?: Scale): void {
+    const open = this.legend?.open ?? false;
     this.legend?.remove();
-    this.surface.setScalars(values, scale);
-    this.twin?.setScalars(values, scale);
-    if (values && scale) this.stage.append((this.legend = buildLegend(scale)));
+    this.legend = this.scalars = null;
+    this.tip.hidden = true;
+    const seen = scale && { ...scale, ...this.chosen.get(scale.title) };
+    this.surface.setScalars(values, seen);
+    this.twin?.setScalars(values, seen);
+    this.surface.vibrate(0, 1);
+    if (values && scale) {
+      this.scalars = { values, scale };
+      const choose = (choice: Partial<Scale>) => {
+        this.chosen.set(scale.title, { ...this.chosen.get(scale.title), ...choice });
+        this.setScalars(values, scale);
+      };
+      this.stage.append((this.legend = buildLegend(seen!, open, choose)));
+    }
     this.invalidate();
+  }
+
+  /** Say what value or part lies under the pointer. */
+  private showTip(hit: Hit | null, x: number, y: number): void {
+    const { scalars, labels, tip } = this;
+    const value = hit && scalars && formatNumber(scalars.values[hit.vertex]!);
+    const part = hit && labels && `part ${labels[hit.vertex]}`;
+    tip.hidden = !value && !part;
+    tip.textContent = value ? `${value} at vertex ${hit.vertex}` : (part ?? "");
+    Object.assign(tip.style, { left: `${x}px`, top: `${y}px` });
+  }
+
+  /** Let the shown function swing along the normals, in a phase from -1 to 1; 1 and `still` end it. */
+  vibrate(phase: number, still = false): void {
+    this.surface.vibrate(still ? 0 : SWING * this.extent, phase);
+    this.invalidate();
+  }
+
+  /** Turn the camera about the shape by an angle. */
+  turn(angle: number): void {
+    this.controls.rotateLeft(angle);
+  }
+
+  /** Cut off what lies beyond a share of the box of the shape along a direction. */
+  cut(direction: three.Vector3 | null, share = 0.5): void {
+    const plane = direction && this.planeAt(direction, share);
+    this.clipped = plane !== null;
+    const materials = [this.surface.material, this.edges.material, this.picker?.material];
+    this.motion.cut(plane, materials.filter((material) => material !== undefined));
+    this.setSolid(this.solid);
+  }
+
+  private planeAt(direction: three.Vector3, share: number): three.Vector4 {
+    const { vertices } = this;
+    let [low, high] = [Infinity, -Infinity];
+    const point = new three.Vector3();
+    for (let place = 0; place < vertices.length; place += 3) {
+      const along = point.fromArray(vertices, place).dot(direction);
+      [low, high] = [Math.min(low, along), Math.max(high, along)];
+    }
+    return new three.Vector4(...direction.toArray(), low + share * (high - low));
   }
 
   /** Color by parts; `palette` has three bytes a label. Labels below 0 stay plain. */
@@ -200,7 +282,8 @@ export class Viewer {
   /** Say whether the inside of the surface is never seen: without it a frame takes a third less. */
   setSolid(solid: boolean): void {
     this.solid = solid;
-    this.surface.material.side = solid && !this.folded ? three.FrontSide : three.DoubleSide;
+    const inside = this.folded || this.clipped || !solid;
+    this.surface.material.side = inside ? three.DoubleSide : three.FrontSide;
     this.invalidate();
   }
 
@@ -279,6 +362,25 @@ export class Viewer {
     this.eye.fit(this.vertices, this.space.matrixWorld);
   }
 
+  /** Give all clicks on the shape to one taker, before any tool; null ends that. */
+  takeClicks(click: Click | null): void {
+    this.pointer.first = click;
+  }
+
+  /** Return what is drawn now in so many pixels of width, over a color. */
+  frameOf(width: number, ground: string): ImageData {
+    this.draw(false);
+    const { canvas } = this;
+    const height = 2 * Math.round((width * canvas.height) / canvas.width / 2);
+    const copy = new OffscreenCanvas(width, height);
+    const pen = copy.getContext("2d", { willReadFrequently: true })!;
+    pen.fillStyle = ground;
+    pen.fillRect(0, 0, width, height);
+    pen.imageSmoothingQuality = "high";
+    pen.drawImage(canvas, 0, 0, width, height);
+    return pen.getImageData(0, 0, width, height);
+  }
+
   setView(view: View): void {
     this.eye.view = view;
   }
@@ -291,6 +393,15 @@ export class Viewer {
   /** Return the ray through a place of the canvas, in the coordinates of the mesh. */
   rayAt(x: number, y: number): three.Ray {
     return this.eye.rayAt(x, y).applyMatrix4(this.space.matrixWorld.clone().invert());
+  }
+
+  /** Return where a point of the mesh is seen, in pixels of the canvas. */
+  placeOf(point: Vec3): [number, number] {
+    const { clientWidth, clientHeight } = this.canvas;
+    this.camera.updateMatrixWorld();
+    const seen = new three.Vector3(...point).applyMatrix4(this.space.matrixWorld);
+    const { x, y } = seen.project(this.camera);
+    return [((x + 1) / 2) * clientWidth, ((1 - y) / 2) * clientHeight];
   }
 
   /** Fill the stage. */
@@ -315,6 +426,7 @@ export class Viewer {
     this.discs.material.uniforms.size!.value = DISC * ratio;
     this.surface.material.uniforms.line!.value = ratio;
     renderer.render(this.scene, this.camera);
+    for (const act of this.onDraw) act();
     if (!fine) this.resting = window.setTimeout(() => this.draw(true), REST);
   }
 }

@@ -3,6 +3,7 @@
 import type { Studio } from "../app";
 import type { State } from "../core/backend";
 import { findRange, formatNumber } from "../core/colors";
+import type { Film } from "../core/film";
 import { Form } from "../core/dom";
 import { findTimeRange, heatFromSource, heatKernelSignature } from "../core/heat";
 import { ColoringPanel } from "./coloring";
@@ -40,6 +41,20 @@ export class HeatPanel extends ColoringPanel {
     this.form.progress("heat-progress", state.spectrum);
     this.form.get("heat-results").hidden = !state.spectrum.k;
     super.refresh(state);
+  }
+
+  films(): Film[] {
+    if (!this.modes.length || (this.view === "source" && this.source < 0)) return [];
+    let before: number | null = null; // what the slider showed
+    const at = (step: number) => {
+      this.form.get("time").valueAsNumber = step;
+      this.paint();
+    };
+    const show = (share: number) => {
+      before ??= this.form.number("time");
+      at(STEPS * share);
+    };
+    return [{ title: "Heat", seconds: 6, show, end: () => before !== null && at(before) }];
   }
 
   protected async show(): Promise<void> {

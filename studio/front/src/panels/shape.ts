@@ -1,10 +1,21 @@
 /** The shape: its counts and health, repairs, values, and files to open and to save. */
 
 import type { Studio } from "../app";
-import type { State } from "../core/backend";
+import type { State, Vec3 } from "../core/backend";
+import { Vector3 } from "three";
 import { download, Form, h } from "../core/dom";
 import { ColoringPanel } from "./coloring";
 import markup from "./shape.html?raw";
+
+const NEAR = 0.95; // cosine of the angle to an axis below which a direction is not taken for it
+
+/** Return the axis of the coordinates that is near to a direction, or the direction. */
+function snap(direction: Vector3): Vector3 {
+  const axes = [0, 1, 2].flatMap((axis) =>
+    [1, -1].map((sign) => new Vector3().setComponent(axis, sign)),
+  );
+  return axes.find((axis) => axis.dot(direction) > NEAR) ?? direction;
+}
 
 export class ShapePanel extends ColoringPanel {
   readonly id = "shape";
@@ -20,9 +31,13 @@ export class ShapePanel extends ColoringPanel {
       open: choose,
       values: () => this.start(),
       "save-png": () => this.savePicture(),
+      "roll-left": () => this.roll(1),
+      "roll-right": () => this.roll(-1),
+      front: () => this.faceFront(),
     });
     app.addExports(form, can.includes("finish"));
     form.get("opening").hidden = !can.includes("open");
+    form.get("facing").hidden = !can.includes("finish");
     if (can.includes("open")) {
       app.shortcut("O", "Open a file", choose);
       app.acceptDrops(app.main, (file) => app.openFile(file));
@@ -86,6 +101,21 @@ export class ShapePanel extends ColoringPanel {
     const partial = values.some(Number.isNaN);
     const range: [number, number] = [chosen.min, chosen.max];
     viewer.setScalars(values, { ...chosen, map: "viridis", range, partial });
+  }
+
+  /** Turn the shape by a quarter in the picture: what is at its side becomes its top. */
+  private roll(side: 1 | -1): Promise<boolean> {
+    const { right, towards } = this.app.viewer.axes;
+    return this.face(snap(right.multiplyScalar(side)), towards);
+  }
+
+  private faceFront(): Promise<boolean> {
+    return this.face(new Vector3(...this.app.state.up), this.app.viewer.axes.towards);
+  }
+
+  private face(up: Vector3, towards: Vector3): Promise<boolean> {
+    const side = { up: up.toArray() as Vec3, towards: towards.toArray() as Vec3 };
+    return this.app.change({ kind: "face", ...side }, "Turning the shape");
   }
 
   private async savePicture(): Promise<void> {

@@ -4,6 +4,7 @@ import type uPlot from "uplot";
 import type { Studio } from "../app";
 import type { State } from "../core/backend";
 import { findRange, formatNumber } from "../core/colors";
+import type { Film } from "../core/film";
 import { Form } from "../core/dom";
 import { lowpass } from "../core/heat";
 import { ColoringPanel } from "./coloring";
@@ -65,6 +66,13 @@ export class SpectrumPanel extends ColoringPanel {
     this.unbend()
       .then((points) => points && this.app.viewer.setVertices(points))
       .catch((error) => this.app.fail(error));
+  }
+
+  films(): Film[] {
+    const { viewer, state } = this.app;
+    if (!state.spectrum.k || this.view !== "eigenfunction") return [];
+    const show = (share: number) => viewer.vibrate(Math.cos(2 * Math.PI * share));
+    return [{ title: "Vibration", seconds: 2, show, end: () => viewer.vibrate(1, true) }];
   }
 
   protected async show(): Promise<void> {

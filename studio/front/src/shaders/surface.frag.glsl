@@ -12,15 +12,24 @@ uniform bool nodal;
 uniform float line; // pixels of the picture for each of the page
 #elif COLORING == 2
 flat in vec3 v_paint;
+flat in vec3 v_beyond;
+in vec3 v_soft;
 #else
 uniform vec3 plain;
 #endif
 #ifdef MARKED
 in vec4 v_mark;
 #endif
+#ifdef CLIPPED
+in vec3 v_place;
+uniform vec4 clip; // normal of the plane, and how far along it the shape is seen
+#endif
 uniform float opacity;
 out vec4 color;
 void main() {
+#ifdef CLIPPED
+  if (dot(v_place, clip.xyz) > clip.w) discard;
+#endif
 #if COLORING == 1
   float share = (v_value - range.x) / max(range.y - range.x, 1e-30);
   vec3 base = texelFetch(table, ivec2(clamp(int(256.0 * share), 0, 255), 0), 0).rgb;
@@ -31,7 +40,11 @@ void main() {
   if (isnan(v_value)) base = vec3(0.72); // no value, such as on a medial wall
   else if (nodal && slope > 1e-9 * range.y) base = mix(vec3(0.12), base, smoothstep(0.7 * line, 1.5 * line, distance_to_zero));
 #elif COLORING == 2
-  vec3 base = v_paint;
+  // The border is where the softened color is halfway to that beyond it.
+  vec3 way = v_beyond - v_paint;
+  float share = dot(v_soft - v_paint, way) / max(dot(way, way), 1e-6);
+  float step_wide = max(fwidth(share), 1e-4);
+  vec3 base = v_paint + way * smoothstep(0.5 - step_wide, 0.5 + step_wide, share);
 #else
   vec3 base = plain;
 #endif

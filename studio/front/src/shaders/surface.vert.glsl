@@ -3,27 +3,45 @@ in float ambient;
 out float v_ambient;
 #if COLORING == 1
 in float value;
+uniform float swing; // along the normal, for a value of 1: an eigenfunction as a vibration
+uniform float phase; // of the colors of it; else 1
 out float v_value;
 #elif COLORING == 2
 in vec3 paint;
-flat out vec3 v_paint; // a face has the color of its last corner, so borders of parts are sharp
+in vec3 soft;
+in vec3 beyond;
+flat out vec3 v_paint; // of the last corner of the face
+flat out vec3 v_beyond; // beyond the border that is near
+out vec3 v_soft;
 #endif
 #ifdef MARKED
 in vec4 mark;
 out vec4 v_mark;
 #endif
+#ifdef CLIPPED
+out vec3 v_place;
+#endif
 out vec3 v_normal;
 out vec3 v_view;
 void main() {
   vec3 turn;
-  vec4 seen = modelViewMatrix * vec4(moved(turn), 1.0);
+  vec3 place = moved(turn);
+#if COLORING == 1
+  place += swing * value * normal;
+#endif
+#ifdef CLIPPED
+  v_place = place;
+#endif
+  vec4 seen = modelViewMatrix * vec4(place, 1.0);
   v_normal = normalMatrix * mix(turned(normal, turn), exact_normal, blend);
   v_view = -seen.xyz;
   v_ambient = ambient;
 #if COLORING == 1
-  v_value = value;
+  v_value = phase * value;
 #elif COLORING == 2
   v_paint = paint;
+  v_beyond = beyond;
+  v_soft = soft;
 #endif
 #ifdef MARKED
   v_mark = mark;

@@ -1,4 +1,4 @@
-/** Deform: choose regions, move them, and let the shape follow (chapter 6 of the thesis). */
+/** Bend: drag a limb, or choose and move regions, and the shape follows (chapter 6 of the thesis). */
 
 import type { Panel, Studio } from "../../app";
 import type { State } from "../../core/backend";
@@ -6,29 +6,31 @@ import { Form, h } from "../../core/dom";
 import type { MotionKind } from "../../core/tools";
 import markup from "./deform.html?raw";
 import { replayFile, transferToFile } from "./files";
+import { Limbs } from "./limbs";
 import { Motion } from "./motion";
 import { Selection, type Selector } from "./selection";
 
 const SELECTORS = ["box", "brush", "part"]; // the other tools move
 
-type Tool = Selector | MotionKind;
+type Tool = "limb" | Selector | MotionKind;
 
 export class DeformPanel implements Panel {
   readonly id = "deform";
-  readonly title = "Deform";
+  readonly title = "Bend";
   readonly needs = ["rig", "finish"];
   private readonly form = new Form(markup);
   private app!: Studio;
   private selection!: Selection;
   private motion!: Motion;
-  private tool: Tool = "brush";
+  limbs!: Limbs;
+  private tool: Tool = "limb";
   private pose = "";
   private active = false;
 
   build(app: Studio): HTMLElement {
     const { form } = this;
     this.app = app;
-    this.tool = app.settings.get<Tool>("tool", "brush");
+    this.tool = app.settings.get<Tool>("tool", "limb");
     this.selection = new Selection(app, form, {
       changing: () => (this.motion.ready = false),
       selected: () => {
@@ -40,6 +42,10 @@ export class DeformPanel implements Panel {
       bound: () => this.showTools(),
       chooseRegion: (region) => this.chooseRegion(region),
     });
+    this.limbs = new Limbs(app, this.motion, this.selection);
+    const more = form.get<HTMLDetailsElement>("more");
+    more.open = app.settings.get("more", false);
+    more.addEventListener("toggle", () => app.settings.set("more", more.open));
     form.onChoice("region", (id) => this.chooseRegion(Number(id)));
     form.onChoice("tool", (id) => this.chooseTool(id as Tool));
     form.on({
@@ -57,7 +63,7 @@ export class DeformPanel implements Panel {
     });
     app.addExports(form);
     for (const [tool, { dataset, textContent }] of form.choice("tool"))
-      app.shortcut(dataset.key!, `Deform: ${textContent!.toLowerCase()}`, () => {
+      app.shortcut(dataset.key!, `Bend: ${textContent!.toLowerCase()}`, () => {
         app.open(this.id);
         this.chooseTool(tool as Tool);
       });
@@ -73,6 +79,7 @@ export class DeformPanel implements Panel {
     form.get("reset").disabled = !deformation.n_edits;
     this.showSteps();
     this.showHistory(state);
+    this.limbs.load().then(() => this.showHint());
     const pose = `${state.shape} ${state.pose} ${deformation.status}`;
     if (pose === this.pose) {
       selection.takeRegions(state).catch((error) => this.app.fail(error));
@@ -81,13 +88,15 @@ export class DeformPanel implements Panel {
     if (!this.pose.startsWith(`${state.shape} `)) {
       selection.startShape(state);
       motion.startShape();
+      this.limbs.startShape();
     }
     this.pose = pose;
     selection.crossing = [];
     motion.startPose();
+    this.limbs.startPose();
     selection.paint();
     selection.takeRegions(state).catch((error) => this.app.fail(error));
-    motion.bind();
+    if (this.tool !== "limb") motion.bind();
     if (form.get("skeleton").checked) this.showSkeleton();
     if (form.get("crossings").checked) this.showCrossings();
   }
@@ -116,9 +125,14 @@ export class DeformPanel implements Panel {
   }
 
   private chooseTool(tool: Tool): void {
+    const fromLimbs = this.tool === "limb";
     this.tool = tool;
     this.app.settings.set("tool", tool);
+    this.limbs.light(-1);
+    if (tool !== "limb") this.form.get<HTMLDetailsElement>("more").open = true;
     this.showTools();
+    this.selection.paint();
+    if (fromLimbs && tool !== "limb") this.motion.bind(); // the regions that were chosen before
     if (tool === "box") this.selection.startBox();
   }
 
@@ -126,11 +140,19 @@ export class DeformPanel implements Panel {
   private showTools(): void {
     const { active, form, tool } = this;
     form.press("tool", tool);
+    this.showHint();
     const selects = SELECTORS.includes(tool);
-    const missing = selects ? null : this.motion.missing;
-    form.text("hint", missing ?? form.get(`tool-${tool}`).dataset.hint!);
-    this.motion.show(selects ? null : (tool as MotionKind), active);
-    this.selection.show(selects ? (tool as Selector) : null, active);
+    const bends = tool === "limb";
+    this.motion.show(selects || bends ? null : (tool as MotionKind), active);
+    this.selection.show(selects ? (tool as Selector) : null, active && !bends);
+    if (active && bends) this.app.viewer.setPointer("grab", null, this.limbs);
+  }
+
+  private showHint(): void {
+    const { form, limbs, tool } = this;
+    const missing = SELECTORS.includes(tool) ? null : this.motion.missing;
+    const hint = missing ?? form.get(`tool-${tool}`).dataset.hint!;
+    form.text("hint", tool === "limb" ? limbs.hint : hint);
   }
 
   private showSteps(): void {

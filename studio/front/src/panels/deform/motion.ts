@@ -14,6 +14,7 @@ const nextFrame = () => new Promise(requestAnimationFrame);
 export class Motion {
   readonly mover: MotionTool;
   private rows: number[] = []; // the region of each row of the shares
+  private limb: Uint32Array | null = null; // that is bound instead of the regions, as region 0
   private handles: Handle[] = []; // of each region
   private rims: Vec3[] = []; // middle of the rim of each region
   private pivots: (Vec3 | undefined)[] = []; // that the person chose instead
@@ -48,6 +49,12 @@ export class Motion {
 
   startPose(): void {
     this.handles = [];
+    this.limb = null;
+  }
+
+  /** The number of the region that moves. */
+  private get region(): number {
+    return this.limb ? 0 : this.selection.region;
   }
 
   forgetPivot(): void {
@@ -86,12 +93,16 @@ export class Motion {
   }
 
   /** Ask by how much each vertex follows each region; then the regions can be moved. */
-  async bind(): Promise<void> {
+  async bind(limb: Uint32Array | null = null): Promise<void> {
     const { app, form } = this;
     const { regions } = this.selection;
     const turn = ++this.bindings;
-    const chosen = [0, 1, 2, 3].map((region) => regions.vertices(region));
-    const fixed = regions.vertices(FIXED);
+    const none = new Uint32Array(0);
+    const chosen = limb
+      ? [limb, none, none, none]
+      : [0, 1, 2, 3].map((region) => regions.vertices(region));
+    const fixed = limb ? none : regions.vertices(FIXED);
+    this.limb = limb;
     this.ready = false;
     form.text("bound", "");
     this.rows = [0, 1, 2, 3].filter((region) => chosen[region]!.length);
@@ -135,9 +146,9 @@ export class Motion {
   }
 
   /** Show a motion by shares at once, and the exact result when the pointer rests. */
-  private async moved(handle: Handle): Promise<void> {
+  async moved(handle: Handle): Promise<void> {
     const { app } = this;
-    this.handles[this.selection.region] = handle;
+    this.handles[this.region] = handle;
     app.viewer.setHandles(this.rowHandles());
     const turn = ++this.motions;
     // A slow frame is no rest: a pointer that moves is heard of at the latest before the next one.

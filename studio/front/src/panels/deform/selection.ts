@@ -12,6 +12,7 @@ import type { Hit, PointerTool } from "../../core/viewer";
 const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#4f6072"]; // of the regions, and fixed
 const CROSSING = "#d8301f";
 const TINT = 190; // of 255: how strongly a region covers the colors below
+const GLOW = 0.6; // the same, as a share, of a limb under the pointer
 const AXES = [0, 1, 2];
 
 const NOTHING = { status: "none", progress: 0, message: "" } as const; // that is awaited
@@ -27,6 +28,7 @@ export class Selection {
   regions = new Regions(0);
   region = 0; // that the tools change
   crossing: number[] = []; // vertices of faces that cross
+  lit: Uint8Array | null = null; // of each vertex: how much it belongs to the limb under the pointer
   readonly box: BoxTool;
   private readonly ring = h("div", { class: "ring", hidden: true });
   private tool: Selector | null = null; // that has the pointer
@@ -153,6 +155,9 @@ export class Selection {
       const owner = regions.of(vertex);
       if (owner !== null) marks.set(tints[owner]!, 4 * vertex);
     }
+    this.lit?.forEach((strength, vertex) => {
+      if (strength) marks.set([...rgbOf(COLORS[0]!), GLOW * strength], 4 * vertex);
+    });
     for (const vertex of this.crossing) marks.set([...rgbOf(CROSSING), TINT], 4 * vertex);
     app.viewer.setMarks(marks);
     const count = regions.vertices(region).length.toLocaleString("en");

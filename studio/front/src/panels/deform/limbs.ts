@@ -1,0 +1,173 @@
+/** Limbs: the one under the pointer lights up, and a drag bends it; no region has to be chosen. */
+
+import * as three from "three";
+import type { Studio } from "../../app";
+import type { Vec3 } from "../../core/backend";
+import { softenBorders } from "../../core/borders";
+import { cutParts } from "../../core/parts";
+import { PlainDrag } from "../../core/tools";
+import type { Hit, PointerTool } from "../../core/viewer";
+import type { Motion } from "./motion";
+import type { Selection } from "./selection";
+
+const HINT =
+  "Point at a limb: it lights up. Drag it, and it bends. Drag anywhere else to turn the view.";
+const NO_LIMBS = "No limb stands out on this shape. Choose a region by hand, under “More”.";
+
+export class Limbs implements PointerTool {
+  private labels: Int32Array | null = null; // part of each vertex
+  private body = -1; // the largest part, which stays
+  private lit = -1;
+  private bound = -1; // the limb that can be moved
+  private binding: Promise<void> = Promise.resolve();
+  private last: PointerEvent | null = null; // of the drag that is going on
+  private readonly drag: PlainDrag;
+
+  constructor(
+    private readonly app: Studio,
+    private readonly motion: Motion,
+    private readonly selection: Selection,
+  ) {
+    this.drag = new PlainDrag(app.viewer);
+  }
+
+  /** The parts of another shape are others. */
+  startShape(): void {
+    this.labels = this.selection.lit = null;
+    this.lit = -1;
+    this.startPose();
+  }
+
+  /** What was bound belongs to the pose before. */
+  startPose(): void {
+    this.bound = -1;
+  }
+
+  /** Load the parts when they are found; return whether there are some. */
+  async load(): Promise<boolean> {
+    const { backend, state } = this.app;
+    if (this.labels || state.parts.status !== "ready") return this.labels !== null;
+    const names = ["parts/labels", "parts/cuts"];
+    const [finest, cuts] = await Promise.all(names.map((name) => backend.array<Int32Array>(name)));
+    if (state.shape !== this.app.state.shape) return false;
+    const { levels, n_regions } = state.parts;
+    this.labels = cutParts(finest!, cuts!, levels.length, n_regions);
+    const sizes = new Uint32Array(levels.length);
+    for (const label of this.labels) sizes[label]!++;
+    this.body = sizes.indexOf(Math.max(...sizes));
+    return true;
+  }
+
+  /** What a person should know or do now. */
+  get hint(): string {
+    const { deformation, parts } = this.app.state;
+    if ([deformation, parts].some(({ status }) => status === "failed")) return NO_LIMBS;
+    if (deformation.status !== "ready") return "The shape is being prepared for bending …";
+    if (!this.labels) return "Its limbs are being found …";
+    return this.labels.some((label) => label !== this.body) ? HINT : NO_LIMBS;
+  }
+
+  /** Return the limb of a vertex, or -1. */
+  at(vertex: number | undefined): number {
+    if (vertex === undefined || !this.labels || this.app.state.deformation.status !== "ready")
+      return -1;
+    const label = this.labels[vertex]!;
+    return label === this.body ? -1 : label;
+  }
+
+  hover(hit: Hit | null): void {
+    this.light(this.at(hit?.vertex));
+  }
+
+  light(limb: number): void {
+    if (limb === this.lit) return;
+    this.lit = limb;
+    this.selection.lit = limb < 0 ? null : this.glowOf(limb);
+    this.selection.paint();
+    this.app.viewer.canvas.style.cursor = limb < 0 ? "grab" : "pointer";
+  }
+
+  /** Return how much each vertex belongs to a limb, of 255, without a step at its rim. */
+  private glowOf(limb: number): Uint8Array {
+    const labels = this.labels!.map((label) => Number(label === limb));
+    const paint = Uint8Array.from({ length: 3 * labels.length }, (_, i) =>
+      i % 3 ? 0 : 255 * labels[i / 3]!,
+    );
+    const { soft } = softenBorders(this.app.viewer.faces, labels, paint);
+    return soft.filter((_, i) => i % 3 === 0);
+  }
+
+  down(event: PointerEvent): boolean {
+    const hit = this.app.viewer.pick(event.offsetX, event.offsetY);
+    const limb = this.at(hit?.vertex);
+    if (!hit || limb < 0) return false;
+    this.hold(limb, hit.point);
+    return true;
+  }
+
+  /** Begin to drag a point of a limb; the motion follows when the limb is bound. */
+  hold(limb: number, point: Vec3): Promise<void> {
+    this.light(limb);
+    this.drag.begin(point);
+    this.last = null;
+    if (limb !== this.bound) {
+      this.bound = limb;
+      this.binding = this.motion.bind(this.verticesOf(limb)).then(() => {
+        if (!this.motion.ready) this.bound = -1; // the next drag asks again
+      });
+    }
+    return this.binding.then(() => this.follow());
+  }
+
+  move(event: PointerEvent): void {
+    this.last = event;
+    this.follow();
+  }
+
+  /** The middle of the rim about which the limb turns. */
+  get pivot(): three.Vector3 {
+    return new three.Vector3(...this.motion.pivotOf(0));
+  }
+
+  /** Return the vertex of a limb that is farthest from the body, which the tour bends. */
+  farthest(): { number: number; tip: Vec3 } | null {
+    const { labels } = this;
+    if (!labels || this.app.state.deformation.status !== "ready") return null;
+    const { vertices } = this.app.viewer;
+    const [center, point] = [new three.Vector3(), new three.Vector3()];
+    const body = this.verticesOf(this.body);
+    for (const vertex of body) center.add(point.fromArray(vertices, 3 * vertex));
+    center.divideScalar(body.length);
+    let [best, least] = [-1, 0];
+    labels.forEach((label, vertex) => {
+      const away = point.fromArray(vertices, 3 * vertex).distanceTo(center);
+      if (label !== this.body && away > least) [best, least] = [vertex, away];
+    });
+    if (best < 0) return null;
+    return { number: labels[best]!, tip: [...vertices.subarray(3 * best, 3 * best + 3)] as Vec3 };
+  }
+
+  /** Return where a point of the limb is after a turn about its pivot. */
+  turned(point: Vec3, axis: Vec3, angle: number): Vec3 {
+    const { pivot } = this;
+    const arm = new three.Vector3(...point).sub(pivot);
+    return arm.applyAxisAngle(new three.Vector3(...axis), angle).add(pivot).toArray();
+  }
+
+  private follow(): void {
+    if (!this.last || !this.motion.ready) return;
+    const handle = this.drag.turn(this.last, this.pivot);
+    if (handle) this.motion.moved(handle);
+  }
+
+  up(): void {
+    this.binding.then(() => {
+      this.last = null;
+      this.motion.commit();
+    });
+  }
+
+  private verticesOf(limb: number): Uint32Array {
+    return Uint32Array.from(this.labels!.keys()).filter((each) => this.labels![each] === limb);
+  }
+}

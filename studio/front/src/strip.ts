@@ -1,0 +1,119 @@
+/** The strip over the picture: whole shape, edges, cut, ruler, films, and what a finger does. */
+
+import { Vector3 } from "three";
+import type { Studio } from "./app";
+import { download, Form, h } from "./core/dom";
+import { playFilm, saveGif, turntable, type Film } from "./core/film";
+import { Ruler } from "./core/ruler";
+import markup from "./strip.html?raw";
+
+export class Strip {
+  private readonly form = new Form(markup);
+  private readonly ruler: Ruler;
+  private playing: AbortController | null = null;
+  private films: Film[] = [];
+
+  constructor(private readonly app: Studio) {
+    const { form } = this;
+    const { viewer } = app;
+    this.ruler = new Ruler(viewer);
+    form.on({
+      whole: () => viewer.fit(),
+      edges: () => {
+        viewer.edges.show(this.toggle("edges"));
+        viewer.invalidate();
+      },
+      cut: () => {
+        form.get("cut-menu").hidden = !this.toggle("cut");
+        this.cut();
+      },
+      "cut-along": () => this.cut(),
+      "cut-place": () => this.cut(),
+      measure: () => (this.toggle("measure") ? this.ruler.start() : this.ruler.stop()),
+      film: () => {
+        form.get("film-menu").hidden = !this.toggle("film");
+        this.stop();
+        this.listFilms();
+      },
+      "film-kind": () => this.stop(),
+      "film-play": () => this.play(),
+      "film-save": () => this.saveFilm(),
+      "film-page": () => app.save("html", "html"),
+      finger: () => {
+        viewer.fingerTurns = !viewer.fingerTurns;
+        this.showFinger();
+      },
+    });
+    const keys = { E: "edges", X: "cut", M: "measure", F: "film" };
+    for (const [key, name] of Object.entries(keys))
+      app.shortcut(key, `Picture: ${name}`, () => form.get(name).click());
+    form.get("film-page").hidden = !app.state.capabilities.includes("finish");
+    this.showFinger();
+    viewer.stage.append(form.root);
+  }
+
+  /** Films belong to the panel that is shown. */
+  panelShown(): void {
+    this.stop();
+    this.listFilms();
+  }
+
+  private toggle(name: string): boolean {
+    const on = this.form.get(name).ariaPressed !== "true";
+    this.form.get(name).ariaPressed = String(on);
+    return on;
+  }
+
+  private cut(): void {
+    const { form, app } = this;
+    const { up, towards } = app.state;
+    const [above, front] = [new Vector3(...up), new Vector3(...towards)];
+    const right = above.clone().cross(front).normalize();
+    const along = [right.clone().cross(above), right, above];
+    const direction = along[form.get<HTMLSelectElement>("cut-along").selectedIndex]!;
+    const on = form.get("cut").ariaPressed === "true";
+    app.viewer.cut(on ? direction : null, form.number("cut-place"));
+  }
+
+  private listFilms(): void {
+    this.films = [...this.app.films(), turntable(this.app.viewer)];
+    const options = this.films.map(({ title }) => h("option", {}, title));
+    this.form.get("film-kind").replaceChildren(...options);
+  }
+
+  private get film(): Film {
+    return this.films[this.form.get<HTMLSelectElement>("film-kind").selectedIndex]!;
+  }
+
+  private play(): void {
+    if (this.playing) return this.stop();
+    this.playing = new AbortController();
+    this.form.get("film-play").ariaPressed = "true";
+    this.form.text("film-play", "Stop");
+    playFilm(this.film, this.playing.signal).catch((error) => this.app.fail(error));
+  }
+
+  private stop(): void {
+    this.playing?.abort();
+    this.playing = null;
+    this.form.get("film-play").ariaPressed = "false";
+    this.form.text("film-play", "Play");
+  }
+
+  private async saveFilm(): Promise<void> {
+    const { app } = this;
+    this.stop();
+    const ground = getComputedStyle(app.main).getPropertyValue("--stage");
+    const told = (share: number) => app.say(`Drawing the film: ${Math.round(100 * share)} %`);
+    const gif = await app.run("Drawing the film", saveGif(app.viewer, this.film, ground, told));
+    if (!gif) return;
+    app.say("");
+    download(gif, app.fileName("gif"), "image/gif");
+  }
+
+  private showFinger(): void {
+    const { fingerTurns } = this.app.viewer;
+    this.form.get("finger").ariaPressed = String(!fingerTurns);
+    this.form.text("finger", fingerTurns ? "Finger: turns" : "Finger: bends or paints");
+  }
+}
