@@ -14,6 +14,7 @@ from eigenshape_studio.beside import Beside
 from eigenshape_studio.calls import RequestError
 from eigenshape_studio.mapping import NEAR, correct_map, map_of_match
 from eigenshape_studio.opening import open_workspace
+from eigenshape_studio.sessions import SessionFile
 from eigenshape_studio.workspace import Workspace
 
 
@@ -213,6 +214,23 @@ def test_wrong_landmarks_are_refused(meta, arrays, reason):
     assert (
         "open the studio with its folder" in page.error("array", name="collection/modes")["message"]
     )
+
+
+def test_the_points_of_a_cloud_are_kept_beside_its_surface(tmp_path):
+    cloud = tmp_path / "ball.xyz"
+    es.io.write_points(es.PointCloud(es.icosphere(3).vertices), cloud)
+    opened = Page(open_workspace([cloud]).fork(SessionFile(tmp_path / "tab.sqlite")))
+    assert opened.call("meta")[0]["n_points"] == 642
+    uploaded = Page(Workspace(es.icosphere(1)).fork(SessionFile(tmp_path / "other.sqlite")))
+    assert uploaded.call("meta")[0]["n_points"] == 0
+    assert "there are none" in uploaded.error("array", name="points")["message"]
+    file = np.frombuffer(cloud.read_bytes(), np.uint8)
+    uploaded.call("finish", kind="open", name="ball.xyz", _arrays={"file": file})
+    again = Page(Workspace(es.icosphere(1)).fork(SessionFile(tmp_path / "other.sqlite")))
+    for page in (opened, uploaded, again):
+        points = page.array("points").reshape(-1, 3)
+        np.testing.assert_allclose(points, es.icosphere(3).vertices, atol=1e-6)
+        assert page.workspace.mesh.n_vertices != 642
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 import type { Backend, Change, State } from "./core/backend";
 import markup from "./app.html?raw";
 import type { Beside } from "./core/beside";
+import { Cloud } from "./core/cloud";
 import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile } from "./core/dom";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
@@ -51,6 +52,7 @@ export class Studio {
   private readonly shortcuts = new Map<string, { text: string; action: () => void }>();
   private readonly pages = new Map<string, { panel: Panel; tab: HTMLElement; page: HTMLElement }>();
   private active: Panel | null = null;
+  private cloud: Cloud | null = null; // the points that the surface was made of
   second: Beside | null = null; // picture of the second shape
   secondShown: (second: Beside) => void = () => {}; // called when its shape is there
   private busy = 0;
@@ -105,7 +107,8 @@ export class Studio {
     const usable = [...this.pages.keys()];
     const last = this.settings.get("panel", "");
     this.refreshPanels();
-    this.open(usable.includes(last) ? last : usable[0]!);
+    const first = this.state.n_points ? "shape" : usable[0]!;
+    this.open(usable.includes(last) ? last : first);
   }
 
   /** Ask for the state, load what changed, and refresh all panels; again while something runs. */
@@ -233,7 +236,13 @@ export class Studio {
     }
     this.active = next.panel;
     this.settings.set("panel", id);
+    this.showCloud();
     this.active.shown?.();
+  }
+
+  /** The panel Shape shows the points of a scan; the others color and bend the surface. */
+  private showCloud(): void {
+    this.cloud?.show(this.active?.id === "shape");
   }
 
   private addPanel(panel: Panel): void {
@@ -269,6 +278,10 @@ export class Studio {
       const [points, faces] = await this.mesh;
       this.viewer.setMesh(points, faces, state.up, state.towards);
       this.viewer.shape = shape;
+      this.cloud?.remove();
+      const cloud = state.n_points && (await this.backend.array<Float32Array>("points"));
+      this.cloud = cloud ? new Cloud(this.viewer, cloud) : null;
+      this.showCloud();
     } else if (pose !== this.shown.pose)
       this.viewer.setVertices(vertices ?? (await this.backend.array("vertices")));
     this.shown = { shape, pose };

@@ -43,6 +43,7 @@ export interface State {
   digest: string; // tells the mesh at rest from all others
   selected: number; // tells the present regions from others; 0: none
   pose: number; // tells the pose from others of the shape, and the shape from others
+  n_points: number; // that the surface was made of; 0 if it is that of the file
   beside: Second | null;
   landmarks: Landmark[];
   collection: Collection | null;
