@@ -287,6 +287,8 @@ def test_a_collection_opens_with_its_mean_modes_and_specimens(collection):
         "must be that of a specimen" in page.error("finish", kind="beside", specimen="x")["message"]
     )
     pairs = {"pairs": np.array([0, 1], "<u4")}
+    beside = page.call("meta")[0]["beside"]
+    assert (beside["can_correct"], beside["can_pose"]) == (False, False)
     assert "kept as it is" in page.error("finish", kind="correct", _arrays=pairs)["message"]
     state = page.call("finish", kind="choose", shape=1)[0]["state"]
     assert (state["name"], state["collection"]["is_mean"]) == ("b", False)

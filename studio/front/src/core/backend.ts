@@ -60,6 +60,8 @@ export interface Second {
   towards: Vec3;
   map: Progress;
   similarity: number[] | null; // lays the shape on this one, by the map: three rows of four
+  can_correct: boolean; // whether the map was found, and not known before
+  can_pose: boolean; // whether all of the shape was mapped to this one
   lines: string[]; // what is known of the map
   pairs: [number, number][]; // vertices of both that correspond, by hand
 }
