@@ -76,7 +76,9 @@ def draw_shape(browser, folder, work, title, mesh, steps):
             wait_until_still(page)
             seen = Image.open(BytesIO(page.screenshot()))
             paths.append(folder / f"studio_{name}.png")
-            seen.convert("RGB").quantize(256).save(paths[-1], optimize=True)  # a third of the bytes
+            seen = seen.convert("RGB")
+            few = seen.quantize(palette=seen.quantize(256))  # a third of the bytes
+            few.save(paths[-1], optimize=True)
     return paths
 
 

@@ -178,6 +178,25 @@ def test_landmarks_are_placed_named_moved_saved_and_loaded(page, tmp_path):
     np.testing.assert_allclose(again, points, atol=1e-9)
 
 
+def test_a_cloud_is_shown_as_points_or_as_its_surface(page, tmp_path):
+    cloud = tmp_path / "ball.xyz"
+    es.io.write_points(es.PointCloud(es.icosphere(3).vertices), cloud)
+    find(page, "tab-shape").click()
+    with page.expect_file_chooser() as chooser:
+        find(page, "open").click()
+    chooser.value.set_files(cloud)
+    wait_until(page, "eigenshape.state.n_points === 642")
+    find(page, "cloud").wait_for()
+    assert not page.evaluate("eigenshape.viewer.surface.visible")
+    find(page, "cloud").get_by_text("Surface").click()
+    assert page.evaluate("eigenshape.viewer.surface.visible")
+    page.keyboard.press("Control+z")
+    wait_until(page, "eigenshape.state.n_points === 0")
+    wait_until_still(page)
+    assert find(page, "cloud").count() == 0
+    assert page.evaluate("eigenshape.viewer.surface.visible")
+
+
 def test_a_collection_has_sliders_and_specimens(browser, collection):  # noqa: F811
     with serve_studio(collection) as url, open_page(browser, url) as page:
         find(page, "tab-collection").click()

@@ -14,6 +14,7 @@ from eigenshape_studio.beside import Beside
 from eigenshape_studio.calls import RequestError
 from eigenshape_studio.mapping import NEAR, correct_map, map_of_match
 from eigenshape_studio.opening import open_workspace
+from eigenshape_studio.sessions import SessionFile
 from eigenshape_studio.workspace import Workspace
 
 
@@ -215,6 +216,23 @@ def test_wrong_landmarks_are_refused(meta, arrays, reason):
     )
 
 
+def test_the_points_of_a_cloud_are_kept_beside_its_surface(tmp_path):
+    cloud = tmp_path / "ball.xyz"
+    es.io.write_points(es.PointCloud(es.icosphere(3).vertices), cloud)
+    opened = Page(open_workspace([cloud]).fork(SessionFile(tmp_path / "tab.sqlite")))
+    assert opened.call("meta")[0]["n_points"] == 642
+    uploaded = Page(Workspace(es.icosphere(1)).fork(SessionFile(tmp_path / "other.sqlite")))
+    assert uploaded.call("meta")[0]["n_points"] == 0
+    assert "there are none" in uploaded.error("array", name="points")["message"]
+    file = np.frombuffer(cloud.read_bytes(), np.uint8)
+    uploaded.call("finish", kind="open", name="ball.xyz", _arrays={"file": file})
+    again = Page(Workspace(es.icosphere(1)).fork(SessionFile(tmp_path / "other.sqlite")))
+    for page in (opened, uploaded, again):
+        points = page.array("points").reshape(-1, 3)
+        np.testing.assert_allclose(points, es.icosphere(3).vertices, atol=1e-6)
+        assert page.workspace.mesh.n_vertices != 642
+
+
 @pytest.fixture(scope="module")
 def collection(tmp_path_factory):
     """The folder of a collection of three balls."""
@@ -235,7 +253,8 @@ def collection(tmp_path_factory):
             points=points,
             gaps=np.zeros(points.shape[:2]),
             confidence=np.ones(points.shape[:2]),
-            reflected=(False, False, False),
+            sides=("same",) * 3,
+            methods=("position",) * 3,
             sources=sources,
             template="a",
             notes={"a": (), "b": ("a note",), "c": ()},
@@ -268,6 +287,8 @@ def test_a_collection_opens_with_its_mean_modes_and_specimens(collection):
         "must be that of a specimen" in page.error("finish", kind="beside", specimen="x")["message"]
     )
     pairs = {"pairs": np.array([0, 1], "<u4")}
+    beside = page.call("meta")[0]["beside"]
+    assert (beside["can_correct"], beside["can_pose"]) == (False, False)
     assert "kept as it is" in page.error("finish", kind="correct", _arrays=pairs)["message"]
     state = page.call("finish", kind="choose", shape=1)[0]["state"]
     assert (state["name"], state["collection"]["is_mean"]) == ("b", False)

@@ -3,6 +3,7 @@
 import type { Backend, Change, State } from "./core/backend";
 import markup from "./app.html?raw";
 import type { Beside } from "./core/beside";
+import { Cloud } from "./core/cloud";
 import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile } from "./core/dom";
 import type { Film } from "./core/film";
 import { Viewer, type View } from "./core/viewer";
@@ -59,6 +60,7 @@ export class Studio {
   private readonly shortcuts = new Map<string, { text: string; action: () => void }>();
   private readonly pages = new Map<string, { panel: Panel; tab: HTMLElement; page: HTMLElement }>();
   private active: Panel | null = null;
+  private cloud: Cloud | null = null; // the points that the surface was made of
   second: Beside | null = null; // picture of the second shape
   secondShown: (second: Beside) => void = () => {}; // called when its shape is there
   private strip: Strip | null = null;
@@ -122,7 +124,8 @@ export class Studio {
     // Whoever brings values wants to see them.
     const last = this.settings.get("panel", this.state.values.length ? "shape" : "");
     this.refreshPanels();
-    this.open(usable.includes(last) ? last : usable[0]!);
+    const first = this.state.n_points ? "shape" : usable[0]!;
+    this.open(usable.includes(last) ? last : first);
     this.findParts();
     if (this.state.samples.length && !this.settings.get("welcomed", false)) welcome(this);
   }
@@ -276,6 +279,7 @@ export class Studio {
     }
     this.active = next.panel;
     this.settings.set("panel", id);
+    this.showCloud();
     this.active.shown?.();
     this.strip?.panelShown();
   }
@@ -283,6 +287,11 @@ export class Studio {
   /** Return what can be played of what is shown. */
   films(): Film[] {
     return this.active?.films?.() ?? [];
+  }
+
+  /** The panel Shape shows the points of a scan; the others color and bend the surface. */
+  private showCloud(): void {
+    this.cloud?.show(this.active?.id === "shape");
   }
 
   private addPanel(panel: Panel): void {
@@ -326,6 +335,11 @@ export class Studio {
       if (state !== this.state) return this.showing; // a newer one has come meanwhile
       this.viewer.setMesh(points, faces, state.up, state.towards);
       this.viewer.shape = shape;
+      this.cloud?.remove();
+      const cloud = state.n_points && (await this.backend.array<Float32Array>("points"));
+      if (state !== this.state) return this.showing;
+      this.cloud = cloud ? new Cloud(this.viewer, cloud) : null;
+      this.showCloud();
     } else if (pose !== this.shown.pose) {
       const points = vertices ?? (await this.backend.array<Float32Array<ArrayBuffer>>("vertices"));
       if (state !== this.state) return this.showing;

@@ -106,6 +106,8 @@ class Beside:
             "similarity": None
             if found is None
             else found.similarity(self._side(0)).ravel().tolist(),
+            "can_correct": found is not None and found.match is not None,
+            "can_pose": found is not None and found.match is not None and not self._flipped,
             "lines": [] if found is None else self._describe(found),
             "pairs": self.pairs.tolist(),
         }

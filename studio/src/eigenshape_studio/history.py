@@ -86,6 +86,12 @@ class Shape:
             return self._read().mesh if self._analysis is None else self._analysis.mesh
 
     @property
+    def points(self) -> np.ndarray | None:
+        """The points that the surface was made of, if it was."""
+        with self._lock:
+            return self._read().points
+
+    @property
     def digest(self) -> str:
         """Text that two shapes share only if their meshes are equal; empty before it is read."""
         if self.loaded and not self._digest:
@@ -401,7 +407,7 @@ def _load(file: SessionFile, number: int, path: str | None) -> Loaded:
     }
     # The file is the user's own: who could change it could change this program.
     attributes = None if pickled is None else pickle.loads(pickled)
-    return Loaded(mesh, attributes, fields, tuple(meta["side"]))
+    return Loaded(mesh, attributes, fields, tuple(meta["side"]), arrays.get("points"))
 
 
 def _shape_row(shape: Shape) -> Row:
@@ -411,6 +417,8 @@ def _shape_row(shape: Shape) -> Row:
     arrays = {"vertices": mesh.vertices.astype("<f8"), "faces": mesh.faces.astype("<u4")}
     for place, one in enumerate(shape.fields.values()):
         arrays[f"field {place}"] = one.values.astype("<f8")
+    if shape.points is not None:
+        arrays["points"] = shape.points.astype("<f8")
     names = [(name, one.title, one.unit) for name, one in shape.fields.items()]
     pickled = None if shape.attributes is None else pickle.dumps(shape.attributes)
     side = shape.analysis.side if shape.loaded else ("auto", "auto")

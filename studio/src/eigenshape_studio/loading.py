@@ -10,6 +10,7 @@ import numpy as np
 
 import eigenshape as es
 from eigenshape.plot.camera import Up, View
+from eigenshape_studio.parse import points_in
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +35,21 @@ class Loaded:
         Functions on the vertices.
     side : (view, up)
         From which the page looks, as in `es.plot.aim_camera`.
+    points : (p, 3) float, optional
+        Those that the surface was made of.
     """
 
     mesh: es.TriangleMesh
     attributes: es.io.MeshAttributes | None = None
     fields: Mapping[str, Field] = field(default_factory=dict)
     side: tuple[View, Up] = ("auto", "auto")
+    points: np.ndarray | None = None
 
 
 def load_file(path: str | Path) -> Loaded:
     """Read a shape with what else its file holds."""
-    path, mesh = Path(path), es.io.read_surface(path).mesh
+    path, found = Path(path), es.io.read_surface(path)
+    mesh = found.mesh
     attributes, values = None, {}
     with suppress(es.FileFormatError):  # points have no attributes
         attributes = es.read_mesh(path, attributes=True, drop_missing=True)[1]
@@ -55,7 +60,8 @@ def load_file(path: str | Path) -> Loaded:
             for title, numbers in attributes.fields.items()
             if _is_field(numbers, mesh.n_vertices)
         }
-    return Loaded(mesh, attributes, check_fields(values, mesh.n_vertices))
+    fields = check_fields(values, mesh.n_vertices)
+    return Loaded(mesh, attributes, fields, points=points_in(path, found.report))
 
 
 def check_fields(values: Mapping[str, Any], n_vertices: int) -> dict[str, Field]:

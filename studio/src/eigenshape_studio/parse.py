@@ -7,6 +7,7 @@ standard output: the mesh, or the reason why there is none.
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -38,6 +39,15 @@ class Limits:
     n_faces: int = 2_000_000
 
 
+@dataclass(frozen=True, eq=False)
+class Upload:
+    """A mesh of a file, what it was made of in sentences, and the points that it was made of."""
+
+    mesh: es.TriangleMesh
+    report: tuple[str, ...]
+    points: np.ndarray | None
+
+
 def display_name(name: object) -> str:
     """Return the last part of a file's name, printable and short."""
     text = PurePosixPath(str(name).replace("\\", "/")).name
@@ -57,9 +67,7 @@ def shape_suffix(name: str) -> str:
     return suffix
 
 
-def parse_surface(
-    name: str, data: bytes, limits: Limits | None = None
-) -> es.geometry.RepairedMesh[es.TriangleMesh]:
+def parse_surface(name: str, data: bytes, limits: Limits | None = None) -> Upload:
     """Parse a file of a mesh, or of points that become a surface, in a child process.
 
     Parameters
@@ -71,8 +79,7 @@ def parse_surface(
 
     Returns
     -------
-    RepairedMesh
-        As of `es.io.read_surface`.
+    Upload
 
     Raises
     ------
@@ -103,8 +110,15 @@ def parse_surface(
         ) from err
     if "error" in meta:
         raise es.FileFormatError(meta["error"])
-    mesh = es.TriangleMesh(arrays["vertices"], arrays["faces"])
-    return es.geometry.RepairedMesh(mesh, tuple(meta["report"]), arrays["source"].astype(np.int64))
+    mesh, points = es.TriangleMesh(arrays["vertices"], arrays["faces"]), arrays["points"]
+    return Upload(mesh, tuple(meta["report"]), points if len(points) else None)
+
+
+def points_in(path: Path, report: Sequence[str]) -> np.ndarray | None:
+    """Return the points of a file that a surface was made of, as its report says; None of a mesh."""
+    if not any(line.startswith("reconstruct_surface") for line in report):
+        return None
+    return es.io.read_points(path, drop_missing=True).points
 
 
 def main() -> None:
@@ -116,10 +130,11 @@ def main() -> None:
             path = Path(folder, f"shape{suffix}")
             path.write_bytes(sys.stdin.buffer.read())
             found = read_upload(path, int(n_faces))
+            points = points_in(path, found.report)
         arrays = {
             "vertices": found.mesh.vertices,
             "faces": found.mesh.faces.astype("<u4"),
-            "source": found.source_vertices.astype("<u4"),
+            "points": np.empty((0, 3)) if points is None else points,
         }
         message = encode({"report": list(found.report)}, arrays)
     except MemoryError:

@@ -23,7 +23,7 @@ from eigenshape_studio.jobs import NO_JOB, PreparingError, window_message
 from eigenshape_studio.loading import Field, Loaded, check_fields
 from eigenshape_studio.onefile import N_MODES as N_REPORTED
 from eigenshape_studio.onefile import report_page
-from eigenshape_studio.parse import display_name, parse_surface
+from eigenshape_studio.parse import Upload, display_name, parse_surface
 from eigenshape_studio.poses import carry_pose
 from eigenshape_studio.samples import SAMPLES, sample_mesh, sample_picture
 from eigenshape_studio.search import Shelf
@@ -219,6 +219,7 @@ class Workspace:
             "deformation": self._deformation_facts(),
             "index": None if self.shelf is None else self.shelf.facts(),
             **self.company.facts(),
+            "n_points": 0 if now.shape.points is None else len(now.shape.points),
             "shapes": [[shape.number, shape.name] for shape in history.shapes.values()],
             "history": [moment.text for moment in history.moments[1:]],
             "place": history.place,
@@ -259,6 +260,7 @@ class Workspace:
         makers: dict[str, Callable[..., np.ndarray]] = {
             "vertices": self._vertices,
             "faces": lambda: self.analysis.mesh.faces.astype("<u4"),
+            "points": self._points,
             "areas": lambda: self.analysis.areas.astype("<f4"),
             "modes": lambda: self._modes(meta),
             "eigenvalues": lambda: self._spectrum().eigenvalues.astype("<f8"),
@@ -291,6 +293,12 @@ class Workspace:
 
     def _vertices(self) -> np.ndarray:
         return self.mesh.vertices.astype("<f4")
+
+    def _points(self) -> np.ndarray:
+        points = self.history.now.shape.points
+        if points is None:
+            raise RequestError("There must be points that the surface was made of; there are none.")
+        return points.astype("<f4")
 
     def _spectrum(self) -> es.Spectrum:
         found = self.analysis.spectrum.result
@@ -647,13 +655,19 @@ class Workspace:
             self.show(sample_mesh(name), name)
             return
         name = display_name(meta.get("name"))
-        self.show(self.read_surface(name, file_bytes(arrays, "file")), name)
+        found = self._parse(name, file_bytes(arrays, "file"))
+        loaded = Loaded(found.mesh, points=found.points)
+        self.history.show(loaded, name, f"Open {name}")
 
     def read_surface(self, name: str, data: bytes) -> es.TriangleMesh:
+        """Read a surface from the bytes of a file from outside."""
+        return self._parse(name, data).mesh
+
+    def _parse(self, name: str, data: bytes) -> Upload:
         """Read a file from outside; what had to be made of points is told with the answer."""
         found = parse_surface(name, data)
         self._warnings += found.report
-        return found.mesh
+        return found
 
     def warn(self, lines: list[str]) -> None:
         """Tell something with the answer to the present call."""

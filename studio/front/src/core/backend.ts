@@ -43,6 +43,7 @@ export interface State {
   digest: string; // tells the mesh at rest from all others
   selected: number; // tells the present regions from others; 0: none
   pose: number; // tells the pose from others of the shape, and the shape from others
+  n_points: number; // that the surface was made of; 0 if it is that of the file
   beside: Second | null;
   landmarks: Landmark[];
   collection: Collection | null;
@@ -60,6 +61,8 @@ export interface Second {
   towards: Vec3;
   map: Progress;
   similarity: number[] | null; // lays the shape on this one, by the map: three rows of four
+  can_correct: boolean; // whether the map was found, and not known before
+  can_pose: boolean; // whether all of the shape was mapped to this one
   lines: string[]; // what is known of the map
   pairs: [number, number][]; // vertices of both that correspond, by hand
 }

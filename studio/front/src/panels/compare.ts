@@ -72,6 +72,8 @@ export class ComparePanel implements Panel {
     if (beside) {
       const { status } = beside.map;
       form.progress("map-progress", beside.map);
+      form.get("pose-part").hidden = !beside.can_pose;
+      form.get("correct-part").hidden = !beside.can_correct && status !== "running";
       form.get("find-map").hidden = status === "running" || status === "ready";
       form.get("map-results").hidden = !this.map && status !== "ready";
       form
