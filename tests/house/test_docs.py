@@ -58,6 +58,23 @@ def test_the_page_of_modes_runs():
     assert len(names["modes"])
 
 
+def test_the_page_from_a_cortex_to_a_figure_runs(tmp_path, monkeypatch):
+    pytest.importorskip("neuromodes", reason="the cortices of neuromodes are missing")
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "brains.md").read_text()
+    names: dict[str, object] = {}
+    exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), names)
+    assert names["spectrum"].certificate.complete
+    assert 0.9 < names["accuracy"][names["needed"] - 1] < 0.91
+    # Myelin is high where the cortex is thin.
+    assert names["measured"] < -0.3
+    assert names["p_value"] < 0.01
+    assert np.isnan(names["on_left"]).sum() == 2796
+    assert Path("myelin.pdf").stat().st_size > 1000
+    read = es.io.read_fields("lh.modes.func.gii")["mode"]
+    np.testing.assert_array_equal(read, names["modes"].astype(np.float32))
+
+
 def test_the_page_from_scans_to_figures_runs(tmp_path, monkeypatch):
     """Its blocks follow one another, with the command between them, in an empty folder."""
     monkeypatch.chdir(tmp_path)
