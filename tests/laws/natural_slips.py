@@ -190,6 +190,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.compat.lapy.Solver: lambda: es.compat.lapy.Solver(
         SimpleNamespace(v=body().vertices, t=body().faces)
     ),
+    es.modes.BrainPrint: lambda: es.modes.brain_print({"lh": body(), "rh": bent()}, 9),
     es.modes.ParcelTree: lambda: es.modes.nodal_parcels(es.cotangent_laplacian(body()), 5),
     es.TriangleMesh: body,
     es.PointCloud: lambda: es.PointCloud(body().vertices),
@@ -392,6 +393,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "vertices": lambda: np.arange(3),
     "view": lambda: [0.0, 0.0, 1.0],
     "winding_numbers.points": lambda: bent().vertices,
+    "brain_print.surfaces": lambda: {"left": body()},
     "figure_cortex.surfaces": lambda: {"left": body()},
     "figure_cortex.values": lambda: {"left": height()},
     "figure_fields.fields": lambda: {"body": (body(), height())},

@@ -34,7 +34,9 @@ CLASSES = {
 # Calls whose answers hold the values that `Shared` has none of.
 CALLED = [
     "align_modes",
+    "brain_print",
     "compare_modes",
+    "condense",
     "nodal_parcels",
     "DepthCamera",
     "ShapeIndex",

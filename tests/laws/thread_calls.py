@@ -270,6 +270,11 @@ def decimated(v: Shared) -> tuple[object, ...]:
     return done, done.carry_values(v.heat), done.carry_labels(v.labels)
 
 
+def brain(v: Shared) -> es.modes.BrainPrint:
+    """Describe a brain of two structures."""
+    return es.modes.brain_print({"lh": v.animal, "rh": v.ball}, 9)
+
+
 def asked(v: Shared) -> tuple[object, ...]:
     """Ask the reader that all threads share."""
     snapshot = v.reader.snapshot(v.by_heat[0].recipe)
@@ -328,7 +333,9 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "find_duplicates": lambda v: es.retrieval.find_duplicates(es.ShapeIndex.open(v.index.folder)),
     "read_fields": lambda v: es.io.read_fields(v.folder / "fields.vtu"),
     "mask_surface": lambda v: es.geometry.mask_surface(v.animal, v.animal.vertices[:, 1] > 0),
-    "brain_print": lambda v: es.modes.brain_print({"lh": v.animal, "rh": v.ball}, 9).asymmetry(),
+    "brain_print": lambda v: es.modes.brain_print({"lh": v.animal, "rh": v.ball}, 9),
+    "BrainPrint.asymmetry": lambda v: brain(v).asymmetry(),
+    "BrainPrint.distances": lambda v: brain(v).distances(brain(v)),
     "condense": lambda v: es.features.condense(v.animal, v.heat),
     "parcellate": lambda v: es.features.parcellate(v.animal, v.heat, v.halves),
     "read_parcellation": lambda v: es.io.read_parcellation(v.folder / "halves.annot", v.animal),
