@@ -6,6 +6,7 @@ import type { Beside } from "./core/beside";
 import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile } from "./core/dom";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
+import { LargeNote } from "./large";
 import style from "./style.css?inline";
 
 /** What survives a reload of the page, in the storage of the tab. */
@@ -47,6 +48,7 @@ export class Studio {
   private readonly page = new Form(markup);
   readonly main = this.page.root;
   private readonly status = this.page.get("status");
+  private readonly large = new LargeNote(this);
   private readonly help = this.page.get<HTMLDialogElement>("help");
   private readonly shortcuts = new Map<string, { text: string; action: () => void }>();
   private readonly pages = new Map<string, { panel: Panel; tab: HTMLElement; page: HTMLElement }>();
@@ -102,6 +104,7 @@ export class Studio {
     const view = this.settings.get<View | null>("view", null);
     if (view && view.shape === this.state.shape) this.viewer.setView(view);
     for (const panel of this.panels) this.addPanel(panel);
+    if (this.state.notes.length) this.say(this.state.notes.join(" "));
     const usable = [...this.pages.keys()];
     const last = this.settings.get("panel", "");
     this.refreshPanels();
@@ -289,6 +292,7 @@ export class Studio {
   }
 
   private refreshPanels(): void {
+    this.large.refresh(this.state);
     for (const { panel } of this.pages.values()) panel.refresh(this.state);
   }
 
