@@ -80,6 +80,7 @@ def start_server(
     up: str = "auto",
     port: int = 0,
     sessions: Path | None = None,
+    *,
     setup: str = "",
 ) -> Iterator[tuple[str, int]]:
     """Serve the studio in a process of its own; yield its address and the number of the process.

@@ -33,7 +33,9 @@ def test_nothing_is_computed_of_a_large_shape_before_it_is_asked_for(page):
     assert {state[what]["status"] for what in ("health", "spectrum", "deformation")} == {"none"}
     assert state["health"]["lines"] == [["fair", "It has not been examined."]]
     found = page.error("rig", {"n_regions": 1}, {"region0": np.arange(9, dtype="<u4")})
-    assert found["message"] == "The shape must be prepared for bending: ask for it above the panels."
+    assert (
+        found["message"] == "The shape must be prepared for bending: ask for it above the panels."
+    )
     assert page.array("vertices").shape == (642, 3)
     found = page.call("finish", kind="examine")[0]["state"]
     assert found["spectrum"]["status"] == "none"
@@ -95,7 +97,7 @@ def test_a_large_shape_is_framed_as_the_whole_is(kind, monkeypatch):
 
 def test_what_cannot_be_opened_is_skipped_and_named(tmp_path):
     (tmp_path / "a.ply").write_text("not a mesh")
-    with pytest.raises(es.FileFormatError, match="a.ply"):
+    with pytest.raises(es.FileFormatError, match=r"a\.ply"):
         open_workspace([tmp_path])
     es.write_mesh(es.icosphere(1), tmp_path / "b.ply")
     first = open_workspace([tmp_path])

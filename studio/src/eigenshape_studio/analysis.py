@@ -67,7 +67,8 @@ class Analysis:
         mesh = self.mesh
         self.health.start()  # Weyl's law takes the area
         if k == self._n_modes and not self.spectrum.begun:
-            return self.spectrum.start()  # the rig takes the same
+            self.spectrum.start()  # which the rig takes, too
+            return
         self.spectrum.cancel()
         self.spectrum = Job(lambda progress: _solve(mesh, k, progress))
 

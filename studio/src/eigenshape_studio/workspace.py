@@ -640,7 +640,9 @@ class Workspace:
             if not np.isnan(field.values[source]).all()
         }
         name = f"{self.analysis.name}, lighter"
-        self.history.show(Loaded(thin, fields=fields, side=self.analysis.side), name, "Lighter copy")
+        self.history.show(
+            Loaded(thin, fields=fields, side=self.analysis.side), name, "Lighter copy"
+        )
         self._warnings.append(f"{thin.n_vertices:,} of {n_vertices:,} vertices were kept.")
 
     def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
