@@ -1,6 +1,6 @@
 """The studio in a real browser: how soon it answers, what a frame costs, and whether it grows.
 
-    python benchmarks/bench_studio.py                  25,000 and 100,000 vertices; some minutes
+    python benchmarks/bench_studio.py                  5,000 to a million vertices; some minutes
     python benchmarks/bench_studio.py --quick          2,500 vertices, half a minute
     python benchmarks/bench_studio.py --minutes 10     then ten minutes of work by a script
 
@@ -25,9 +25,11 @@ from playwright.sync_api import Browser, Page
 from report import Report, Row, options_of
 from studio_pages import (
     THREE,
+    browser_cpu,
     browser_processes,
     frame_cpu,
     page_memory,
+    peak_memory,
     process_memory,
     serve_plain,
 )
@@ -43,9 +45,11 @@ from hatch_build import install_packages  # noqa: E402
 PACKAGES = ["eigenshape", "eigenshape-studio", "playwright", "numpy", "scipy", "numba"]
 COLUMNS = ("shape", "figure", "measured", "aim")
 FULL, QUICK = (25_000, 100_000, 20_000), (2_500, 3_000, 2_000)  # drag, first picture, report
+SIZES, QUICK_SIZES = (5_000, 25_000, 100_000, 1_000_000), (2_000, 8_000)
 N_FRAMES = 30
 WARM = 120.0  # seconds of work after which memory may no longer grow
 BEAST = "giraffe"
+LARGEST_CREATURE = 100_000  # vertices; larger shapes are subdivided
 # Resolves with the seconds from the end of the next stroke of the pointer until regions can be moved.
 WATCH = """() => {
     const { root } = PANEL.form;
@@ -214,6 +218,43 @@ def measure_opening(browser: Browser, folder: Path, n_vertices: int) -> list[Row
         ]
 
 
+def measure_size(browser: Browser, folder: Path, n_vertices: int) -> list[Row]:
+    """Measure what the first picture of a shape costs, and a frame of it.
+
+    The server starts to compute a spectrum meanwhile unless the shape is large, and that counts.
+    """
+    path = folder / "size.ply"
+    halvings = 3 if n_vertices > LARGEST_CREATURE else 0
+    mesh = es.make_creature(BEAST, n_vertices=n_vertices // 4**halvings)
+    for _ in range(halvings):
+        mesh = es.geometry.subdivide(mesh)
+    es.write_mesh(mesh, path)
+    before = browser_cpu()
+    with (
+        studio.start_server(path) as (url, number),
+        studio.open_page(browser, url, ready="true") as page,
+    ):
+        drawn = f"window.eigenshape?.viewer.renderer.info.render.triangles >= {len(mesh.faces)}"
+        studio.wait_until(page, drawn, 300)
+        server = psutil.Process(number)
+        cpu = browser_cpu() - before + sum(server.cpu_times()[:2])
+        memory = peak_memory(server)
+        studio.wait_until_still(page)
+        held = process_memory(browser_processes())
+        server.suspend()  # only the browser shall work now
+        million = n_vertices > LARGEST_CREATURE
+        step = "() => eigenshape.viewer.invalidate()"
+        frame = frame_cpu(page, step, N_FRAMES // 6 if million else N_FRAMES)
+        server.resume()
+    most_cpu, most_memory = (10, 1430) if million else (None, None)
+    return [
+        row(mesh.n_vertices, "CPU to the first picture", cpu, most=most_cpu),
+        row(mesh.n_vertices, "most memory of the server until then", memory, "MiB", most_memory),
+        row(mesh.n_vertices, "memory of the browser", held, "MiB"),
+        row(mesh.n_vertices, "CPU of a frame", 1000 * frame, "ms"),
+    ]
+
+
 def measure_report(folder: Path, n_vertices: int) -> list[Row]:
     """Measure the size of a report."""
     mesh = es.make_creature(BEAST, n_vertices=n_vertices)
@@ -309,7 +350,7 @@ def main() -> None:
     parser.add_argument(
         "--minutes", type=float, default=0.0, help="of work by a script, for the memory; none"
     )
-    parser.add_argument("--only", choices=["drag", "opening", "report", "work"])
+    parser.add_argument("--only", choices=["drag", "opening", "sizes", "report", "work"])
     options = parser.parse_args()
     if not THREE.exists():
         install_packages()
@@ -320,6 +361,11 @@ def main() -> None:
         parts: dict[str, Callable[[], list[Row]]] = {
             "drag": lambda: measure_drag(browser, folder, drag, options.repeats),
             "opening": lambda: measure_opening(browser, folder, large),
+            "sizes": lambda: [
+                found
+                for size in (QUICK_SIZES if options.quick else SIZES)
+                for found in measure_size(browser, folder, size)
+            ],
             "report": lambda: measure_report(folder, reported),
             "work": lambda: work_for(browser, folder, options.minutes) if options.minutes else [],
         }

@@ -101,6 +101,12 @@ def page_memory(page: Page) -> float:
     return (held["usedSize"] + held.get("backingStorageSize", 0.0)) / 2**20
 
 
+def peak_memory(process: psutil.Process) -> float:
+    """Return the most MiB that a process has held so far (Linux)."""
+    status = Path(f"/proc/{process.pid}/status").read_text()
+    return int(status.partition("VmHWM:")[2].split()[0]) / 2**10
+
+
 def process_memory(processes: list[psutil.Process]) -> float:
     """Return the MiB that processes hold for themselves alone."""
     return sum(process.memory_full_info().uss for process in processes) / 2**20

@@ -82,12 +82,17 @@ def start_server(
     up: str = "auto",
     port: int = 0,
     sessions: Path | None = None,
+    *,
+    setup: str = "",
 ) -> Iterator[tuple[str, int]]:
-    """Serve the studio in a process of its own; yield its address and the number of the process."""
+    """Serve the studio in a process of its own; yield its address and the number of the process.
+
+    That process begins with the code in `setup`.
+    """
     build_page()
     folder = tempfile.TemporaryDirectory()
     options = [str(index or ""), view, up, str(port), str(sessions or folder.name)]
-    command = [sys.executable, "-c", SERVE, str(mesh or ""), *options]
+    command = [sys.executable, "-c", setup + SERVE, str(mesh or ""), *options]
     with folder, subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             yield str(process.stdout.readline().strip()), process.pid  # type: ignore[union-attr]

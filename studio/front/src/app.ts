@@ -8,6 +8,7 @@ import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile 
 import type { Film } from "./core/film";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
+import { LargeNote } from "./large";
 import { DeformPanel } from "./panels/deform/deform";
 import { Strip } from "./strip";
 import style from "./style.css?inline";
@@ -56,6 +57,7 @@ export class Studio {
   private readonly page = new Form(markup);
   readonly main = this.page.root;
   private readonly status = this.page.get("status");
+  private readonly large = new LargeNote(this);
   private readonly help = this.page.get<HTMLDialogElement>("help");
   private readonly shortcuts = new Map<string, { text: string; action: () => void }>();
   private readonly pages = new Map<string, { panel: Panel; tab: HTMLElement; page: HTMLElement }>();
@@ -120,6 +122,7 @@ export class Studio {
     if (view && view.shape === this.state.shape) this.viewer.setView(view);
     for (const panel of this.panels) this.addPanel(panel);
     this.strip = new Strip(this);
+    if (this.state.notes.length) this.say(this.state.notes.join(" "));
     const usable = [...this.pages.keys()];
     // Whoever brings values wants to see them.
     const last = this.settings.get("panel", this.state.values.length ? "shape" : "");
@@ -366,6 +369,7 @@ export class Studio {
   }
 
   private refreshPanels(): void {
+    this.large.refresh(this.state);
     for (const { panel } of this.pages.values()) panel.refresh(this.state);
   }
 

@@ -54,10 +54,29 @@ if (data) {
   inlineBackend(data).then((backend) => fillWindow(backend, settings));
 } else if (document.getElementById("eigenshape-studio")) {
   const settings = new Settings(sessionStorage);
-  // The server knows the session of a tab by a number, which survives a reload.
-  const tab = settings.get("tab", "") || crypto.randomUUID();
+  nameTab(settings).then((tab) => fillWindow(httpBackend(tab), settings));
+}
+
+/** Return the number by which the server knows the session of this tab; it survives a reload. */
+async function nameTab(settings: Settings): Promise<string> {
+  const known = settings.get("tab", "");
+  // A browser that duplicates a tab copies its storage, but two tabs must not share a session.
+  if (known && (await holdName(known, 500))) return known;
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  const tab = Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
   settings.set("tab", tab);
-  fillWindow(httpBackend(tab), settings);
+  holdName(tab, 500);
+  return tab;
+}
+
+/** Hold a name as long as this page is open; false if another page holds it for so many ms. */
+function holdName(name: string, patience: number): Promise<boolean> {
+  if (!navigator.locks) return Promise.resolve(true); // on another machine, without TLS
+  const signal = AbortSignal.timeout(patience); // a page that is loaded again leaves it at once
+  return new Promise((resolve) => {
+    const hold = () => new Promise<void>(() => resolve(true));
+    navigator.locks.request(`eigenshape ${name}`, { signal }, hold).catch(() => resolve(false));
+  });
 }
 
 /** Show the studio in the output of a notebook's cell (anywidget). */

@@ -33,10 +33,14 @@ class Job(Generic[T]):
         Called as work(progress); `progress` takes the fraction done and a short message.
     shared : bool
         Whether several tabs wait for the job, so that none may cancel it.
+    begin : bool
+        Whether it begins now; otherwise with the first call of `start` or `wait`.
     """
 
-    def __init__(self, work: Callable[[Progress], T], *, shared: bool = False) -> None:
-        self.status: Status = "running"
+    def __init__(
+        self, work: Callable[[Progress], T], *, shared: bool = False, begin: bool = True
+    ) -> None:
+        self.status: Status = "none"
         self.progress = 0.0
         self.message = ""
         self.shared = shared
@@ -45,6 +49,17 @@ class Job(Generic[T]):
         self._result: T | None = None
         self._cancelled = threading.Event()
         self._done = threading.Event()
+        self._starting = threading.Lock()
+        self.begun = False
+        if begin:
+            self.start()
+
+    def start(self) -> None:
+        """Begin, unless it has begun."""
+        with self._starting:
+            if self.begun:
+                return
+            self.begun, self.status = True, "running"
         threading.Thread(target=self._run, daemon=True).start()
 
     @property
@@ -54,11 +69,12 @@ class Job(Generic[T]):
 
     def cancel(self) -> None:
         """Stop the work at its next report of progress, unless it is shared."""
-        if not self.shared:
+        if self.begun and not self.shared:
             self._cancelled.set()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the work has ended; return whether it has."""
+        """Begin if that was not done, and wait until the work has ended; return whether it has."""
+        self.start()
         return self._done.wait(timeout)
 
     def facts(self) -> dict[str, Any]:

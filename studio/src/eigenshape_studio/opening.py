@@ -29,7 +29,7 @@ def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = 
     Raises
     ------
     FileFormatError
-        If the first shape cannot be read.
+        If no shape can be read; those before the first readable one are left out with a note.
     InvalidParameterError
         If a folder has no shape.
     """
@@ -56,12 +56,34 @@ def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = 
         workspace = Workspace(sample_mesh(SAMPLES[0]), SAMPLES[0], index=index, shared=True)
         workspace.welcome = True
         return workspace
-    # All tabs share what is computed of the first one; of the others each tab has its own.
+    first, notes = _open_first(found)
     listed = [
-        Shape(number, name, partial(load_file, path), path=str(path), shared=number == 0)
-        for number, (name, path) in enumerate(found[:MOST_LISTED])
+        Shape(number, name, partial(load_file, path), path=str(path))
+        for number, (name, path) in enumerate(found[1:MOST_LISTED], 1)
     ]
-    return Workspace(listed, index=index, shared=True)
+    workspace = Workspace([first, *listed], index=index, shared=True)
+    workspace.notes = notes
+    return workspace
+
+
+def _open_first(found: list[tuple[str, Path]]) -> tuple[Shape, list[str]]:
+    """Return the first shape that can be read, and why those before it, which are removed, cannot.
+
+    All tabs share what is computed of it; of the others each tab has its own.
+    """
+    notes: list[str] = []
+    while True:
+        name, path = found[0]
+        shape = Shape(0, name, partial(load_file, path), path=str(path), shared=True)
+        try:
+            shape.analysis  # noqa: B018  it is read now
+        except (es.EigenshapeError, OSError) as error:
+            if len(found) == 1:
+                raise
+            notes.append(f"{name} cannot be opened: {error}")
+            del found[0]
+        else:
+            return shape, notes
 
 
 def _index_in(folder: Path) -> es.ShapeIndex | None:

@@ -15,7 +15,15 @@ import numpy as np
 
 import eigenshape as es
 from eigenshape.deformation.rig import pose_rig
-from eigenshape_studio.analysis import N_MODES, Analysis, cut_rows, diagram_rows, vertex_labels
+from eigenshape.geometry.resolution.thinning import thin_out
+from eigenshape_studio.analysis import (
+    LIGHT,
+    N_MODES,
+    Analysis,
+    cut_rows,
+    diagram_rows,
+    vertex_labels,
+)
 from eigenshape_studio.calls import Arrays, Reply, RequestError, file_bytes, whole
 from eigenshape_studio.company import Company
 from eigenshape_studio.history import History, Pose, Shape
@@ -113,6 +121,7 @@ class Workspace:
         self.matches: list[str] = []  # names, of the last query
         self._searched: tuple[Any, Reply] | None = None  # for what, and what was found
         self.specimens: Specimens | None = None  # of the collection that the studio was opened with
+        self.notes: list[str] = []  # what the page says when it is opened
         self.mode = "graded"
         self.welcome = False  # whether the page offers samples first
         self._begin()
@@ -212,6 +221,8 @@ class Workspace:
             "capabilities": capabilities,
             "most_bytes": self.most_bytes,
             "suffixes": ",".join(es.io.SHAPE_FORMATS),
+            "notes": self.notes,
+            "large": analysis.large_facts(),
             "health": analysis.health_facts(),
             "values": [_field_facts(name, field) for name, field in self.fields.items()],
             "spectrum": analysis.spectrum_facts(),
@@ -434,7 +445,8 @@ class Workspace:
         if job.status == "running":
             raise PreparingError("The shape is being prepared for bending.")
         if job.result is None:
-            raise RequestError(f"The shape must be prepared for bending: {job.message}")
+            why = job.message or "ask for it above the panels."
+            raise RequestError(f"The shape must be prepared for bending: {why}")
         return job.result
 
     def _require_shelf(self) -> Shelf:
@@ -496,6 +508,9 @@ class Workspace:
             "repair": self._repair,
             "open": self._open,
             "solve": self._solve,
+            "examine": lambda *_: self.analysis.health.start(),
+            "prepare": lambda *_: self.analysis.prepare(),
+            "lighten": self._lighten,
             "parts": lambda *_: self.analysis.find_parts(),
             "transfer": self._transfer,
             "choose": self._choose,
@@ -644,6 +659,21 @@ class Workspace:
         loaded = Loaded(done.mesh, kept, side=self.analysis.side)
         self.history.show(loaded, self.analysis.name, f"Repair: {', '.join(names)}")
         self._warnings += done.report
+
+    def _lighten(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+        """Show a copy of the shape in its present pose that has fewer vertices."""
+        n_vertices = self.mesh.n_vertices
+        thin, source = thin_out(self.mesh, LIGHT)
+        fields = {
+            name: replace(field, values=field.values[source])
+            for name, field in self.fields.items()
+            if not np.isnan(field.values[source]).all()
+        }
+        name = f"{self.analysis.name}, lighter"
+        self.history.show(
+            Loaded(thin, fields=fields, side=self.analysis.side), name, "Lighter copy"
+        )
+        self._warnings.append(f"{thin.n_vertices:,} of {n_vertices:,} vertices were kept.")
 
     def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
         """Show the mesh of a file, a sample, or a shape of the index by its name."""

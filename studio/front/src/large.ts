@@ -1,0 +1,28 @@
+/** A note above the panels while a large shape waits to be examined, with what can be asked for. */
+
+import type { Studio } from "./app";
+import type { State } from "./core/backend";
+import { Form } from "./core/dom";
+import markup from "./large.html?raw";
+
+export class LargeNote {
+  private readonly form = new Form(markup);
+
+  constructor(app: Studio) {
+    const ask = (kind: string, text: string) => () => app.change({ kind }, text);
+    this.form.on({
+      lighten: ask("lighten", "Making a lighter copy"),
+      examine: ask("examine", "Starting to examine"),
+      prepare: ask("prepare", "Starting to compute"),
+    });
+    app.main.querySelector("[data-test=panels]")!.before(this.form.root);
+  }
+
+  refresh({ large, health, deformation, capabilities }: State): void {
+    const { form } = this;
+    form.root.hidden = !large || !capabilities.includes("finish");
+    form.text("large-text", large);
+    form.get("examine").hidden = health.status !== "none";
+    form.get("prepare").hidden = deformation.status !== "none";
+  }
+}
