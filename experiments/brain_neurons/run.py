@@ -117,23 +117,23 @@ def main() -> None:
             "split twice": measure_large(files[0], 2, MODES[-1], exact=True),
             "split four times": measure_large(files[0], 4, MODES[-1], exact=False),
         }
-    figure, (axes,) = chart()
-    for (name, row), color in zip(neurons.items(), COLORS, strict=False):
-        counts = row["regions"]
-        axes.loglog(
-            list(counts.values()), [float(tolerance) for tolerance in counts], color=color,
-            label=name, marker=".",
-        )  # fmt: skip
-    label(
-        axes,
-        "regions",
-        "share of the variance of log heat that is lost",
-        "condensed heat of five neurons, one piece each, 8 times",
-    )
-    pictures = {"regions": figure}
+    pictures = {"regions": plot_regions(neurons)}
     if not arguments.quick:
         pictures |= draw(files[0])
     finish(rounded(results), pictures, arguments)
+
+
+def plot_regions(neurons: dict[str, dict[str, Any]]) -> Figure:
+    """Plot the number of regions against the share of the variance that they lose."""
+    figure, (axes,) = chart()
+    for (name, row), color in zip(neurons.items(), COLORS, strict=False):
+        lost = [float(tolerance) for tolerance in row["regions"]]
+        axes.loglog(list(row["regions"].values()), lost, color=color, label=name, marker=".")
+    label(
+        axes, "regions", "share of the variance of log heat that is lost",
+        "condensed heat of neurons, of the largest piece, at eight times",
+    )  # fmt: skip
+    return figure
 
 
 def draw(path: Path) -> dict[str, Figure]:
@@ -149,7 +149,7 @@ def draw(path: Path) -> dict[str, Figure]:
             (
                 "condensed",
                 regions.values[regions.labels, 2],
-                f"its means over {len(regions.areas)} regions",
+                f"log heat, means over {len(regions.areas)} regions",
             ),
         )
     }

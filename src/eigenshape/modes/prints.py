@@ -37,8 +37,8 @@ class BrainPrint(ReadOnly):
     >>> ball = es.icosphere(3)
     >>> egg = es.TriangleMesh(ball.vertices * [1, 1, 1.3], ball.faces)
     >>> found = es.modes.brain_print({"Left-Caudate": ball, "Right-Caudate": egg}, 20)
-    >>> {name: round(value, 1) for name, value in found.asymmetry().items()}
-    {'Left-Caudate': 8.0}
+    >>> {name: round(value) for name, value in found.asymmetry().items()}
+    {'Left-Caudate': 6}
     """
 
     names: tuple[str, ...]
