@@ -103,7 +103,7 @@ def shape_tensors(
             "A bundle must be of the shape beside it; it has "
             f"{len(bundle.mass)} points and the shape has {len(points)}."
         )
-    kept = None if labels is None else torch.as_tensor(np.asarray(labels))
+    kept = None if labels is None else torch.tensor(np.asarray(labels))
     places = torch.tensor(points, dtype=dtype)
     return ShapeTensors(places, **bundle_tensors(bundle, dtype), labels=kept, sizes=(len(points),))
 
