@@ -42,19 +42,19 @@ def main() -> None:
 
 def isospectralize(*, small: bool):
     """Move a sphere until its lowest eigenvalues are those of another shape (Cosmo and others 2019)."""
-    start, k = es.icosphere(2 if small else 3), 12 if small else 20
+    start, k = es.icosphere(2 if small else 3), 12 if small else 16
     x, y, z = start.vertices.T
     target = es.TriangleMesh(
         np.column_stack([1.3 * x, 0.9 * y * (1 + 0.3 * x), 0.7 * z]), start.faces
     )
     wanted = et.solve_spectrum(target.vertices, target.faces, k).eigenvalues
-    # Smooth moves alone: coefficients in the low eigenfunctions of the sphere.
-    basis = es.solve_spectrum(es.cotangent_laplacian(start), 25).eigenvectors
-    basis = torch.tensor(basis[:, 1:])
+    # Smooth moves alone: by low eigenfunctions of the sphere, the lower the farther.
+    low = es.solve_spectrum(es.cotangent_laplacian(start), 25)
+    basis = torch.tensor(low.eigenvectors[:, 1:] * (2 / low.eigenvalues[1:]))
     moves = (1e-3 * torch.randn(24, 3, dtype=torch.float64)).requires_grad_()
     optimizer = torch.optim.Adam([moves], lr=0.02)
     losses = []
-    for _ in range(40 if small else 150):
+    for _ in range(40 if small else 100):
         optimizer.zero_grad()
         vertices = torch.tensor(start.vertices) + basis @ moves
         loss = et.spectral_loss(et.solve_spectrum(vertices, start.faces, k), wanted)
@@ -80,7 +80,7 @@ def denoise(*, small: bool):
     wanted = et.solve_spectrum(clean.vertices, clean.faces, 60).eigenvalues
     vertices = torch.tensor(noisy.vertices, requires_grad=True)
     optimizer = torch.optim.Adam([vertices], lr=0.02 * length)
-    for _ in range(30 if small else 120):
+    for _ in range(30 if small else 60):
         optimizer.zero_grad()
         spectrum = et.solve_spectrum(vertices, clean.faces, 60)
         stay = (vertices - torch.tensor(noisy.vertices)).square().mean() / length**2
@@ -146,8 +146,8 @@ def heat_features(shape: et.ShapeTensors) -> torch.Tensor:
 
 def segment(*, small: bool):
     """Train DiffusionNet to name the parts of quadrupeds, and test it on other individuals and poses."""
-    n, k, rounds = (500, 24, 12) if small else (800, 32, 40)
-    n_train, n_test = (4, 2) if small else (12, 6)
+    n, k, rounds = (500, 24, 12) if small else (800, 32, 30)
+    n_train, n_test = (4, 2) if small else (10, 5)
     train = [learned_shape(pose, pose, n, k)[1] for pose in range(1, n_train + 1)]
     tests = [learned_shape(pose, pose, n, k) for pose in range(101, 101 + n_test)]
     network = et.DiffusionNet(16, len(PARTS), width=16, n_blocks=2)

@@ -1,5 +1,7 @@
 """Shapes as tensors: what networks on surfaces take, one by one and in batches."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -48,7 +50,7 @@ class ShapeTensors:
     labels: Tensor | None = None
     sizes: tuple[int, ...] = ()
 
-    def to(self, place: Any) -> "ShapeTensors":
+    def to(self, place: Any) -> ShapeTensors:
         """Return the shape on another device, or with numbers of another precision."""
         moved: dict[str, Any] = {
             each.name: getattr(self, each.name).to(place)
