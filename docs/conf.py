@@ -3,7 +3,10 @@
 import inspect
 import re
 import sys
+from importlib import import_module
 from pathlib import Path
+
+from sphinx.ext.autodoc.mock import mock
 
 import eigenshape as es
 
@@ -32,6 +35,8 @@ myst_heading_anchors = 4
 
 autosummary_generate = True
 autodoc_member_order = "bysource"
+MOCKED = ["torch", "torch_geometric"]  # of the room for learning: the site is built without them
+autodoc_mock_imports = MOCKED
 autodoc_typehints = "none"  # docstrings give types and shapes
 napoleon_google_docstring = False
 napoleon_use_rtype = False
@@ -77,6 +82,11 @@ def write_api_pages() -> None:
         for inner in room.__all__
         if inspect.ismodule(getattr(room, inner))
     ]
+    with mock(MOCKED):
+        torch_room = import_module("eigenshape.torch")
+        for name in torch_room.__all__:
+            getattr(torch_room, name)
+    rooms.append(("torch", torch_room))
     for name, room in [("eigenshape", es), *rooms]:
         title = "The short door" if room is es else f"eigenshape.{name}"
         summary = (inspect.getdoc(room) or "").split("\n\n")

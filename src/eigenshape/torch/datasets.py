@@ -1,5 +1,7 @@
 """A torch data set of the shapes in a folder, with their operators."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """Geodesic distances by heat, differentiable in the vertices."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Shapes as tensors: what networks on surfaces take, one by one and in batches."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -48,7 +50,7 @@ class ShapeTensors:
     labels: Tensor | None = None
     sizes: tuple[int, ...] = ()
 
-    def to(self, place: Any) -> "ShapeTensors":
+    def to(self, place: Any) -> ShapeTensors:
         """Return the shape on another device, or with numbers of another precision."""
         moved: dict[str, Any] = {
             each.name: getattr(self, each.name).to(place)
@@ -103,7 +105,7 @@ def shape_tensors(
             "A bundle must be of the shape beside it; it has "
             f"{len(bundle.mass)} points and the shape has {len(points)}."
         )
-    kept = None if labels is None else torch.as_tensor(np.asarray(labels))
+    kept = None if labels is None else torch.tensor(np.asarray(labels))
     places = torch.tensor(points, dtype=dtype)
     return ShapeTensors(places, **bundle_tensors(bundle, dtype), labels=kept, sizes=(len(points),))
 

@@ -1,5 +1,7 @@
 """Certified eigenpairs in torch, and their gradients by implicit differentiation."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any
 
