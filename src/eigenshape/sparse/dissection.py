@@ -28,12 +28,13 @@ FINE = 64
 SEGMENTS_TO_SHARE = 16
 # and points of a segment that is worth a thread.
 WORTH_A_THREAD = 4000
-# Neighbors a point, itself included, and the square of the points on a cut, over those that it cuts,
-# from which on these are of a solid: surfaces have 7 and 3, or 19 and 12 where second neighbors are
-# joined, tetrahedra 14 and more the more they are. The separators of a solid are most of its factor,
-# so that other cuts compete there and the best is narrowed: 0.4 of the multiplications are left. On
-# surfaces 0.9 would be (measured), which costs more than it saves.
-DENSE, SOLID_CUT = 10, 16
+# Neighbors a point, itself included, from which on a graph may be that of a solid: surfaces have 7,
+# tetrahedra 14. It is one if the square of the points on a cut exceeds these neighbors times the
+# points that are cut: on surfaces it is half as much, however far their neighbors reach. The
+# separators of a solid are most of its factor, so that other cuts compete there and the best is
+# narrowed: 0.4 of the multiplications are left. On surfaces 0.9 would be (measured), which costs
+# more than it saves.
+DENSE = 10
 # Points far apart whose distances make the keys in a solid. In a cube these are corners, and the cut
 # across the diagonal of the first two is larger than others.
 SOLID_ENDS = 4
@@ -101,7 +102,9 @@ class _Dissection:
     def __init__(self, indptr: Indices, indices: Indices, leaf: int) -> None:
         n = len(indptr) - 1
         self.graph, self.leaf = (indptr, indices), leaf
-        self.dense = len(indices) >= DENSE * n
+        neighbors = len(indices) / max(n, 1)
+        # Points on a cut, squared, over the points that it cuts, from which on these are of a solid
+        self.solid_cut = neighbors if neighbors >= DENSE else np.inf
         self.rows = sp.csr_array((np.ones(len(indices)), indices, indptr), shape=(n, n))
         self.nodes, self.place = np.arange(n), np.arange(n)  # nodes[place[v]] = v
         # The name of the segment that a point lies in; -1 when its place is final.
@@ -192,7 +195,7 @@ class _Dissection:
                     take_sides(*graph, points, owner, name, key, level, not from_below, side)
             distances.append(latest)
             n_cut = np.count_nonzero(side == CUT)
-            solid = solid or bool(self.dense and n_cut**2 > SOLID_CUT * size)
+            solid = solid or bool(n_cut**2 > self.solid_cut * size)
             if n_before == 1 and not solid:
                 break
         else:
