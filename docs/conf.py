@@ -52,6 +52,7 @@ sphinx_gallery_conf = {
     "doc_module": ("eigenshape",),
     "backreferences_dir": "gallery/backreferences",
     "show_signature": False,
+    "remove_config_comments": True,
     "write_computation_times": False,
     "download_all_examples": False,
     "abort_on_example_error": True,

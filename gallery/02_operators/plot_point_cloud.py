@@ -35,3 +35,4 @@ dots = axes.scatter(
 axes.set_aspect("equal")
 axes.set_axis_off()
 figure.colorbar(dots, label="eigenfunction of the points")
+# sphinx_gallery_thumbnail_number = 2

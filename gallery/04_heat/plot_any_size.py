@@ -32,3 +32,4 @@ left.legend()
 # The first of its numbers on the whole shape.
 
 es.figure_field(animal, free[:, 0], "scale-invariant signature, frequency 0", color_map="magma")
+# sphinx_gallery_thumbnail_number = 2

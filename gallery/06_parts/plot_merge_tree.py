@@ -24,3 +24,4 @@ es.figure_segments(hand, regions.labels, regions.features.vertices, view="front"
 # The persistence diagram of the same function: the farther from the diagonal, the longer it lasts.
 
 es.plot.figure_diagram(es.features.persistence_diagram(hand, heat), label="heat")
+# sphinx_gallery_thumbnail_number = 2

@@ -39,3 +39,4 @@ es.plot.figure_fields(
     up="y",
     color_map="turbo",
 )
+# sphinx_gallery_thumbnail_number = 2

@@ -42,3 +42,4 @@ areas = latent.differences("area")
 change = areas[groups == 1].mean(axis=0) - areas[groups == 0].mean(axis=0)
 region = es.spectral.difference_regions(latent, 0, change)
 es.figure_field(bodies[0], region, "more area in the second group", view="front", color_map="magma")
+# sphinx_gallery_thumbnail_number = 2

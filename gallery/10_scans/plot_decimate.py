@@ -27,3 +27,4 @@ axes.legend()
 # The meshes themselves.
 
 es.plot.figure_poses(poses)
+# sphinx_gallery_thumbnail_number = 2

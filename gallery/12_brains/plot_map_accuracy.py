@@ -37,3 +37,4 @@ for count in (10, 50, 200):
     fields[f"{count} modes"] = (part.mesh, rebuilt)
 limits = tuple(np.quantile(values, [0.02, 0.98]))
 es.plot.figure_fields(fields, "myelin", view=[-1, 0, 0], up="z", color_map="magma", limits=limits)
+# sphinx_gallery_thumbnail_number = 2

@@ -41,3 +41,4 @@ for i in range(2):
     fields[f"random map {i + 1}"] = (part.mesh, nulls[:, i])
 limits = tuple(np.quantile(myelin, [0.02, 0.98]))
 es.plot.figure_fields(fields, view=[-1, 0, 0], up="z", color_map="magma", limits=limits)
+# sphinx_gallery_thumbnail_number = 2

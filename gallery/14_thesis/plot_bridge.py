@@ -36,3 +36,4 @@ axes.set(xlabel="radius of the neck, length", ylabel="eigenvalue, 1/length²")
 # The second eigenvalue goes to 0 with the neck, if slowly: there are two shapes then.
 
 es.plot.figure_poses({name: shapes[name] for name in ("neck 0.02", "neck 0.12", "neck 0.4")})
+# sphinx_gallery_thumbnail_number = 2
