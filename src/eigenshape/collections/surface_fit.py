@@ -12,7 +12,6 @@ from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import EigenshapeError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.collections.alignment import (
-    CLEAR_SIDE,
     MIRROR,
     ON_SURFACE,
     Side,
@@ -60,6 +59,8 @@ FOLDED = 0.3
 # which a form is of another kind: skulls of mice have 0.01 to 0.02, creatures in another pose 0.01
 # to 0.04, other kinds 0.25 to 0.55.
 POSES_DIFFER, NOT_ALIKE = 0.03, 0.15
+# Misfit of one side in another pose, as a share of that of the other one, that tells which it is
+CLEAR_MISFIT = 0.7
 
 
 @record
@@ -185,7 +186,7 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
         posed = [found for side in sides if (found := _fit_posed(source, target, side))]
         if len(posed) == 2:
             upright, reflected = (each.misfit for each in posed)
-            is_clear = upright < CLEAR_SIDE * reflected or reflected < CLEAR_SIDE * upright
+            is_clear = min(upright, reflected) < CLEAR_MISFIT * max(upright, reflected)
             # Of two that fit as well, the one that is not mirrored
             posed = (
                 [min(posed, key=lambda each: each.misfit)]
