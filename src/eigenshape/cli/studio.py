@@ -33,8 +33,8 @@ def studio(
     Parameters
     ----------
     shapes
-        Files, folders of files, or an index. The first shape is shown, and the others stand in a
-        list. By default a synthetic creature.
+        Files, folders of files, an index, or the folder of a collection. The first shape is shown,
+        and the others stand in a list; two stand side by side. By default a synthetic creature.
     index
         Folder of an index to search in.
     port
