@@ -13,6 +13,8 @@ const TILE = 192; // pixels of a side
 const TILES_A_FRAME = 4; // so that no frame takes long
 const GRID = 1024; // pixels: width of the picture that has a pixel for each vertex
 const GROUND = 96; // points of a side of the ground
+const DARKEST = 0.9;
+const FAINT = 0.035; // darkness that is not seen; a large faint shadow would double the time of a frame
 const REACH = 2.2; // side of the ground, in radii of the shape
 const MOST_FACES = 400_000; // beyond, drawing the shape 48 times would take seconds
 const ROUNDS = 8; // in which neighbors are averaged: 48 directions leave steps
@@ -26,12 +28,7 @@ const GROUND_ROUNDS = 60; // the same, on the ground, where shadows fall far
 export class Ambient {
   readonly ground: three.Mesh<three.PlaneGeometry, three.ShaderMaterial>;
   private readonly atlas: three.WebGLRenderTarget;
-  private readonly sky = new three.DataTexture(
-    new Uint8Array(GROUND * GROUND),
-    GROUND,
-    GROUND,
-    three.RedFormat,
-  );
+  private readonly grid: Uint32Array; // corners of all faces of the ground
   private readonly counter = new three.ShaderMaterial({
     glslVersion: three.GLSL3,
     vertexShader: ambientVertex,
@@ -69,9 +66,8 @@ export class Ambient {
       fragmentShader: groundFragment,
       transparent: true,
       depthWrite: false,
-      uniforms: { sky: { value: this.sky } },
     });
-    this.sky.minFilter = this.sky.magFilter = three.LinearFilter;
+    this.grid = Uint32Array.from(plane.index!.array);
     this.ground = new three.Mesh(plane, material);
     this.ground.visible = false;
     this.ground.renderOrder = -1;
@@ -103,7 +99,7 @@ export class Ambient {
 
   dispose(): void {
     this.stop();
-    for (const each of [this.atlas, this.sky, this.counter, this.caster]) each.dispose();
+    for (const each of [this.atlas, this.counter, this.caster]) each.dispose();
   }
 
   private clear(): void {
@@ -165,13 +161,29 @@ export class Ambient {
 
   /** Light the vertices and the ground by what they see. */
   private finish(): void {
-    const { surface, ground, sky } = this;
+    const { surface, ground } = this;
     const { faces } = surface;
     surface.replace("ambient", average(this.count(surface), faces, ROUNDS));
-    const grid = ground.geometry.index!.array;
-    sky.image.data!.set(average(this.count(ground), grid, GROUND_ROUNDS));
-    sky.needsUpdate = ground.visible = true;
+    this.darken(average(this.count(ground), this.grid, GROUND_ROUNDS));
+    ground.visible = true;
     this.onDone();
+  }
+
+  /** Make the ground dark where it sees little of the sky; where it is not dark it is not drawn. */
+  private darken(sky: Uint8Array): void {
+    const { geometry } = this.ground;
+    const places = geometry.getAttribute("uv");
+    const dark = Float32Array.from(sky, (share, point) => {
+      const away = 2 * Math.hypot(places.getX(point) - 0.5, places.getY(point) - 0.5);
+      const fading = 1 - three.MathUtils.smoothstep(away, 0.5, 1); // it ends before the rim
+      return Math.max(0, DARKEST * (1 - share / 255) * fading - FAINT);
+    });
+    geometry.setAttribute("dark", new three.BufferAttribute(dark, 1));
+    const isDark = (_: number, place: number) => {
+      const first = place - (place % 3);
+      return this.grid.subarray(first, first + 3).some((point) => dark[point]! > 0);
+    };
+    geometry.setIndex(new three.BufferAttribute(this.grid.filter(isDark), 1));
   }
 
   /** Return, for each vertex of an object, how much of the sky it sees. */

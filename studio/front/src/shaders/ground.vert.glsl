@@ -1,5 +1,6 @@
-out vec2 v_place; // from -1 to 1
+in float dark;
+out float v_dark;
 void main() {
-  v_place = vec2(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y); // rows of three.js begin above
+  v_dark = dark;
   gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0));
 }
