@@ -62,6 +62,7 @@ export class Limbs implements PointerTool {
   get hint(): string {
     const { deformation, parts } = this.app.state;
     if ([deformation, parts].some(({ status }) => status === "failed")) return NO_LIMBS;
+    if (deformation.status === "none") return "A shape as large as this is prepared for bending on request; see above.";
     if (deformation.status !== "ready") return "The shape is being prepared for bending …";
     if (!this.labels) return "Its limbs are being found …";
     return this.labels.some((label) => label !== this.body) ? HINT : NO_LIMBS;
