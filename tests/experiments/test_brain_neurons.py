@@ -34,3 +34,11 @@ def test_a_hundred_regions_hold_the_heat():
     for row in NEURONS.values():
         assert row["regions"]["0.05"] < 60
         assert row["regions"]["0.01"] < 150
+
+
+def test_the_stated_error_bounds_the_true_one():
+    large = EXPECTED["full"]["large"]
+    assert large["split four times"]["vertices"] > 1_000_000
+    assert large["split four times"]["stated error"] < 0.01
+    assert large["split twice"]["true error"] < large["split twice"]["stated error"]
+    assert large["split four times"]["regions"] == large["split twice"]["regions"]

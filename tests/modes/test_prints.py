@@ -35,7 +35,7 @@ def test_what_is_wrong_is_named():
     with pytest.raises(InvalidParameterError, match="must hold a structure; there is none"):
         brain_print({})
     twice = es.TriangleMesh(BALL.vertices, [*BALL.faces, BALL.faces[0]])
-    with pytest.raises(InvalidShapeError, match=r"^rh.pial: Faces must differ"):
+    with pytest.raises(InvalidShapeError, match=r"^Structure rh.pial: Faces must differ"):
         brain_print({"lh.pial": BALL, "rh.pial": twice}, 9)
     one = brain_print({"lh.pial": BALL, "rh.white": BALL}, 9)
     with pytest.raises(

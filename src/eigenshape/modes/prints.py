@@ -138,5 +138,5 @@ def brain_print(surfaces: Mapping[str, MeshLike], n_values: Integer = 50) -> Bra
         try:
             rows.append(shape_dna(as_mesh(surface, str(name)), n_values))
         except InvalidShapeError as err:
-            raise InvalidShapeError(f"{name}: {err}") from err
+            raise InvalidShapeError(f"Structure {name}: {err}") from err
     return BrainPrint(tuple(map(str, surfaces)), np.array(rows))
