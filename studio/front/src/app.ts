@@ -122,7 +122,6 @@ export class Studio {
     if (view && view.shape === this.state.shape) this.viewer.setView(view);
     for (const panel of this.panels) this.addPanel(panel);
     this.strip = new Strip(this);
-    if (this.state.notes.length) this.say(this.state.notes.join(" "));
     const usable = [...this.pages.keys()];
     // Whoever brings values wants to see them.
     const last = this.settings.get("panel", this.state.values.length ? "shape" : "");

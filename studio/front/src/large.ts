@@ -1,4 +1,4 @@
-/** A note above the panels while a large shape waits to be examined, with what can be asked for. */
+/** A note above the panels: what could not be opened, and what can be asked for of a large shape. */
 
 import type { Studio } from "./app";
 import type { State } from "./core/backend";
@@ -18,10 +18,12 @@ export class LargeNote {
     app.main.querySelector("[data-test=panels]")!.before(this.form.root);
   }
 
-  refresh({ large, health, deformation, capabilities }: State): void {
+  refresh({ large, notes, place, health, deformation, capabilities }: State): void {
     const { form } = this;
-    form.root.hidden = !large || !capabilities.includes("finish");
-    form.text("large-text", large);
+    const lines = [...(place ? [] : notes), large].filter(Boolean); // notes: until something is done
+    form.root.hidden = !lines.length || !capabilities.includes("finish");
+    form.text("large-text", lines.join(" "));
+    form.get("asking").hidden = !large;
     form.get("examine").hidden = health.status !== "none";
     form.get("prepare").hidden = deformation.status !== "none";
   }

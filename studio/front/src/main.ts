@@ -16,6 +16,10 @@ import { SearchPanel } from "./panels/search";
 import { ShapePanel } from "./panels/shape";
 import { SpectrumPanel } from "./panels/spectrum";
 
+// ms until the name of a session counts as another page's. A page that is loaded again lets it go at
+// once, but a busy machine may need a while.
+const PATIENCE = 3000;
+
 function start(backend: Backend, host: HTMLElement, settings: Settings, keys: EventTarget): Studio {
   const deform = new DeformPanel();
   const panels = [
@@ -61,18 +65,18 @@ if (data) {
 async function nameTab(settings: Settings): Promise<string> {
   const known = settings.get("tab", "");
   // A browser that duplicates a tab copies its storage, but two tabs must not share a session.
-  if (known && (await holdName(known, 500))) return known;
+  if (known && (await holdName(known))) return known;
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   const tab = Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
   settings.set("tab", tab);
-  holdName(tab, 500);
+  holdName(tab);
   return tab;
 }
 
-/** Hold a name as long as this page is open; false if another page holds it for so many ms. */
-function holdName(name: string, patience: number): Promise<boolean> {
+/** Hold a name as long as this page is open; false if another page does not let it go. */
+function holdName(name: string): Promise<boolean> {
   if (!navigator.locks) return Promise.resolve(true); // on another machine, without TLS
-  const signal = AbortSignal.timeout(patience); // a page that is loaded again leaves it at once
+  const signal = AbortSignal.timeout(PATIENCE);
   return new Promise((resolve) => {
     const hold = () => new Promise<void>(() => resolve(true));
     navigator.locks.request(`eigenshape ${name}`, { signal }, hold).catch(() => resolve(false));

@@ -24,7 +24,7 @@ export interface State {
   capabilities: string[]; // rig, finish, query, open, repair, solve
   suffixes: string; // of the files that can be opened, as a file dialog takes them
   most_bytes: number; // of a file
-  notes: string[]; // to say when the page is opened
+  notes: string[]; // what could not be opened
   large: string; // what to say of a large shape of which nothing is computed unasked; or ""
   health: {
     status: Progress["status"]; // all else is null or empty until it is ready
