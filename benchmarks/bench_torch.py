@@ -130,7 +130,7 @@ def memory(quick: bool, _repeats: int) -> Iterator[Row]:
                 f"{laplacian.n_points:,} vertices, {k} pairs",
                 f"{backward:.0f} MiB",
                 f"`es.solve_spectrum`: {forward:.0f} MiB",
-                f"{backward / forward:.1f} times as much",
+                f"{backward / max(forward, 1):.1f} times as much",
             ],
             "figure": f"memory of {name}",
             "ours": backward,
