@@ -36,7 +36,7 @@ FINE_REACH = np.geomspace(0.2, 0.05, 40)
 ON_SURFACE = 0.1
 # The gap of a surface, as a share of that of its mirror image, below which it is no mirror image, or
 # the other way round. On the tuning half of experiments/ch7_collection, skulls of others, whole or
-# cut, have 0.98 to 1.03, since their two sides are alike; hands of other individuals 0.55 to 0.8.
+# cut, have 0.98 to 1.03, since their two sides are alike; hands of other individuals 0.55 to 0.67.
 CLEAR_SIDE = 0.85
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 Side: TypeAlias = Literal["same", "mirrored", "cannot be told"]

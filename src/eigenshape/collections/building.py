@@ -171,7 +171,8 @@ def build_collection(
     paths = {item.name: item.path for item in items}
     surface = _template_surface(paths[template])
     key = _digest(surface.vertices, surface.faces)
-    told = sides_of_landmarks(labelled, template)
+    readable = {name: points for name, points in labelled.items() if name in found}
+    told = sides_of_landmarks(readable, template)
     known = False if mirrored is False else None
     states = {name: f"{digest} {known} {told.get(name)}" for name, digest in digests.items()}
     work = partial(_fit_file, surface, known, {paths[name]: told[name] for name in told})
