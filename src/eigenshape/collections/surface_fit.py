@@ -59,6 +59,7 @@ FOLDED = 0.3
 # which a form is of another kind: skulls of mice have 0.01 to 0.02, creatures in another pose 0.01
 # to 0.04, other kinds 0.25 to 0.55.
 POSES_DIFFER, NOT_ALIKE = 0.03, 0.15
+MOST_MISSING = 0.75  # of the source's area: front halves of skulls lack 0.64, misplaced skulls 0.9
 # Misfit of one side in another pose, as a share of that of the other one, that tells which it is
 CLEAR_MISFIT = 0.7
 
@@ -194,10 +195,11 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
                 else [replace(posed[0], side="cannot be told")]
             )
         fit = min([fit, *posed], key=lambda each: each.misfit)
-    if fit.misfit > NOT_ALIKE:
+    if fit.misfit > NOT_ALIKE or fit.missing > MOST_MISSING:
         raise InvalidShapeError(
             "The target must have about the form of the source, and half of it at least; after "
-            f"bending the misfit is {fit.misfit:.2f}, and the most is {NOT_ALIKE}."
+            f"bending the misfit is {fit.misfit:.2f}, the most is {NOT_ALIKE}, and {fit.missing:.0%} "
+            f"of the source is missing, the most is {MOST_MISSING:.0%}."
         )
     return fit
 
@@ -280,16 +282,17 @@ def bend_onto(
     confidence = np.clip(2 * cosines, 0, 1) * (1 + (gaps / (FAR * size)) ** 2) ** -2
     edges, stretch, strains = _stretches(source, vertices)
     folded = strains > FOLDED
-    unmatched = beyond | folded | (gaps > UNMATCHED * size)
+    unreached = beyond | (gaps > UNMATCHED * size)
     areas = dual_volumes(placed)
-    stretch = stretch[~unmatched[edges].any(axis=1)]
+    # Folds count: most of a form of another kind would be one.
+    stretch = stretch[~unreached[edges].any(axis=1)]
     return SurfaceFit(
         vertices=moved,
         gaps=gaps,
         confidence=np.where(beyond | folded, 0, confidence),
         gap=float(np.mean(far**2 / (far**2 + ON_SURFACE**2))),
         strain=float(np.std(stretch)) if len(stretch) else 1.0,
-        missing=float(areas @ unmatched / areas.sum()),
+        missing=float(areas @ (unreached | folded) / areas.sum()),
         excess=float(np.mean(far > UNMATCHED)),
         side="same",
         method="position",
