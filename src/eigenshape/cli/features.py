@@ -11,7 +11,6 @@ import typer
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError
-from eigenshape._workers import run_in_workers
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
@@ -169,7 +168,7 @@ def condense(
     with (
         steps.worker_processes(workers, timeout, memory, scheduler) as processes,
         progress_bar("condense") as progress,
-        closing(run_in_workers(work, items, processes)) as outcomes,
+        closing(steps.run_in_workers(work, items, processes)) as outcomes,
     ):
         report = batch_reporter(progress, "failed")
         for n_done, (item, outcome) in enumerate(outcomes, start=1):

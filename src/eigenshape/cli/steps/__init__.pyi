@@ -6,6 +6,7 @@ from .collection_report import write_collection_report as write_collection_repor
 from .condensing import TABLES as TABLES
 from .condensing import condense_file as condense_file
 from .condensing import join_tables as join_tables
+from .condensing import run_in_workers as run_in_workers
 from .condensing import write_table as write_table
 from .facts import shape_facts as shape_facts
 from .indexing import choose_shapes as choose_shapes

@@ -11,6 +11,7 @@ import numpy as np
 
 from eigenshape._extras import import_extra
 from eigenshape._files import replace_file
+from eigenshape._workers import run_in_workers
 from eigenshape.cli.inputs import drops_missing
 from eigenshape.features.condensed import condense
 from eigenshape.geometry.repairs.repair import repair
@@ -19,6 +20,8 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.signatures.approximate_heat import LARGE, approximate_heat_signature
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
+
+__all__ = ["run_in_workers"]  # for the verb, as it is, beside what is defined here
 
 TABLES = (".csv", ".parquet")
 CUT_OFF = 0.01  # the most that e^{-tλ} of the last mode may be at the shortest time, without a note
