@@ -3,8 +3,8 @@
 import ast
 import doctest
 import inspect
-import re
 import pydoc
+import re
 from pathlib import Path
 
 import pytest
