@@ -87,11 +87,11 @@ def test_two_tabs_have_edits_of_their_own(browser, page, url, mesh, rig):
 
 
 def test_a_long_job_of_one_tab_does_not_stop_another(browser, page, url, path, tmp_path):
-    es.write_mesh(es.icosphere(6), tmp_path / "large.ply")
+    es.write_mesh(es.icosphere(7), tmp_path / "large.ply")
     with open_page(browser, url) as busy:
         find(busy, "tab-shape").click()
         open_file(busy, "open", tmp_path / "large.ply")
-        wait_until(busy, "eigenshape.viewer.vertices.length > 3 * 40000")
+        wait_until(busy, "eigenshape.viewer.vertices.length > 3 * 160000")
         choose_above(page, HEAD)
         turn(page, 30)
         running = busy.evaluate("eigenshape.backend.meta().then((state) => state.spectrum.status)")

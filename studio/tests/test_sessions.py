@@ -113,6 +113,19 @@ def test_a_session_is_found_again_with_all_that_is_in_it(first, top, tmp_path):
     again.workspace.close()
 
 
+def test_what_was_undone_and_replaced_is_not_found_again(first, tmp_path):
+    file = SessionFile(tmp_path / "tab.sqlite")
+    page = Page(first.fork(file))
+    for text, chosen in (("A", (3,)), ("B", (4,))):
+        page.call("finish", {"kind": "select", "text": text}, {"regions": owners(*chosen)})
+    page.call("finish", kind="undo")
+    page.call("finish", {"kind": "select", "text": "C"}, {"regions": owners(5)})
+    page.workspace.close()
+
+    state = Page(first.fork(SessionFile(file.path))).call("meta")[0]
+    assert (state["history"], state["place"]) == (["A", "C"], 2)
+
+
 def test_a_session_does_not_need_the_shape_that_the_server_shows(first, top, tmp_path):
     file = SessionFile(tmp_path / "tab.sqlite")
     page = Page(first.fork(file))

@@ -345,7 +345,7 @@ class History:
         """Write what is new to the file of the tab, if it has one."""
         if self.file is None:
             return
-        new = self.moments[self._n_written :]
+        written, new = self.moments[: self._n_written], self.moments[self._n_written :]
         shapes = [shape for shape in self.shapes.values() if not shape.stored]
         poses = {moment.pose for moment in new if moment.pose.number and not moment.pose.stored}
         self.file.write(
@@ -353,7 +353,7 @@ class History:
             map(_shape_row, shapes),
             [_pose_row(pose) for pose in poses],
             [_moment_row(moment) for moment in new],
-            (self.moments[0].number, self.moments[-1].number),
+            (written[0].number, written[-1].number) if written else (0, -1),
         )
         for shape in shapes:
             shape.stored = True

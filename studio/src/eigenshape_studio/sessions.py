@@ -101,7 +101,7 @@ class SessionFile:
         moments: Iterable[Row],
         kept: tuple[int, int],
     ) -> None:
-        """Write what is new, at once; of the moments in the file, those numbered `kept` stay."""
+        """Write what is new, at once; moments in the file stay from the first to the last number `kept`."""
         with self._lock, self._open() as database:
             database.executemany("insert or replace into fact values (?, ?)", facts.items())
             database.executemany("insert or replace into shape values (?, ?, ?, ?, ?, ?)", shapes)
