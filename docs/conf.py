@@ -62,6 +62,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "eigenshape"
 html_static_path = ["_static"]
 html_css_files = ["eigenshape.css"]
+html_context = {"default_mode": "auto"}  # light or dark, as the reader's system is
 html_theme_options = {
     "show_prev_next": False,
     "navigation_with_keys": False,
