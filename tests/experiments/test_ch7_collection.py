@@ -3,8 +3,13 @@
 import json
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-FULL = json.loads((ROOT / "experiments" / "ch7_collection" / "expected.json").read_text())["full"]
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch7_collection"
+FULL, AWKWARD = (
+    json.loads((FOLDER / name).read_text())["full"]
+    for name in ("expected.json", "expected_awkward.json")
+)
 
 
 def test_more_labelled_skulls_are_better():
@@ -17,3 +22,19 @@ def test_errors_grow_with_the_spread_that_is_given():
     assert parts[-1]["error"] > 2 * parts[0]["error"]
     for part in parts:
         assert 0.6 < part["spread"] / part["error"] < 1.6
+
+
+@pytest.mark.long
+@pytest.mark.data
+def test_a_mirror_image_is_told_by_landmarks_and_never_taken_for_sure(quick_form):
+    found = quick_form("ch7_collection/awkward.py")["quick"]["kinds"]
+    for kinds in (found, AWKWARD["kinds"]):
+        mirrored, known = kinds["mirrored"], kinds["mirrored, six landmarks known"]
+        assert mirrored["cannot be told"] == mirrored["specimens"]
+        assert known["mirrored"] == known["specimens"]
+        assert known["mean"] < 1.5 * kinds["as it is"]["mean"]
+
+
+def test_other_things_are_refused():
+    assert all(thing["refused"] == 1 for thing in AWKWARD["other things"].values())
+    assert AWKWARD["kinds"]["half of another attached"]["refused"] == 2

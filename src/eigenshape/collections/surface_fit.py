@@ -198,7 +198,7 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
     if fit.misfit > NOT_ALIKE or fit.missing > MOST_MISSING:
         raise InvalidShapeError(
             "The target must have about the form of the source, and half of it at least; after "
-            f"bending the misfit is {fit.misfit:.2f}, the most is {NOT_ALIKE}, and {fit.missing:.0%} "
+            f"bending the misfit is {fit.misfit:.3f}, the most is {NOT_ALIKE}, and {fit.missing:.0%} "
             f"of the source is missing, the most is {MOST_MISSING:.0%}."
         )
     return fit
