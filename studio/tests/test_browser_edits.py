@@ -87,15 +87,15 @@ def test_two_tabs_have_edits_of_their_own(browser, page, url, mesh, rig):
 
 
 def test_a_long_job_of_one_tab_does_not_stop_another(browser, page, url, path, tmp_path):
-    es.write_mesh(es.icosphere(7), tmp_path / "large.ply")
+    es.write_mesh(es.icosphere(6), tmp_path / "large.ply")
+    status = "eigenshape.backend.meta().then((state) => state.spectrum.status)"
     with open_page(browser, url) as busy:
         find(busy, "tab-shape").click()
         open_file(busy, "open", tmp_path / "large.ply")
-        wait_until(busy, "eigenshape.viewer.vertices.length > 3 * 160000")
-        choose_above(page, HEAD)
-        turn(page, 30)
-        running = busy.evaluate("eigenshape.backend.meta().then((state) => state.spectrum.status)")
-        assert running == "running"
+        wait_until(busy, "eigenshape.state.spectrum.status === 'running'")
+        # Asked of the server itself: a picture may take longer than the job on a busy machine.
+        assert page.evaluate("eigenshape.backend.array('vertices').then((found) => found.length)")
+        assert busy.evaluate(status) == "running"
         open_file(busy, "open", path)  # ends the job
         wait_until(busy, "eigenshape.state.name === 'quadruped.ply'")
 
