@@ -96,10 +96,7 @@ def figure_eigenfunctions(
     if not chosen:
         raise InvalidParameterError("indices must name at least one eigenfunction; it is empty.")
     camera = choose_camera(mesh, camera, view, up, size=420)
-    n_columns = min(len(chosen), 4)
-    n_rows = -(-len(chosen) // n_columns)
-    figure = Figure(figsize=(PANEL * n_columns + 0.8, (PANEL + 0.3) * n_rows), layout="constrained")
-    grid = figure.subplots(n_rows, n_columns, squeeze=False)
+    figure, grid = _empty_grid(len(chosen), min(len(chosen), 4))
     colors, scale = mpl.colormaps["RdBu_r"], Normalize(-1, 1)
     for axes, index in zip(grid.flat, chosen, strict=False):
         function = spectrum.eigenvectors[:, index]
@@ -110,8 +107,6 @@ def figure_eigenfunctions(
         show(axes, draw(mesh, camera, vertex_colors=shades, zero_set_of=zero_set_of))
         number = spectrum.certificate.first + index
         axes.set_title(f"φ$_{{{number}}}$,  λ = {spectrum.eigenvalues[index]:.4g}")
-    for axes in grid.flat[len(chosen) :]:
-        axes.set_axis_off()
     bar = figure.colorbar(ScalarMappable(scale, colors), ax=grid, shrink=0.7)
     bar.set_label("eigenfunction / its largest value (dark line: 0)")
     return figure
@@ -256,11 +251,7 @@ def figure_fields(  # noqa: PLR0913 - what is drawn, and one keyword for each ch
     scale, extend = value_scale(everything, limits)
     colors = mpl.colormaps[color_map].with_extremes(bad=NO_VALUE)
     n_columns = 2 if len(shapes) == 4 else min(len(shapes), 3)
-    n_rows = -(-len(shapes) // n_columns)
-    figure = Figure(figsize=(PANEL * n_columns + 0.8, (PANEL + 0.3) * n_rows), layout="constrained")
-    grid = figure.subplots(n_rows, n_columns, squeeze=False)
-    for axes in grid.flat:
-        axes.set_axis_off()
+    figure, grid = _empty_grid(len(shapes), n_columns)
     for axes, (title, (mesh, field)) in zip(grid.flat, shapes.items(), strict=False):
         aimed = choose_camera(mesh, camera, view, up, size=420)
         show(axes, draw(mesh, aimed, vertex_colors=map_colors(field, scale, colors)))
@@ -268,6 +259,16 @@ def figure_fields(  # noqa: PLR0913 - what is drawn, and one keyword for each ch
     bar = figure.colorbar(ScalarMappable(scale, colors), ax=grid, shrink=0.7, extend=extend)
     bar.set_label(bar_label(label, everything))
     return figure
+
+
+def _empty_grid(n_drawings: int, n_columns: int) -> tuple[Figure, np.ndarray]:
+    """Return a figure with room for a color bar, and its axes, without frames: some rows of drawings."""
+    n_rows = -(-n_drawings // n_columns)
+    figure = Figure(figsize=(PANEL * n_columns + 0.8, (PANEL + 0.3) * n_rows), layout="constrained")
+    grid = figure.subplots(n_rows, n_columns, squeeze=False)
+    for axes in grid.flat:
+        axes.set_axis_off()
+    return figure, grid
 
 
 def vertex_field(values: ArrayLike, n_vertices: int) -> np.ma.MaskedArray:
