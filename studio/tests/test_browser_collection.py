@@ -2,39 +2,22 @@
 
 import numpy as np
 import pytest
+from balls import collection_of_balls
 
-import eigenshape as es
 from eigenshape.cli import steps
-from eigenshape.collections import CarriedLandmarks, Collection
+from eigenshape.collections import CarriedLandmarks
 
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     """The page of three balls with one landmark, whose correspondence needs no fit."""
     folder = tmp_path_factory.mktemp("balls")
-    ball = es.icosphere(3)
-    sides = np.array([[1.0, 1.7, 0.8], [1.2, 1.5, 0.8], [1.0, 1.4, 1.1]])
-    points = ball.vertices * sides[:, None]
-    names = ("a", "b", "<c>")
-    sources = tuple(folder / f"{number}.ply" for number in range(3))
-    for source, own in zip(sources, points, strict=True):
-        es.write_mesh(es.TriangleMesh(own, ball.faces), source)
-    collection = Collection(
-        folder=folder,
-        names=names,
-        mean=es.TriangleMesh(points.mean(axis=0), ball.faces),
-        points=points,
-        gaps=np.zeros(points.shape[:2]),
-        confidence=np.ones(points.shape[:2]),
-        sides=("same", "same", "same"),
-        methods=("position", "position", "position"),
-        sources=sources,
-        template="a",
-        notes={"a": (), "b": ("</script><b>a note</b>",), "<c>": ()},
-        failures={"d": "it could not be read"},
-    )
+    note = "</script><b>a note</b>"
+    collection = collection_of_balls(folder, ("a", "b", "<c>"), level=3, note=note)
     spread = np.full((3, 1), 0.1)
-    carried = CarriedLandmarks(names, ("top",), points[:, :1], spread, spread > 1)
+    carried = CarriedLandmarks(
+        collection.names, ("top",), collection.points[:, :1], spread, spread > 1
+    )
     path = folder / "report.html"
     steps.write_collection_report(collection, carried, path, "balls", lambda share, name: None)
     return path

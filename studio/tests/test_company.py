@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from balls import collection_of_balls
 from conftest import stretched_ball
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from test_workspace import Page, file_of
 
 import eigenshape as es
-from eigenshape.collections.collection import Collection, fit_file, save_collection, write_fit
+from eigenshape.collections.collection import fit_file, save_collection, write_fit
 from eigenshape.matching.spectral_refinement import corners_of_faces
 from eigenshape_studio.beside import Beside
 from eigenshape_studio.calls import RequestError
@@ -237,30 +238,12 @@ def test_the_points_of_a_cloud_are_kept_beside_its_surface(tmp_path):
 def collection(tmp_path_factory):
     """The folder of a collection of three balls."""
     folder = tmp_path_factory.mktemp("balls")
-    ball = es.icosphere(2)
-    points = ball.vertices * np.array([[[1.0, 1.7, 0.8]], [[1.2, 1.5, 0.8]], [[1.0, 1.4, 1.1]]])
-    names = ("a", "b", "c")
-    sources = tuple(folder / f"{name}.ply" for name in names)
-    arrays = {"gaps": np.zeros(ball.n_vertices), "confidence": np.ones(ball.n_vertices)}
-    for name, source, own in zip(names, sources, points, strict=True):
-        es.write_mesh(es.TriangleMesh(own, ball.faces), source)
-        write_fit(fit_file(folder, name), vertices=own, **arrays)
-    save_collection(
-        Collection(
-            folder=folder,
-            names=names,
-            mean=es.TriangleMesh(points.mean(axis=0), ball.faces),
-            points=points,
-            gaps=np.zeros(points.shape[:2]),
-            confidence=np.ones(points.shape[:2]),
-            sides=("same",) * 3,
-            methods=("position",) * 3,
-            sources=sources,
-            template="a",
-            notes={"a": (), "b": ("a note",), "c": ()},
-            failures={"d": "it could not be read"},
-        )
-    )
+    made = collection_of_balls(folder, ("a", "b", "c"), level=2, note="a note")
+    for name, own, gaps, confidence in zip(
+        made.names, made.points, made.gaps, made.confidence, strict=True
+    ):
+        write_fit(fit_file(folder, name), vertices=own, gaps=gaps, confidence=confidence)
+    save_collection(made)
     return folder
 
 
