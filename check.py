@@ -1,16 +1,23 @@
 """Run the checks: format, lint, types, layers, tests. CI runs this same file.
 
 python check.py            all of it but the long tests; two minutes on two cores
-python check.py --all      the long tests, the docs site and the studio in a browser, too; twelve minutes
+python check.py --all      the long tests, the docs site and the studio in a browser, too
 python check.py --nightly  as --all, with every part of the broad sweeps; a commit runs a tenth of these
 python check.py --fast     without the tests
 """
 
 import os
+import platform
+import re
 import subprocess
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np  # noqa: F401  brings the BLAS that is looked for
+from conftest import TURNS, turn_of_commit
+from threadpoolctl import threadpool_info
 
 FIRST = {
     "format": ["-m", "ruff", "format", "--check", "."],
@@ -21,15 +28,13 @@ TYPES_AND_LAYERS = {
     "layers": ["-c", "from importlinter.cli import lint_imports_command as main; main()"],
 }
 # Each process takes half of the files in a row, so that tests of one file share what they make.
-TESTS = ["-m", "pytest", "-n", "2", "--dist", "worksteal"]
+TESTS = ["-m", "pytest", "--dist", "worksteal"]
 STUDIO = [
     "-m",
     "pytest",
     "studio/tests",
 ]  # in one process, which waits for a browser most of the time
-# The gallery runs here and nowhere else, also where its pages are there from an older library.
-RUN_GALLERY = ["-D", "sphinx_gallery_conf.run_stale_examples=1"]
-DOCS = ["-m", "sphinx", "-q", "-W", "--keep-going", *RUN_GALLERY, "docs"]
+DOCS = ["-m", "sphinx", "-q", "-W", "--keep-going", "docs"]
 OPTIONS = {"--all", "--nightly", "--fast"}
 
 
@@ -47,10 +52,11 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as site:
         beside, tests = dict(TYPES_AND_LAYERS), {}
         if everything:
-            beside |= {"docs": [*DOCS, site], "studio": [*STUDIO, *nightly]}
-            tests["all tests"] = [*TESTS, *nightly]
+            pages = run_gallery(0, 1) if nightly else run_gallery(turn_of_commit(), TURNS)
+            beside |= {"docs": [*DOCS, *pages, site], "studio": [*STUDIO, *nightly]}
+            tests["all tests"] = [*TESTS, *two_processes(), *nightly]
         elif "--fast" not in options:
-            tests["tests"] = [*TESTS, "-m", "not long"]
+            tests["tests"] = [*TESTS, *two_processes(), "-m", "not long"]
         failed = run_checks(FIRST)
         # Beside the tests, so that no core waits: types take one, and the studio half of one.
         with ThreadPoolExecutor(2) as pool:
@@ -63,6 +69,37 @@ def main() -> int:
     names = [*FIRST, *beside, *tests]
     print(f"failed: {', '.join(failed)}" if failed else f"passed: {', '.join(names)}")
     return 1 if failed else 0
+
+
+def two_processes() -> list[str]:
+    """Return the options of two processes of tests, the second with another BLAS kernel.
+
+    No answer may depend on the family of the CPU. Every other commit swaps the halves of the tests
+    that they begin with. Kernels are chosen by OpenBLAS on x86 alone.
+    """
+    blas = [library for library in threadpool_info() if library["internal_api"] == "openblas"]
+    if not blas or platform.machine() not in ("x86_64", "AMD64"):
+        return ["-n", "2"]
+    used = {library["architecture"] for library in blas}
+    # OpenBLAS takes Zen for Haswell, so that Haswell would be no other kernel there.
+    kernel = "Sandybridge" if used <= {"Haswell", "Zen"} else "Haswell"
+    processes = ["popen", f"popen//env:OPENBLAS_CORETYPE={kernel}"]
+    if turn_of_commit() % 2:
+        processes.reverse()
+    return ["--tx", processes[0], "--tx", processes[1]]
+
+
+def run_gallery(turn: int, turns: int) -> list[str]:
+    """Return the options of a build of the docs that runs the scripts of the gallery which have this turn.
+
+    They run here and nowhere else, also where their pages are there from an older library.
+    """
+    scripts = sorted(path.name for path in Path("gallery").rglob("plot_*.py"))
+    pattern = "|".join(map(re.escape, scripts[turn::turns]))
+    return [
+        *["-D", "sphinx_gallery_conf.run_stale_examples=1"],
+        *["-D", f"sphinx_gallery_conf.filename_pattern={pattern}"],
+    ]
 
 
 def run_checks(checks: dict[str, list[str]]) -> list[str]:

@@ -7,7 +7,6 @@ named; what is answered about shapes that are not named must be right.
 """
 
 import argparse
-import multiprocessing
 import shutil
 import sys
 import tempfile
@@ -40,11 +39,7 @@ LONG = " " + 20 * "n"  # of names, so that the tables have some pages
 
 def killed(folder, start, line, seconds):
     """Run steps in a process that dies, at a line or after a time; return the last step that it called done."""
-    context = multiprocessing.get_context("fork")  # of this process, which has everything imported
-    ours, theirs = context.Pipe()
-    process = context.Process(target=writer.change_in_all_ways, args=(folder, start, line, theirs))
-    process.start()
-    theirs.close()
+    process, ours = writer.begin(writer.change_in_all_ways, folder, start, line)
     step = ours.recv()
     if line is None:
         time.sleep(seconds)

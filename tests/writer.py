@@ -1,6 +1,7 @@
 """What processes of the tests do with an index until they are killed, telling the number of each step that is done."""
 
 import itertools
+import multiprocessing
 import os
 import signal
 import sys
@@ -12,6 +13,21 @@ from eigenshape._errors import StoreError
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.store import database
 from eigenshape.retrieval.store.writing import DescribedShape
+
+
+def begin(work, *args):
+    """Start a process that works on an index; return it and our end of a pipe to it.
+
+    A server that has everything imported forks it, so that twenty start in a second. A fork of a
+    test's own process, which has threads, could wait forever for a lock that one of them holds.
+    """
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["eigenshape.retrieval.index"])
+    ours, theirs = context.Pipe()
+    process = context.Process(target=work, args=(*args, theirs))
+    process.start()
+    theirs.close()
+    return process, ours
 
 
 def add_shapes(folder, done):

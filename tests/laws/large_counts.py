@@ -151,7 +151,7 @@ def outcome(call: Callable[[], Any]) -> str | None:
         found: str | None = answers.get(timeout=LONGEST)
     except Empty:
         found = f"no answer in {LONGEST} s"
-        process.kill()
+    process.kill()  # what has answered may still wait for threads that it started
     process.join()
     return found
 

@@ -1,5 +1,4 @@
 import json
-import multiprocessing
 import os
 import shutil
 import signal
@@ -353,7 +352,7 @@ def test_of_several_creators_one_succeeds(tmp_path):
 def test_three_first_writers_share_one_index(tmp_path):
     for trial in range(5):
         folder = tmp_path / str(trial)
-        writers = [begin(writer.open_and_add, folder) for _ in range(3)]
+        writers = [writer.begin(writer.open_and_add, folder) for _ in range(3)]
         assert [ours.recv() for _, ours in writers] == 3 * ["ready"]
         for number, (_, ours) in enumerate(writers):
             ours.send(f"shape {number}")
@@ -567,19 +566,9 @@ def read_only(folder):
         folder.chmod(0o755)
 
 
-def begin(work, folder):
-    """Start a process from a server that has everything imported, so that twenty take a second."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["eigenshape.retrieval.index"])
-    ours, theirs = context.Pipe()
-    process = context.Process(target=work, args=(folder, theirs))
-    process.start()
-    return process, ours
-
-
 def killed_at_random(work, folder, rng):
     """Kill a process in the midst of a step; the number of the last step that it called done."""
-    process, done = begin(work, folder)
+    process, done = writer.begin(work, folder)
     number = [done.recv() for _ in range(rng.integers(1, 4))][-1]
     time.sleep(rng.uniform(0.0, 0.02))
     process.kill()

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import ReadOnly, finite_values, record, whole_number
 from eigenshape._progress import Progress
+from eigenshape._threads import one_blas_thread
 from eigenshape.features.boundaries import CONCAVITY, move_boundaries, smooth_boundaries
 from eigenshape.features.contrast import FINE_CONTRAST, contrast_at
 from eigenshape.features.part_contrast import weigh_parts
@@ -71,6 +72,7 @@ class PartDecomposition(ReadOnly):
     parts: Segmentation
 
 
+@one_blas_thread()
 def find_parts(
     mesh: MeshLike,
     *,

@@ -204,6 +204,7 @@ def box_eigenvalues(
     return np.pi**2 * sums
 
 
+@one_blas_thread()
 def flat_torus_eigenvalues(k: Integer, periods: ArrayLike) -> Float[np.ndarray, " k"]:
     """Return the first eigenvalues of a flat torus: 4π² |ξ|² for ξ in the dual lattice.
 
