@@ -604,3 +604,13 @@ def test_a_law_that_is_not_promised_is_skipped_for_that_reason_first():
     }
     assert reasons[()]["reflection"] == "not promised"
     assert reasons["reflection",]["reflection"] == "a graph lies nowhere"
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_a_change_is_a_share_of_the_entries_of_its_rows(unit):
+    ball = cotangent_laplacian(icosphere(1))
+    before = Laplacian(unit * ball.stiffness, unit**2 * ball.mass)
+    after = Laplacian(1.25 * before.stiffness, before.mass)
+    change, place = sameness.distance(before, after)
+    assert change == pytest.approx(0.25, rel=1e-12)
+    assert place.startswith("the largest change is that of W_ij at ")
