@@ -18,7 +18,7 @@ from real_shapes import require_data
 # errors of carried landmarks in expected.json (seven labelled skulls, one)
 SIZES = 0.153, 0.20, 0.244
 WIDTHS = 0.0, 1.0, 2.0, 4.0, 8.0  # mm, up to about which errors agree; 0: independent
-N_DRAWS = 50
+N_DRAWS = 20
 
 
 def drawn_errors(
@@ -35,14 +35,14 @@ def drawn_errors(
 
 def main() -> None:
     """Compare statistics of the expert's landmarks with those after errors are added."""
-    arguments = options_of(__doc__, quick="three draws of each").parse_args()
+    arguments = options_of(__doc__, quick="two draws of each").parse_args()
     require_data()
     names = strains("reporting")
     given = [truth(name).points for name in names]
-    # Neighbors are told in one frame; the files are nearly in one.
+    # The files are nearly in one frame, in which neighbors are found.
     points = np.array(given)
     draw = np.random.default_rng(0)
-    n_draws = 3 if arguments.quick else N_DRAWS
+    n_draws = 2 if arguments.quick else N_DRAWS
     found = {}
     for size in SIZES:
         for width in WIDTHS:
