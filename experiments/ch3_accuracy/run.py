@@ -19,7 +19,6 @@ from rich.progress import track
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from frame import rounded
 from outputs import options_of, output_file, save_figures
 
 SIZES = {"full": (1000, 2500, 6250), "quick": (300, 480, 750)}
@@ -268,7 +267,7 @@ def main() -> None:
             f"{case:<24} {name:<22} n {row['n'][-1]:>6}  median {row['median'][-1]:.5f}  worst {row['worst'][-1]:.5f}"
             f"  order {row['order']:5.2f}  entries a row {row['row']:6.1f}  seconds {row['seconds']}"
         )
-    save_figures(rounded(table), arguments.out)
+    save_figures(table, arguments.out)
     if arguments.picture:
         draw(arguments.picture, 1000 if arguments.quick else 4000)
 

@@ -14,7 +14,6 @@ from rich.progress import track
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from frame import rounded
 from outputs import options_of, save_figures
 from real_shapes import DATA
 
@@ -138,7 +137,7 @@ def order(case: Case, condition: str) -> list[float]:
     meshes = [finer(case.mesh, case.followed + times) for times in range(3)]
     rows = np.array([widths(mesh, FEW, condition) for mesh in meshes])
     slopes = -np.polyfit(np.arange(3) * np.log(2), np.log(rows), 1)[0]
-    return [round(float(slopes.min()), 3), round(float(slopes.max()), 3)]
+    return [float(slopes.min()), float(slopes.max())]
 
 
 def measured(case: Case, condition: str, *, with_order: bool) -> dict[str, object]:
@@ -184,7 +183,7 @@ def main() -> None:
         label = f"{name}, {condition.capitalize()}" if name in open_ones else name
         table[label] = measured(cases[name], condition, with_order=not arguments.quick)
         print(label, table[label], flush=True)
-    save_figures(rounded(table), arguments.out)
+    save_figures(table, arguments.out)
 
 
 if __name__ == "__main__":

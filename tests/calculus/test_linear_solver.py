@@ -139,6 +139,16 @@ def test_a_load_that_does_not_balance_is_named_and_the_remedy_works():
         np.testing.assert_allclose(poisson_solver(TWO).solve(TWO.mass @ left), 0.0, atol=1e-8)
 
 
+@pytest.mark.parametrize("scale", [1e-100, 1e-6, 1e6, 1e100])
+def test_whether_a_load_balances_does_not_depend_on_its_unit(scale):
+    load = TWO.mass @ remove_means(TWO, np.sin(np.arange(TWO.n_points)))
+    solver = poisson_solver(TWO)
+    np.testing.assert_allclose(solver.solve(scale * load) / scale, solver.solve(load), atol=1e-12)
+    load[0] += 1e-6
+    with pytest.raises(es.InvalidParameterError, match="the right-hand side must sum to 0"):
+        solver.solve(scale * load)
+
+
 def test_wrong_arguments_are_named():
     solver = poisson_solver(PLATE, [0, 7, 0])
     assert solver.solve(values=[1.0, 2.0, 1.0])[0] == 1.0

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch7_collection"
-FULL, AWKWARD = (
+FULL, AWKWARD, NOISE = (
     json.loads((FOLDER / name).read_text())["full"]
-    for name in ("expected.json", "expected_awkward.json")
+    for name in ("expected.json", "expected_awkward.json", "expected_noise.json")
 )
 
 
@@ -38,3 +38,13 @@ def test_a_mirror_image_is_told_by_landmarks_and_never_taken_for_sure(quick_form
 def test_other_things_are_refused():
     assert all(thing["refused"] == 1 for thing in AWKWARD["other things"].values())
     assert AWKWARD["kinds"]["half of another attached"]["refused"] == 2
+
+
+def test_the_noise_of_labels_leaves_more_than_carried_landmarks_do():
+    labels = NOISE["0.153 mm, 0.0 mm"]
+    carried = FULL["statistics"]["landmarks"]
+    for name in ("Procrustes distances", "component 1", "component 2", "component 3"):
+        assert labels[name] > carried[name] + 0.02
+    within = NOISE["0.2 mm, 4.0 mm"]
+    assert within["component 3"] < carried["component 3"]
+    assert carried["Procrustes distances"] < within["low"]

@@ -243,6 +243,18 @@ def test_flips_keep_the_surface_and_end_delaunay(seed):
     assert (opposite + opposite[after.twins] < np.pi + 1e-9).all()
 
 
+@few
+@given(seeds)
+def test_a_rectangle_keeps_its_diagonal_however_thin_it_is(seed):
+    """Both diagonals are Delaunay, and rounding must not choose between them."""
+    rng = np.random.default_rng(seed)
+    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]] * 10 ** rng.uniform(-5, 0, 3)
+    points, faces = Rotation.random(rng=rng).apply(corners), np.array([[0, 1, 2], [0, 2, 3]])
+    lengths = np.linalg.norm(points[faces] - points[np.roll(faces, -1, axis=1)], axis=2)
+    before = tufted_cover(points, faces, lengths.ravel())
+    np.testing.assert_array_equal(flip_to_delaunay(before).tails, before.tails)
+
+
 def angles(cover: Triangulation) -> np.ndarray:
     """The angle at the tail of each side, by the law of cosines."""
     a, c, b = np.moveaxis(cover.lengths.reshape(-1, 3)[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]], 1, 0)

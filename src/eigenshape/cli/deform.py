@@ -11,6 +11,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import err, print_json, print_table, print_written, progress_bar
+from eigenshape.cli.inputs import parse_numbers
 from eigenshape.deformation.modes import Mode
 
 REGIONS = (
@@ -179,23 +180,16 @@ def parse_rotation(text: str, mesh: es.TriangleMesh, region: Any) -> es.Rotation
             f"A rotation is 'x by 90', '0,1,1 by -30', or 'z by 45 @ 0,0.1,0' (degrees, and a point of the axis); "
             f"it is {text!r}."
         )
-    axis = AXES.get(found[1]) or _three(found[1], "An axis other than x, y and z")
+    axis = AXES.get(found[1]) or parse_numbers(
+        found[1], "An axis other than x, y and z is three numbers separated by commas", 3
+    )
     angle = math.radians(float(found[2]))
     if found[3]:
-        return es.Rotation(_three(found[3], "A pivot"), axis, angle)
+        pivot = parse_numbers(found[3], "A pivot is three numbers separated by commas", 3)
+        return es.Rotation(pivot, axis, angle)
     rim = es.deformation.region_boundary(mesh, es.deformation.region_mask(mesh, region))
     middle = mesh.vertices[rim].mean(axis=0) if len(rim) else [0.0, 0.0, 0.0]
     return es.Rotation(middle, axis, angle)
-
-
-def _three(text: str, name: str) -> list[float]:
-    try:
-        x, y, z = (float(piece) for piece in text.split(","))
-    except ValueError as error:
-        raise InvalidParameterError(
-            f"{name} is three numbers separated by commas; it is {text!r}."
-        ) from error
-    return [x, y, z]
 
 
 def _require_at_most(number: int, last: int, name: str) -> None:

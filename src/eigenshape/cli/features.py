@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
@@ -23,7 +22,7 @@ from eigenshape.cli.console import (
     print_written,
     progress_bar,
 )
-from eigenshape.cli.inputs import HeatMethod, repair_names, require_one_rule
+from eigenshape.cli.inputs import HeatMethod, parse_numbers, repair_names, require_one_rule
 from eigenshape.retrieval.heat.recipe import PRESETS
 
 COLUMNS = {
@@ -155,12 +154,7 @@ def condense(
     tolerance
         Largest share of the variance of a shape that the means may lose. More regions keep more.
     """
-    try:
-        clock = [float(time) for time in times.split(",")]
-    except ValueError as error:
-        raise InvalidParameterError(
-            f"--times takes numbers separated by commas, such as 1e6,1e7; it is {times!r}."
-        ) from error
+    clock = parse_numbers(times, "--times takes numbers separated by commas, such as 1e6,1e7")
     steps.require_output(output, steps.TABLES, "A table")
     work = partial(steps.condense_file, clock, n_modes, tolerance, repair_names(repair))
     items = es.io.find_items(sources)

@@ -98,6 +98,17 @@ def repair_names(text: str) -> tuple[str, ...]:
     return require_repairs(names, KNOWN_REPAIRS, "Names of --repair")
 
 
+def parse_numbers(text: str, rule: str, count: int | None = None) -> list[float]:
+    """Return numbers separated by commas; raise an error that gives the rule if the text is not so."""
+    try:
+        numbers = [float(piece) for piece in text.split(",")]
+    except ValueError as err:
+        raise InvalidParameterError(f"{rule}; it is {text!r}.") from err
+    if count is not None and len(numbers) != count:
+        raise InvalidParameterError(f"{rule}; it is {text!r}.")
+    return numbers
+
+
 def drops_missing(names: Sequence[str]) -> bool:
     """Tell whether points that are not finite are to be left out when a file is read."""
     return "auto" in names or "drop_missing" in names

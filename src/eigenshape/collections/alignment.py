@@ -18,6 +18,7 @@ from eigenshape.collections.spread_points import (
     spread_points,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import rotations_and_stretches
 from eigenshape.geometry.mesh import TriangleMesh
 
 # Lengths are in units of the root mean square distance of a surface from its middle. All numbers
@@ -309,9 +310,6 @@ def _best_turns(
 ) -> tuple[Float[np.ndarray, " q"], Float[np.ndarray, "q 3 3"]]:
     """Return factors and proper turns of least weighted squares about the middle (Umeyama 1991)."""
     products = np.einsum("qki,qkj,qk->qij", starts, ends, weights, optimize=True)
-    left, stretches, right = np.linalg.svd(products)
-    sides = np.sign(np.linalg.det(left @ right))
-    stretches[:, 2] *= sides
-    left[:, :, 2] *= sides[:, None]
+    rotations, stretches = rotations_and_stretches(products)
     extents = np.einsum("qki,qki,qk->q", starts, starts, weights)
-    return stretches.sum(axis=1) / extents, (left @ right).transpose(0, 2, 1)
+    return stretches.sum(axis=1) / extents, rotations.transpose(0, 2, 1)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from eigenshape.collections.alignment import CLEAR_SIDE
+from eigenshape.geometry.measure import rotations_and_stretches
 from eigenshape.morphometrics.landmarks import Landmarks
 
 
@@ -33,8 +34,7 @@ def _residuals(one: Float[np.ndarray, "k 3"], two: Float[np.ndarray, "k 3"]) -> 
     known = np.isfinite(one).all(axis=1) & np.isfinite(two).all(axis=1)
     one, two = (points[known] - points[known].mean(axis=0) for points in (one, two))
     product = one.T @ two / max(float(np.linalg.norm(one) * np.linalg.norm(two)), 1e-300)
-    lengths = np.linalg.svd(product, compute_uv=False)
-    lengths[2] *= np.sign(np.linalg.det(product))
-    cosines = lengths.sum(), lengths.sum() - 2 * lengths[2]
+    stretches = rotations_and_stretches(product)[1]
+    cosines = stretches.sum(), stretches.sum() - 2 * stretches[2]
     upright, reflected = (float(np.sqrt(max(1 - cosine**2, 0))) for cosine in cosines)
     return upright, reflected

@@ -236,7 +236,19 @@ def bounding_box(shape: Shape) -> tuple[Float[np.ndarray, " d"], Float[np.ndarra
 
 def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k 3 3"]:
     """Return the rotation nearest to each matrix in the Frobenius norm (Kabsch 1976)."""
-    left, _, right = np.linalg.svd(matrices)
+    return rotations_and_stretches(matrices)[0]
+
+
+def rotations_and_stretches(
+    matrices: Float[np.ndarray, "*k 3 3"],
+) -> tuple[Float[np.ndarray, "*k 3 3"], Float[np.ndarray, "*k 3"]]:
+    """Return the rotation R nearest to each matrix M, and signed stretches, whose sum is trace(RᵀM).
+
+    They are the singular values; the smallest is negative if M reflects.
+    """
+    left, stretches, right = np.linalg.svd(matrices)
     # A reflection becomes a rotation by a change of sign along the smallest singular value.
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return left @ right
+    signs = np.sign(np.linalg.det(left @ right))
+    left[..., 2] *= signs[..., None]
+    stretches[..., 2] *= signs
+    return left @ right, stretches

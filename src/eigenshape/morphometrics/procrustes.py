@@ -11,7 +11,7 @@ from eigenshape._arrays import ReadOnly, real_numbers, record
 from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.geometry.measure import nearest_rotations
+from eigenshape.geometry.measure import nearest_rotations, rotations_and_stretches
 from eigenshape.morphometrics.landmarks import Specimens, as_configurations, as_curves
 from eigenshape.morphometrics.splines import bending_matrix
 
@@ -61,11 +61,9 @@ class ProcrustesFit(ReadOnly):
     @one_blas_thread()
     def distances(self) -> Float[np.ndarray, "n n"]:
         """Return the Procrustes distances of all pairs, each pair turned on one another anew."""
-        # With the best turn, |x - R y|² = 2 - 2 (sum of singular values of xᵀy, the last signed).
+        # With the best turn, |x - R y|² = 2 - 2 (sum of the signed stretches of xᵀy).
         products = np.tensordot(self.shapes, self.shapes, axes=(1, 1)).swapaxes(1, 2)
-        values = np.linalg.svd(products, compute_uv=False)
-        values[..., 2] *= np.sign(np.linalg.det(products))
-        squares = 2 - 2 * values.sum(axis=-1)
+        squares = 2 - 2 * rotations_and_stretches(products)[1].sum(axis=-1)
         np.fill_diagonal(squares, 0)
         return np.sqrt(np.maximum(squares, 0))
 

@@ -107,6 +107,13 @@ def check_engine(source, engine, coarse):
         assert nearest(source, query, found.places, 1) == nearest(source, query, np.arange(400), 1)
 
 
+def test_vectors_of_an_engine_are_those_of_a_query_in_whole_steps(source):
+    coarse = coarse_rows(source, RECIPE)
+    vectors = engines.coarse_vectors(coarse, 10, 30).reshape(20, 3, -1)
+    exact = [coarse.axes.project_query(codes) for codes in source.codes[10:30, 0]]
+    assert (np.abs(vectors - exact) <= 0.501 * coarse.axes.steps.ravel()).all()
+
+
 def test_an_engine_supplies_what_a_scan_finds(source):
     coarse = coarse_rows(source, RECIPE)
     check_engine(source, Exhaustive(coarse), coarse)

@@ -40,6 +40,7 @@ from eigenshape.spectral.laws.outcomes import (
     SkippedLaw,
     check_promises,
 )
+from eigenshape.spectral.solve import solve_spectrum
 
 
 def bumpy(mesh: TriangleMesh, size: float = 0.03, seed: int = 1) -> TriangleMesh:
@@ -604,3 +605,24 @@ def test_a_law_that_is_not_promised_is_skipped_for_that_reason_first():
     }
     assert reasons[()]["reflection"] == "not promised"
     assert reasons["reflection",]["reflection"] == "a graph lies nowhere"
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_a_change_is_a_share_of_the_entries_of_its_rows(unit):
+    ball = cotangent_laplacian(icosphere(1))
+    before = Laplacian(unit * ball.stiffness, unit**2 * ball.mass)
+    after = Laplacian(1.25 * before.stiffness, before.mass)
+    change, place = sameness.distance(before, after)
+    assert change == pytest.approx(0.25, rel=1e-12)
+    assert place.startswith("the largest change is that of W_ij at ")
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_what_residuals_allow_is_a_share_of_the_last_eigenvalue(unit):
+    ball = cotangent_laplacian(icosphere(1))
+    laplacian = Laplacian(unit * ball.stiffness, ball.mass)
+    spectrum = solve_spectrum(laplacian, 5)
+    uncertain = replace(spectrum, residuals=np.full(5, 1e-6 * spectrum.eigenvalues[-1]))
+    law = sameness.same_eigenvalues("same", laplacian, uncertain, 1e-9)
+    assert law.holds
+    assert law.allowed == pytest.approx(1.001e-6, rel=1e-6)

@@ -113,6 +113,14 @@ def test_smoothing_keeps_the_volume_by_choice_whatever_the_unit(scale):
     assert volumes[2] == pytest.approx(volumes[0], rel=1e-12)
 
 
+def test_a_thin_shape_keeps_its_volume():
+    """It is the share of the volume that is lost which decides, not how small the volume is."""
+    thin = es.TriangleMesh(TORUS.vertices * [1, 1, 1e-4], TORUS.faces)
+    kept = es.spectral.smooth_mesh(thin, SPECTRUM, heat_filter(0.05), keep_volume=True)
+    volumes = [es.geometry.enclosed_volume(each) for each in (thin, kept)]
+    assert volumes[1] == pytest.approx(volumes[0], rel=1e-12)
+
+
 def test_smoothing_removes_noise():
     ball = es.icosphere(3)
     noise = 0.02 * np.random.default_rng(0).standard_normal(ball.vertices.shape)
