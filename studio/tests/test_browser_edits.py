@@ -20,7 +20,7 @@ from browser import (
 
 import eigenshape as es
 from eigenshape.deformation import BoxRegion, bend, bind, region_boundary, region_mask
-from eigenshape_studio.poses import carry_pose
+from eigenshape_studio.others.poses import carry_pose
 
 pytestmark = pytest.mark.long
 

@@ -20,9 +20,9 @@ from scipy.ndimage import binary_erosion, maximum_filter, minimum_filter
 
 import eigenshape as es
 from eigenshape.plot.render import palette
-from eigenshape_studio.analysis import N_MODES
-from eigenshape_studio.analysis import vertex_labels as label_vertices
 from eigenshape_studio.report import write_report
+from eigenshape_studio.shape.analysis import N_MODES
+from eigenshape_studio.shape.analysis import vertex_labels as label_vertices
 
 pytestmark = pytest.mark.long
 

@@ -11,12 +11,12 @@ from test_workspace import Page, file_of
 import eigenshape as es
 from eigenshape.collections.collection import fit_file, save_collection, write_fit
 from eigenshape.matching.spectral_refinement import corners_of_faces
-from eigenshape_studio.beside import Beside
 from eigenshape_studio.calls import RequestError
-from eigenshape_studio.mapping import NEAR, correct_map, map_of_match
 from eigenshape_studio.opening import open_workspace
-from eigenshape_studio.sessions import SessionFile
-from eigenshape_studio.workspace import Workspace
+from eigenshape_studio.others.beside import Beside
+from eigenshape_studio.others.mapping import NEAR, correct_map, map_of_match
+from eigenshape_studio.tab.sessions import SessionFile
+from eigenshape_studio.tab.workspace import Workspace
 
 
 @pytest.fixture(scope="module")

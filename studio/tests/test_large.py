@@ -7,13 +7,15 @@ from conftest import stretched_ball
 from test_workspace import Page, file_of
 
 import eigenshape as es
-from eigenshape_studio import analysis, workspace
-from eigenshape_studio.analysis import frame_shape
 from eigenshape_studio.opening import open_workspace
-from eigenshape_studio.workspace import Workspace
+from eigenshape_studio.shape import analysis
+from eigenshape_studio.shape.analysis import frame_shape
+from eigenshape_studio.tab import workspace
+from eigenshape_studio.tab.workspace import Workspace
 
 LOWER = """
-from eigenshape_studio import analysis, workspace
+from eigenshape_studio.shape import analysis
+from eigenshape_studio.tab import workspace
 analysis.LARGE, workspace.LIGHT = 500, 300
 """
 

@@ -21,8 +21,8 @@ from conftest import stretched_ball
 import eigenshape as es
 from eigenshape_studio.guard import Rules, local_hosts
 from eigenshape_studio.server import MOST_CALLS, make_app, serve
+from eigenshape_studio.tab.workspace import Answer
 from eigenshape_studio.wire import decode, encode
-from eigenshape_studio.workspace import Answer
 
 # The studio with limits that tests can reach within a second or two.
 SCRIPT = """

@@ -17,13 +17,13 @@ from conftest import stretched_ball
 from test_workspace import PULL, TURN, Page, bend, file_of
 
 import eigenshape as es
-from eigenshape_studio import sessions
-from eigenshape_studio.history import N_IN_MEMORY, History, Shape
-from eigenshape_studio.loading import Loaded
 from eigenshape_studio.server import Tabs
-from eigenshape_studio.sessions import SessionFile, remove_old
+from eigenshape_studio.shape.loading import Loaded
+from eigenshape_studio.tab import sessions
+from eigenshape_studio.tab.history import N_IN_MEMORY, History, Shape
+from eigenshape_studio.tab.sessions import SessionFile, remove_old
+from eigenshape_studio.tab.workspace import Workspace
 from eigenshape_studio.wire import decode, encode
-from eigenshape_studio.workspace import Workspace
 
 TAB = "a-tab-of-the-tests"
 
@@ -234,7 +234,7 @@ def test_regions_of_another_shape_are_refused(first):
 SERVERS = """
 import os, signal, sys
 from pathlib import Path
-from eigenshape_studio.analysis import warm_up
+from eigenshape_studio.shape.analysis import warm_up
 from eigenshape_studio.server import serve
 
 warm_up()

@@ -15,8 +15,8 @@ from conftest import stretched_ball
 from matplotlib.image import imread
 
 import eigenshape as es
+from eigenshape_studio.tab.workspace import Workspace
 from eigenshape_studio.wire import decode, encode
-from eigenshape_studio.workspace import Workspace
 
 CELL = """
 import eigenshape as es

@@ -9,11 +9,11 @@ import pytest
 from conftest import stretched_ball
 
 import eigenshape as es
-from eigenshape_studio.history import Shape
-from eigenshape_studio.loading import Loaded
 from eigenshape_studio.opening import open_workspace
+from eigenshape_studio.shape.loading import Loaded
+from eigenshape_studio.tab.history import Shape
+from eigenshape_studio.tab.workspace import Workspace
 from eigenshape_studio.wire import decode, encode
-from eigenshape_studio.workspace import Workspace
 
 TURN = {"type": "rotation", "pivot": [0, 0.9, 0], "axis": [0, 0, 2], "angle": 0.6}
 PULL = {"type": "translation", "vector": [0, 0.4, 0.1]}

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from eigenshape_studio.bundle import bundle_text
-from eigenshape_studio.jobs import Job
+from eigenshape_studio.shape.jobs import Job
 from eigenshape_studio.wire import encode_halves
 
 if TYPE_CHECKING:
-    from eigenshape_studio.workspace import Workspace
+    from eigenshape_studio.tab.workspace import Workspace
 
 N_MODES = 20  # eigenfunctions; with 20,000 vertices each takes about 50 kB of the file
 POLL = 0.1  # seconds between reports of progress

@@ -8,7 +8,7 @@ from typing import Any
 import eigenshape as es
 from eigenshape.plot.camera import Up, View
 from eigenshape_studio.onefile import N_MODES, report_page
-from eigenshape_studio.workspace import Workspace
+from eigenshape_studio.tab.workspace import Workspace
 
 
 def write_report(  # noqa: PLR0913  one for each option of the command

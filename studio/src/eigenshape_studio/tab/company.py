@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import eigenshape as es
-from eigenshape_studio.beside import Beside
 from eigenshape_studio.calls import Arrays, RequestError, file_bytes
-from eigenshape_studio.history import Shape
-from eigenshape_studio.landmarks import (
+from eigenshape_studio.others.beside import Beside
+from eigenshape_studio.others.landmarks import (
     SurfaceLandmarks,
     landmark_file,
     parse_landmarks,
     place_landmarks,
 )
-from eigenshape_studio.loading import Loaded
-from eigenshape_studio.mapping import DenseMap
-from eigenshape_studio.parse import display_name
-from eigenshape_studio.specimens import Specimens
+from eigenshape_studio.others.mapping import DenseMap
+from eigenshape_studio.others.specimens import Specimens
+from eigenshape_studio.shape.loading import Loaded
+from eigenshape_studio.shape.parse import display_name
+from eigenshape_studio.tab.history import Shape
 
 if TYPE_CHECKING:
-    from eigenshape_studio.workspace import Workspace
+    from eigenshape_studio.tab.workspace import Workspace
 
 SAMPLE_POSE = 1  # of a sample beside the shape; the one that opens as the shape has pose 0
 

@@ -16,7 +16,13 @@ import numpy as np
 import eigenshape as es
 from eigenshape.deformation.rig import pose_rig
 from eigenshape.geometry.resolution.thinning import thin_out
-from eigenshape_studio.analysis import (
+from eigenshape_studio.calls import Arrays, Reply, RequestError, file_bytes, whole
+from eigenshape_studio.onefile import N_MODES as N_REPORTED
+from eigenshape_studio.onefile import report_page
+from eigenshape_studio.others.poses import carry_pose
+from eigenshape_studio.others.search import Shelf
+from eigenshape_studio.others.specimens import Specimens
+from eigenshape_studio.shape.analysis import (
     LIGHT,
     N_MODES,
     Analysis,
@@ -24,20 +30,14 @@ from eigenshape_studio.analysis import (
     diagram_rows,
     vertex_labels,
 )
-from eigenshape_studio.calls import Arrays, Reply, RequestError, file_bytes, whole
-from eigenshape_studio.company import Company
-from eigenshape_studio.history import History, Pose, Shape
-from eigenshape_studio.jobs import NO_JOB, PreparingError, window_message
-from eigenshape_studio.loading import Field, Loaded, check_fields
-from eigenshape_studio.onefile import N_MODES as N_REPORTED
-from eigenshape_studio.onefile import report_page
-from eigenshape_studio.parse import Upload, display_name, parse_surface
-from eigenshape_studio.poses import carry_pose
-from eigenshape_studio.samples import SAMPLES, sample_mesh, sample_picture
-from eigenshape_studio.search import Shelf
-from eigenshape_studio.sessions import SessionFile
-from eigenshape_studio.sides import remember_side
-from eigenshape_studio.specimens import Specimens
+from eigenshape_studio.shape.jobs import NO_JOB, PreparingError, window_message
+from eigenshape_studio.shape.loading import Field, Loaded, check_fields
+from eigenshape_studio.shape.parse import Upload, display_name, parse_surface
+from eigenshape_studio.shape.samples import SAMPLES, sample_mesh, sample_picture
+from eigenshape_studio.shape.sides import remember_side
+from eigenshape_studio.tab.company import Company
+from eigenshape_studio.tab.history import History, Pose, Shape
+from eigenshape_studio.tab.sessions import SessionFile
 from eigenshape_studio.wire import WireError, decode, encode
 
 MOST_REGIONS = 4  # one component each of the attribute `shares` of the vertex shader
