@@ -10,20 +10,20 @@ import eigenshape as es
 from eigenshape_studio.opening import open_workspace
 from eigenshape_studio.shape import analysis
 from eigenshape_studio.shape.analysis import frame_shape
-from eigenshape_studio.tab import workspace
+from eigenshape_studio.tab import changes
 from eigenshape_studio.tab.workspace import Workspace
 
 LOWER = """
 from eigenshape_studio.shape import analysis
-from eigenshape_studio.tab import workspace
-analysis.LARGE, workspace.LIGHT = 500, 300
+from eigenshape_studio.tab import changes
+analysis.LARGE, changes.LIGHT = 500, 300
 """
 
 
 @pytest.fixture
 def page(monkeypatch):
     monkeypatch.setattr(analysis, "LARGE", 500)
-    monkeypatch.setattr(workspace, "LIGHT", 300)
+    monkeypatch.setattr(changes, "LIGHT", 300)
     mesh = stretched_ball()
     height = {"height (m)": mesh.vertices[:, 1]}
     return Page(Workspace(mesh, "ball.ply", values=height, shared=True).fork())

@@ -1,10 +1,8 @@
 """What stands beside the shape of a tab: a second shape with a map, landmarks, a collection."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,19 +20,19 @@ from eigenshape_studio.others.specimens import Specimens
 from eigenshape_studio.shape.loading import Loaded
 from eigenshape_studio.shape.parse import display_name
 from eigenshape_studio.tab.history import Shape
-
-if TYPE_CHECKING:
-    from eigenshape_studio.tab.workspace import Workspace
+from eigenshape_studio.tab.scene import Scene
+from eigenshape_studio.tab.searching import Searching
 
 SAMPLE_POSE = 1  # of a sample beside the shape; the one that opens as the shape has pose 0
 
 
 class Company:
-    """The second shape, landmarks and collection of a workspace.
+    """The second shape, landmarks and collection of a tab.
 
     Parameters
     ----------
-    workspace : Workspace
+    scene : Scene
+    searching : Searching
 
     Attributes
     ----------
@@ -44,8 +42,8 @@ class Company:
         What returns an array, by the first part of its name.
     """
 
-    def __init__(self, workspace: Workspace) -> None:
-        self._of = workspace
+    def __init__(self, scene: Scene, searching: Searching) -> None:
+        self._of, self._searching = scene, searching
         self._beside: Beside | None = None  # of the shape at rest and the second one
         self._lock = threading.Lock()
         self.works: dict[str, Callable[[dict[str, Any], Arrays], None]] = {
@@ -142,7 +140,7 @@ class Company:
     def _read(self, meta: dict[str, Any], arrays: Arrays) -> tuple[es.TriangleMesh, str]:
         """Return the mesh and the name of what a call wants to see."""
         if "match" in meta:
-            return self._of.read_match(meta["match"])
+            return self._searching.read_match(meta["match"])
         if "sample" in meta:
             kind = str(meta["sample"])
             return es.make_creature(kind, SAMPLE_POSE), kind
@@ -150,7 +148,7 @@ class Company:
             name = str(meta["specimen"])
             return self._require_specimens().mesh(name), name
         name = display_name(meta.get("name"))
-        return self._of.read_surface(name, file_bytes(arrays, "file")), name
+        return self._of.parse(name, file_bytes(arrays, "file")).mesh, name
 
     def _correct(self, _meta: dict[str, Any], arrays: Arrays) -> None:
         """Correct the map by pairs of vertices."""
@@ -178,7 +176,7 @@ class Company:
             raise RequestError("names must be a list of the names of landmarks.")
         placed, told = place_landmarks(self._of.mesh, names, points)
         self._of.history.did("Landmarks", landmarks=placed.write())
-        self._of.warn(told)
+        self._of.warnings += told
 
     def _landmarks_array(self, tail: str) -> np.ndarray:
         """Return a file of the landmarks of a side, as "0/fcsv", or vertices near carried ones."""
