@@ -47,5 +47,5 @@ def url(path):
 def page(browser, url):
     """A tab of its own, whose shape can be deformed."""
     with open_page(browser, url) as page:
-        wait_until(page, "eigenshape.state.deformation.status === 'ready'", 120)
+        wait_until(page, "eigenshape.state.deformation.status === 'ready'")
         yield page

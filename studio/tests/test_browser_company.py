@@ -77,7 +77,7 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     with page.expect_file_chooser() as chooser:
         find(page, "second-file").click()
     chooser.value.set_files(other)
-    wait_until(page, "eigenshape.state.beside?.map.status === 'ready'", 120)
+    wait_until(page, "eigenshape.state.beside?.map.status === 'ready'")
     wait_until(page, "eigenshape.panels.find(({ id }) => id === 'compare').map !== null")
     wait_until_still(page)
 
@@ -111,14 +111,14 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     page.mouse.click(*place)
     _there, place = seen_vertex(page, 1)
     page.mouse.click(*place)
-    wait_until(page, "eigenshape.state.beside.pairs.length === 1", 60)
-    wait_until(page, "eigenshape.state.beside.map.status === 'ready'", 60)
+    wait_until(page, "eigenshape.state.beside.pairs.length === 1")
+    wait_until(page, "eigenshape.state.beside.map.status === 'ready'")
     wait_until_still(page)
     chosen = page.evaluate("eigenshape.state.beside.pairs[0]")
     assert page.evaluate(f"{compare}.partners[0][{chosen[0]}]") == chosen[1]
     page.keyboard.press("Control+z")
-    wait_until(page, "eigenshape.state.beside.pairs.length === 0", 60)
-    wait_until(page, "eigenshape.state.beside.map.status === 'ready'", 60)
+    wait_until(page, "eigenshape.state.beside.pairs.length === 0")
+    wait_until(page, "eigenshape.state.beside.map.status === 'ready'")
     wait_until_still(page)
 
     # What is painted on one is seen on the other.

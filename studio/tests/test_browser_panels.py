@@ -365,7 +365,7 @@ def test_shape_panel_opens_repairs_and_saves(page, folder, mesh):
 def test_search_ranks_shapes_and_shows_corresponding_points(page, folder, mesh):
     open_panel(page, "search")
     find(page, "search").click()
-    find(page, "match-0").wait_for(timeout=60_000)
+    find(page, "match-0").wait_for()
     index = es.ShapeIndex.open(folder / "index")
     # The first match is the shape itself, which the page leaves out.
     matches = index.query(mesh, n_matches=10)[1:]
@@ -386,7 +386,7 @@ def test_search_ranks_shapes_and_shows_corresponding_points(page, folder, mesh):
     assert page.locator('[data-test="canvas"]').count() == 1
     # What was found is found again after a reload.
     page.reload()
-    find(page, "match-0").wait_for(timeout=60_000)
+    find(page, "match-0").wait_for()
     again = find(page, "matches").locator("button").all_inner_texts()
     assert again == cards
 
@@ -398,7 +398,7 @@ def test_search_ranks_shapes_and_shows_corresponding_points(page, folder, mesh):
     wait_until_still(page)
     open_panel(page, "search")
     find(page, "search-part").click()
-    page.get_by_text("Shapes with a part like the painted one.").wait_for(timeout=60_000)
+    page.get_by_text("Shapes with a part like the painted one.").wait_for()
     assert find(page, "matches").locator("button").count() >= 1
 
 

@@ -31,7 +31,7 @@ TAB = "a-tab-of-the-tests"
 @pytest.fixture(scope="module")
 def first():
     workspace = Workspace(stretched_ball(2), "ball.ply", shared=True)
-    assert workspace.analysis.rig.wait(120)
+    assert workspace.analysis.rig.wait(600)
     return workspace
 
 
@@ -139,7 +139,7 @@ def test_a_session_does_not_need_the_shape_that_the_server_shows(first, top, tmp
     # An edit that is sent while the modes are computed anew is sent again.
     call = {"kind": "commit", "handles": [PULL], "mode": "graded"}
     select(again, *top)
-    assert again.workspace.analysis.rig.wait(60)
+    assert again.workspace.analysis.rig.wait(600)
     again.call("finish", call)
     assert again.call("meta")[0]["deformation"]["n_edits"] == 2
     again.workspace.close()
@@ -332,7 +332,7 @@ def test_no_edit_is_lost_by_a_server_that_is_killed(first, top, tmp_path, in_tur
     es.write_mesh(first.mesh, tmp_path / "ball.ply")
     calls = script(top)
     steady = Page(Workspace(es.read_mesh(tmp_path / "ball.ply"), "ball.ply").fork())
-    assert steady.workspace.analysis.rig.wait(60)
+    assert steady.workspace.analysis.rig.wait(600)
     for meta, arrays in calls:
         steady.call("finish", meta, arrays)
     n_places = len(steady.call("meta")[0]["history"]) + 1
