@@ -163,8 +163,10 @@ def open_page(
     if more and ready == HAS_SHAPE:
         wait_until(page, "eigenshape.active !== null")
         page.evaluate(SHOW_MORE)
-    yield page
-    context.close()
+    try:
+        yield page
+    finally:
+        context.close()
     seen = [line for line in seen if not any(text in line for text in expected)]
     assert not seen, "\n".join(seen)
 
@@ -189,10 +191,11 @@ def wait_until(page: Page, condition: str, seconds: float = PATIENCE) -> None:
 
     `page.wait_for_function` would call eval, which the policy of the page forbids.
     """
-    end = monotonic() + seconds
+    end, pause = monotonic() + seconds, 20.0
     while not page.evaluate(condition):
         assert monotonic() < end, f"not true within {seconds} s: {condition}"
-        page.wait_for_timeout(50)
+        page.wait_for_timeout(pause)
+        pause = min(1.5 * pause, 300.0)  # to ask often would slow down what takes long
 
 
 def move_pointer(page: Page, x: float, y: float, steps: int = 1) -> None:

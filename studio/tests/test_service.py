@@ -17,7 +17,7 @@ from urllib.parse import quote, urlsplit
 import httpx
 import numpy as np
 import pytest
-from browser import drop_file, find, open_page, start_browser, wait_until
+from browser import drop_file, find, open_page, wait_until
 from test_server import GOOD, HOSTILE, Server, ply_of
 
 import eigenshape as es
@@ -641,7 +641,7 @@ def test_sixteen_clients_with_some_hostile_requests(service):
     assert metrics_of(service)["eigenshape_queue"] == 0
 
 
-def test_the_page_shows_matches_with_pictures_and_errors_in_words(service, tmp_path):
+def test_the_page_shows_matches_with_pictures_and_errors_in_words(service, browser, tmp_path):
     scan, bad = tmp_path / "fish.off", tmp_path / "bad.off"
     es.write_mesh(es.make_creature("fish", 1, n_vertices=500), scan)
     bad.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n")
@@ -652,31 +652,30 @@ def test_the_page_shows_matches_with_pictures_and_errors_in_words(service, tmp_p
         "[...document.querySelectorAll('.stage')].every((each) => each.firstChild)"
     )
     url = f"{service.base}/?token={TOKEN}"
-    with start_browser() as browser:
-        with open_page(browser, url, ready=ready) as page:
-            assert "token" not in page.url
-            drop_file(page, "drop", scan)
-            wait_until(page, pictures)
-            wait_until(page, "[...document.images].every((each) => each.naturalWidth > 0)")
-            assert "zoo/fish" in find(page, "match-0").inner_text()
-            assert find(page, "match-0").locator("circle").count() > 3
-            assert find(page, "scan-picture").locator("circle").count() > 3
-            # Names are shown as they are, and never read as HTML.
-            assert MARKUP in find(page, "matches").inner_text()
-        with open_page(browser, url, ready=ready, dark=True) as page:
-            drop_file(page, "drop", scan)
-            wait_until(page, pictures)
-            page.goto(f"{service.base}/docs")
-            wait_until(page, "document.querySelectorAll('article').length >= 7")
-        # Chromium itself writes a line for each answer with an error.
-        context = browser.new_context()
-        page = context.new_page()
-        page.goto(url)
-        wait_until(page, ready)
-        drop_file(page, "drop", bad)
-        wait_until(page, "document.querySelector('.status.bad') !== null")
-        assert "bad.off could not be described: " in find(page, "status").inner_text()
-        context.close()
+    with open_page(browser, url, ready=ready) as page:
+        assert "token" not in page.url
+        drop_file(page, "drop", scan)
+        wait_until(page, pictures)
+        wait_until(page, "[...document.images].every((each) => each.naturalWidth > 0)")
+        assert "zoo/fish" in find(page, "match-0").inner_text()
+        assert find(page, "match-0").locator("circle").count() > 3
+        assert find(page, "scan-picture").locator("circle").count() > 3
+        # Names are shown as they are, and never read as HTML.
+        assert MARKUP in find(page, "matches").inner_text()
+    with open_page(browser, url, ready=ready, dark=True) as page:
+        drop_file(page, "drop", scan)
+        wait_until(page, pictures)
+        page.goto(f"{service.base}/docs")
+        wait_until(page, "document.querySelectorAll('article').length >= 7")
+    # Chromium itself writes a line for each answer with an error.
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(url)
+    wait_until(page, ready)
+    drop_file(page, "drop", bad)
+    wait_until(page, "document.querySelector('.status.bad') !== null")
+    assert "bad.off could not be described: " in find(page, "status").inner_text()
+    context.close()
 
 
 @pytest.mark.parametrize(

@@ -153,19 +153,19 @@ def run_cell(page):
 @pytest.mark.long
 def test_jupyterlab_shows_the_widget(lab, browser):
     pytest.importorskip("jupyterlab")
-    page = browser.new_page(viewport={"width": 1280, "height": 900})
-    seen = []
-    page.on("pageerror", lambda error: seen.append(str(error)))
-    page.goto(lab)
-    run_cell(page)
-    error = page.locator("[data-mime-type='application/vnd.jupyter.error']")
-    assert not error.count(), error.first.inner_text()
-    canvas = page.locator(".jp-OutputArea canvas").first
-    canvas.wait_for(timeout=120_000)
-    find(page, "counts").get_by_text("642 vertices").wait_for(timeout=60_000)
-    find(page, "legend").get_by_text("height, m").wait_for()  # the values that were given
-    find(page, "tab-spectrum").click()
-    find(page, "panel-spectrum").get_by_text("none is missing").wait_for(timeout=60_000)
-    shown = imread(BytesIO(canvas.screenshot()))
-    assert shown.std() > 0.05  # the shape, and not one color
-    assert not seen, seen
+    with browser.new_page(viewport={"width": 1280, "height": 900}) as page:
+        seen = []
+        page.on("pageerror", lambda error: seen.append(str(error)))
+        page.goto(lab)
+        run_cell(page)
+        error = page.locator("[data-mime-type='application/vnd.jupyter.error']")
+        assert not error.count(), error.first.inner_text()
+        canvas = page.locator(".jp-OutputArea canvas").first
+        canvas.wait_for(timeout=120_000)
+        find(page, "counts").get_by_text("642 vertices").wait_for(timeout=60_000)
+        find(page, "legend").get_by_text("height, m").wait_for()  # the values that were given
+        find(page, "tab-spectrum").click()
+        find(page, "panel-spectrum").get_by_text("none is missing").wait_for(timeout=60_000)
+        shown = imread(BytesIO(canvas.screenshot()))
+        assert shown.std() > 0.05  # the shape, and not one color
+        assert not seen, seen

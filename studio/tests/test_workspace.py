@@ -204,15 +204,15 @@ def test_edits_are_saved_and_replayed_on_another_resolution(page, top):
     bent = es.deform(es.rig_shape(stretched_ball()), top.astype(int), ROTATION)
     np.testing.assert_array_equal(again, bent.vertices.astype("<f4"))
 
-    fine = Page(Workspace(stretched_ball(4)))
-    assert fine.workspace.analysis.rig.wait(600)
-    error = fine.error("finish", kind="replay", edits=edits)
+    coarse = Page(Workspace(stretched_ball(2)))
+    assert coarse.workspace.analysis.rig.wait(600)
+    error = coarse.error("finish", kind="replay", edits=edits)
     assert "choose its file together with the edits" in error["message"]
     arrays = {"source": file_of(stretched_ball())}
-    found = fine.call("finish", {"kind": "replay", "edits": edits, "source": "ball.ply"}, arrays)
+    found = coarse.call("finish", {"kind": "replay", "edits": edits, "source": "ball.ply"}, arrays)
     assert found[0]["state"]["deformation"]["n_edits"] == 1
     edit = es.deformation.Edit((es.deformation.Move(top.astype(int), ROTATION),))
-    rig = es.rig_shape(stretched_ball(4))
+    rig = es.rig_shape(stretched_ball(2))
     expected = es.deformation.replay(rig, [edit], source=stretched_ball()).mesh
     np.testing.assert_array_equal(found[1]["vertices"], expected.vertices.astype("<f4"))
 
