@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
-from eigenshape_studio.calls import RequestError, whole
+from eigenshape_studio.calls import Families, Meta, RequestError, whole
 from eigenshape_studio.shape.analysis import cut_rows, diagram_rows, vertex_labels
 from eigenshape_studio.shape.samples import sample_picture
 from eigenshape_studio.tab.scene import Scene
@@ -35,7 +35,7 @@ class ShapeArrays:
         self._painting = threading.Lock()
         # The pose that the brush last painted on, and the function that computes distances on it.
         self._waves: tuple[Any, Any] = (None, None)
-        self.makers: dict[str, Callable[[dict[str, Any]], np.ndarray]] = {
+        self.makers: dict[str, Callable[[Meta], np.ndarray]] = {
             "vertices": lambda _: scene.mesh.vertices.astype("<f4"),
             "faces": lambda _: scene.analysis.mesh.faces.astype("<u4"),
             "points": self._points,
@@ -48,19 +48,19 @@ class ShapeArrays:
             "crossings": self._crossings,
             "regions": self._regions,
         }
-        self.families: dict[str, Callable[[str], np.ndarray]] = {
+        self.families: Families = {
             "parts": self._parts,
             "values": self._values,
             "disc": self._disc,
             "sample": sample_picture,
         }
 
-    def _regions(self, _meta: dict[str, Any]) -> np.ndarray:
+    def _regions(self, _meta: Meta) -> np.ndarray:
         """Return the region of each vertex, as the page chose it; empty where it chose none."""
         found = self._of.history.owners(self._of.history.now)
         return np.empty(0, np.uint8) if found is None else found
 
-    def _points(self, _meta: dict[str, Any]) -> np.ndarray:
+    def _points(self, _meta: Meta) -> np.ndarray:
         points = self._of.history.now.shape.points
         if points is None:
             raise RequestError("There must be points that the surface was made of; there are none.")
@@ -74,19 +74,19 @@ class ShapeArrays:
             )
         return found
 
-    def _modes(self, meta: dict[str, Any]) -> np.ndarray:
+    def _modes(self, meta: Meta) -> np.ndarray:
         modes = self._spectrum().eigenvectors
         start = whole(meta, "start", 0, modes.shape[1], 0)
         stop = whole(meta, "stop", start, modes.shape[1], modes.shape[1])
         return np.ascontiguousarray(modes[:, start:stop].T, dtype="<f4")
 
-    def _coefficients(self, _meta: dict[str, Any]) -> np.ndarray:
+    def _coefficients(self, _meta: Meta) -> np.ndarray:
         """Return the coordinates of the present pose in terms of the modes, (k, 3)."""
         spectrum = self._spectrum()
         weighted = spectrum.mass @ self._of.mesh.vertices
         return np.asarray(spectrum.eigenvectors.T @ weighted).astype("<f4")
 
-    def _brackets(self, meta: dict[str, Any]) -> np.ndarray:
+    def _brackets(self, meta: Meta) -> np.ndarray:
         k = whole(meta, "stop", 1, min(300, self._of.analysis.mesh.n_vertices), N_BRACKETS)
         found = self._of.analysis.brackets
         if found is None or len(found.lower) < k:
@@ -100,7 +100,7 @@ class ShapeArrays:
             raise RequestError("The parts must be ready; they are not. Find the parts first.")
         return found
 
-    def _diagram(self, _meta: dict[str, Any]) -> np.ndarray:
+    def _diagram(self, _meta: Meta) -> np.ndarray:
         found = self._require_parts()
         return diagram_rows(found.mesh, found.heat)
 
@@ -119,7 +119,7 @@ class ShapeArrays:
             )
         return self._of.fields[tail].values.astype("<f4")
 
-    def _crossings(self, _meta: dict[str, Any]) -> np.ndarray:
+    def _crossings(self, _meta: Meta) -> np.ndarray:
         return es.geometry.self_intersections(self._of.mesh).astype("<u4").reshape(-1, 2)
 
     def _disc(self, tail: str) -> np.ndarray:

@@ -14,7 +14,16 @@ import numpy as np
 
 import eigenshape as es
 from eigenshape.deformation.rig import pose_rig
-from eigenshape_studio.calls import Arrays, Reply, RequestError, file_bytes, whole
+from eigenshape_studio.calls import (
+    Arrays,
+    Families,
+    Meta,
+    Reply,
+    RequestError,
+    Works,
+    file_bytes,
+    whole,
+)
 from eigenshape_studio.shape.jobs import NO_JOB, PreparingError
 from eigenshape_studio.tab.history import Pose
 from eigenshape_studio.tab.scene import Scene
@@ -45,10 +54,8 @@ class Bending:
 
     Attributes
     ----------
-    works : {str: callable}
-        What changes something, by the kind of the call.
-    families : {str: callable}
-        What returns an array, by the first part of its name.
+    works : Works
+    families : Families
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -57,13 +64,13 @@ class Bending:
         self._mode = "graded"
         # The pose that is dragged, and the session in which it is.
         self._dragged: tuple[Pose | None, es.DeformationSession | None] = (None, None)
-        self.works: dict[str, Callable[[dict[str, Any], Arrays], np.ndarray | None]] = {
+        self.works: Works = {
             "preview": self._preview,
             "commit": self._commit,
             "cancel": self._cancel,
             "replay": self._replay,
         }
-        self.families: dict[str, Callable[[str], np.ndarray]] = {"skeleton": self._skeleton}
+        self.families: Families = {"skeleton": self._skeleton}
 
     def facts(self) -> dict[str, Any]:
         """Return what the page shows of it."""
@@ -106,7 +113,7 @@ class Bending:
             raise RequestError(f"The shape must be prepared for bending: {why}")
         return job.result
 
-    def bind(self, meta: dict[str, Any], arrays: Arrays) -> Reply:
+    def bind(self, meta: Meta, arrays: Arrays) -> Reply:
         """Bind regions, and return the share by which each vertex follows each of them."""
         n_regions = whole(meta, "n_regions", 1, MOST_REGIONS)
         n_modes = None if meta.get("n_modes") is None else whole(meta, "n_modes", 1, MOST_MODES)
@@ -144,14 +151,14 @@ class Bending:
         self.bound = bound
         return session.binding
 
-    def _preview(self, meta: dict[str, Any], _arrays: Arrays) -> np.ndarray:
+    def _preview(self, meta: Meta, _arrays: Arrays) -> np.ndarray:
         """Return the exact result of a motion, which is not kept."""
         bound, entries, mode = self._motion(meta)
         binding = self._drag(bound, entries)
         handles = [handle_from(entry) for entry in entries]
         return self._listen(mode, lambda: es.deformation.bend(binding, handles, mode=mode).vertices)
 
-    def _commit(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _commit(self, meta: Meta, _arrays: Arrays) -> None:
         bound, entries, mode = self._motion(meta)
         self._drag(bound, entries)
         session = self._session()
@@ -159,7 +166,7 @@ class Bending:
         self._mode = mode
         self._of.history.bend(session.edits, bent, "Bend")
 
-    def _motion(self, meta: dict[str, Any]) -> tuple[Bound, list[Any], Any]:
+    def _motion(self, meta: Meta) -> tuple[Bound, list[Any], Any]:
         """Return what a call moves, by which handles and in which mode."""
         entries, mode = meta.get("handles"), meta.get("mode", self._mode)
         if self.bound is None:
@@ -176,7 +183,7 @@ class Bending:
             raise RequestError(f"mode must be one of {', '.join(MODES)}; it is {mode!r:.80}.")
         return self.bound, entries, mode
 
-    def _chosen(self, meta: dict[str, Any]) -> Bound | None:
+    def _chosen(self, meta: Meta) -> Bound | None:
         """Return what the chosen regions move; the server may have begun anew since they were bound."""
         history = self._of.history
         owners = history.owners(history.now)
@@ -198,11 +205,11 @@ class Bending:
         self._of.warnings += [str(warning.message) for warning in heard]
         return result
 
-    def _cancel(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _cancel(self, _meta: Meta, _arrays: Arrays) -> None:
         self.bound = None
         self._session().cancel()
 
-    def _replay(self, meta: dict[str, Any], arrays: Arrays) -> None:
+    def _replay(self, meta: Meta, arrays: Arrays) -> None:
         """Apply stored edits; of another mesh of the shape if the array `source` holds its file."""
         rig = self._rig_at_rest()
         source = None

@@ -1,14 +1,12 @@
 """Changes of a tab beside bending: steps through its history, and other shapes."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 import eigenshape as es
 from eigenshape.geometry.resolution.thinning import thin_out
-from eigenshape_studio.calls import Arrays, RequestError, file_bytes, whole
+from eigenshape_studio.calls import Arrays, Meta, RequestError, Works, file_bytes, whole
 from eigenshape_studio.others.poses import carry_pose
 from eigenshape_studio.shape.analysis import LIGHT
 from eigenshape_studio.shape.loading import Loaded
@@ -30,13 +28,12 @@ class Changes:
 
     Attributes
     ----------
-    works : {str: callable}
-        What changes something, by the kind of the call.
+    works : Works
     """
 
     def __init__(self, scene: Scene, searching: Searching) -> None:
         self._of, self._searching = scene, searching
-        self.works: dict[str, Callable[[dict[str, Any], Arrays], None]] = {
+        self.works: Works = {
             "undo": self._undo,
             "redo": self._redo,
             "go": self._go,
@@ -54,34 +51,34 @@ class Changes:
             "face": self._face,
         }
 
-    def _undo(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _undo(self, _meta: Meta, _arrays: Arrays) -> None:
         if not self._of.history.place:
             raise RequestError("There must be an edit to undo; there is none.")
         self._of.history.go(self._of.history.place - 1)
 
-    def _redo(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _redo(self, _meta: Meta, _arrays: Arrays) -> None:
         if self._of.history.place == len(self._of.history.moments) - 1:
             raise RequestError("There must be an undone edit to redo; there is none.")
         self._of.history.go(self._of.history.place + 1)
 
-    def _go(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _go(self, meta: Meta, _arrays: Arrays) -> None:
         """Go to a place of the history."""
         self._of.history.go(whole(meta, "place", 0, len(self._of.history.moments) - 1))
 
-    def _select(self, meta: dict[str, Any], arrays: Arrays) -> None:
+    def _select(self, meta: Meta, arrays: Arrays) -> None:
         """Take the region of each vertex."""
         if "regions" not in arrays:
             raise RequestError("The call must have an array 'regions'.")
         self._of.history.select(arrays["regions"], str(meta.get("text", "Select"))[:60])
 
-    def _choose(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _choose(self, meta: Meta, _arrays: Arrays) -> None:
         """Show a shape of the list."""
         self._of.history.choose(self._of.listed_shape(meta.get("shape")))
 
-    def _reset(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _reset(self, _meta: Meta, _arrays: Arrays) -> None:
         self._of.history.did("All undone", pose=self._of.history.now.shape.rest)
 
-    def _repair(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _repair(self, meta: Meta, _arrays: Arrays) -> None:
         """Repair the shape in its present pose, which becomes the shape."""
         names = meta.get("names")
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
@@ -93,7 +90,7 @@ class Changes:
         self._of.history.show(loaded, self._of.analysis.name, f"Repair: {', '.join(names)}")
         self._of.warnings += done.report
 
-    def _lighten(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _lighten(self, _meta: Meta, _arrays: Arrays) -> None:
         """Show a copy of the shape in its present pose that has fewer vertices."""
         n_vertices = self._of.mesh.n_vertices
         thin, source = thin_out(self._of.mesh, LIGHT)
@@ -108,7 +105,7 @@ class Changes:
         )
         self._of.warnings.append(f"{thin.n_vertices:,} of {n_vertices:,} vertices were kept.")
 
-    def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
+    def _open(self, meta: Meta, arrays: Arrays) -> None:
         """Show the mesh of a file, a sample, or a shape of the index by its name."""
         if "match" in meta:
             self._of.show(*self._searching.read_match(meta["match"]))
@@ -122,18 +119,18 @@ class Changes:
         loaded = Loaded(found.mesh, points=found.points)
         self._of.history.show(loaded, name, f"Open {name}")
 
-    def _face(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _face(self, meta: Meta, _arrays: Arrays) -> None:
         """Let another direction be up and another side the front, now and later on."""
         analysis = self._of.analysis
         analysis.look_from(meta.get("towards", "auto"), meta.get("up", "auto"))
         side = analysis.view()
         remember_side(analysis.mesh, side["up"], side["towards"])
 
-    def _solve(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _solve(self, meta: Meta, _arrays: Arrays) -> None:
         most = min(MOST_MODES, self._of.analysis.mesh.n_vertices)
         self._of.analysis.solve(whole(meta, "k", 1, most))
 
-    def _transfer(self, meta: dict[str, Any], arrays: Arrays) -> None:
+    def _transfer(self, meta: Meta, arrays: Arrays) -> None:
         """Bend another shape as this one was bent; the result becomes the shape."""
         name = display_name(meta.get("name"))
         target = self._of.parse(name, file_bytes(arrays, "file")).mesh

@@ -1,13 +1,12 @@
 """What stands beside the shape of a tab: a second shape with a map, landmarks, a collection."""
 
 import threading
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 import eigenshape as es
-from eigenshape_studio.calls import Arrays, RequestError, file_bytes
+from eigenshape_studio.calls import Arrays, Families, Meta, RequestError, Works, file_bytes
 from eigenshape_studio.others.beside import Beside
 from eigenshape_studio.others.landmarks import (
     SurfaceLandmarks,
@@ -46,7 +45,7 @@ class Company:
         self._of, self._searching = scene, searching
         self._beside: Beside | None = None  # of the shape at rest and the second one
         self._lock = threading.Lock()
-        self.works: dict[str, Callable[[dict[str, Any], Arrays], None]] = {
+        self.works: Works = {
             "beside": self._open,
             "map": lambda *_: self._require_beside().start(),
             "correct": self._correct,
@@ -54,7 +53,7 @@ class Company:
             "landmarks": self._set_landmarks,
             "mean": self._show_mean,
         }
-        self.families: dict[str, Callable[[str], np.ndarray]] = {
+        self.families: Families = {
             "beside": lambda tail: self._require_beside().array(tail),
             "landmarks": self._landmarks_array,
             "collection": lambda tail: self._require_specimens().array(tail),
@@ -123,7 +122,7 @@ class Company:
             raise RequestError("There must be a collection; open the studio with its folder.")
         return self._of.specimens
 
-    def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
+    def _open(self, meta: Meta, arrays: Arrays) -> None:
         """Show a second shape: of the list, a file, a match, a sample or a specimen; or none."""
         history = self._of.history
         if meta.get("close"):
@@ -137,7 +136,7 @@ class Company:
         second.mesh  # noqa: B018  a file that cannot be read must not stand beside
         history.did(f"{second.name} beside", beside=second.number, pairs=b"")
 
-    def _read(self, meta: dict[str, Any], arrays: Arrays) -> tuple[es.TriangleMesh, str]:
+    def _read(self, meta: Meta, arrays: Arrays) -> tuple[es.TriangleMesh, str]:
         """Return the mesh and the name of what a call wants to see."""
         if "match" in meta:
             return self._searching.read_match(meta["match"])
@@ -150,22 +149,22 @@ class Company:
         name = display_name(meta.get("name"))
         return self._of.parse(name, file_bytes(arrays, "file")).mesh, name
 
-    def _correct(self, _meta: dict[str, Any], arrays: Arrays) -> None:
+    def _correct(self, _meta: Meta, arrays: Arrays) -> None:
         """Correct the map by pairs of vertices."""
         given = arrays.get("pairs", np.empty(0, dtype=np.int64))
         pairs = self._require_beside().check_pairs(given)
         self._of.history.did("Correct the map", pairs=pairs.tobytes())
 
-    def _take_pose(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _take_pose(self, _meta: Meta, _arrays: Arrays) -> None:
         """Bend the shape into the pose of the second one; the result becomes the shape."""
         self._of.show(self._require_beside().take_pose(), self._of.analysis.name)
 
-    def _show_mean(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _show_mean(self, _meta: Meta, _arrays: Arrays) -> None:
         """Show the mean of the collection."""
         specimens = self._require_specimens()
         self._of.show(specimens.mean, specimens.title)
 
-    def _set_landmarks(self, meta: dict[str, Any], arrays: Arrays) -> None:
+    def _set_landmarks(self, meta: Meta, arrays: Arrays) -> None:
         """Take all landmarks anew: by names and points, or from a file."""
         names, points = meta.get("names"), arrays.get("points", np.empty(0))
         if "file" in arrays:

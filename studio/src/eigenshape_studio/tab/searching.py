@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
-from eigenshape_studio.calls import Arrays, Reply, RequestError, file_bytes, whole
+from eigenshape_studio.calls import Arrays, Meta, Reply, RequestError, file_bytes, whole
 from eigenshape_studio.others.search import Shelf
 from eigenshape_studio.shape.parse import display_name, parse_surface
 from eigenshape_studio.tab.scene import Scene
@@ -30,7 +30,7 @@ class Searching:
             raise RequestError("There must be an index to search in; open the studio with --index.")
         return self._shelf
 
-    def query(self, meta: dict[str, Any], arrays: Arrays) -> Reply:
+    def query(self, meta: Meta, arrays: Arrays) -> Reply:
         """Search an index for shapes like the present one, a part of it, or that of a file."""
         shelf = self._require_shelf()
         n_matches = whole(meta, "n_matches", 1, 100, 5)

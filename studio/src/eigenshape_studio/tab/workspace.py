@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
-from eigenshape_studio.calls import Arrays, Reply, RequestError
+from eigenshape_studio.calls import Arrays, Families, Meta, Reply, RequestError, Works
 from eigenshape_studio.onefile import N_MODES as N_REPORTED
 from eigenshape_studio.onefile import report_page
 from eigenshape_studio.others.search import Shelf
@@ -101,20 +101,20 @@ class Workspace(Scene):
         self.bending = Bending(self)
         self.company = Company(self, self.searching)
         shown, changes = ShapeArrays(self), Changes(self, self.searching)
-        self._calls: dict[str, Callable[[dict[str, Any], Arrays], Reply]] = {
+        self._calls: dict[str, Callable[[Meta, Arrays], Reply]] = {
             "meta": lambda *_: (self.state(), {}),
             "array": self._call_array,
             "rig": self.bending.bind,
             "finish": self._finish,
             "query": self.searching.query,
         }
-        self._works: dict[str, Callable[[dict[str, Any], Arrays], np.ndarray | None]] = {
+        self._works: Works = {
             **self.bending.works,
             **changes.works,
             **self.company.works,
         }
         self._makers = shown.makers
-        self._families: dict[str, Callable[[str], np.ndarray]] = {
+        self._families: Families = {
             **shown.families,
             **self.bending.families,
             **self.company.families,
@@ -195,14 +195,14 @@ class Workspace(Scene):
             "samples": list(SAMPLES) if self.welcome else [],
         }
 
-    def _call_array(self, meta: dict[str, Any], _arrays: Arrays) -> Reply:
+    def _call_array(self, meta: Meta, _arrays: Arrays) -> Reply:
         """Return one array by its name."""
         name = meta.get("name")
         if not isinstance(name, str):
             raise RequestError(f"The name of an array must be text; it is {name!r:.80}.")
         return {}, {name: self.array(name, meta)}
 
-    def array(self, name: str, meta: dict[str, Any] | None = None) -> np.ndarray:
+    def array(self, name: str, meta: Meta | None = None) -> np.ndarray:
         """Return one array by its name; `meta` may hold the range start..stop.
 
         Raises
@@ -267,7 +267,7 @@ class Workspace(Scene):
             names += ["parts/labels", "parts/cuts", "diagram"]
         return report_page(state, {name: self.array(name) for name in names}, self.array("modes"))
 
-    def _finish(self, meta: dict[str, Any], arrays: Arrays) -> Reply:
+    def _finish(self, meta: Meta, arrays: Arrays) -> Reply:
         """Change something, and return the new state."""
         kind = meta.get("kind")
         if not isinstance(kind, str) or kind not in self._works:
