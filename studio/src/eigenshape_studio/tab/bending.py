@@ -116,7 +116,6 @@ class Bending:
     def bind(self, meta: Meta, arrays: Arrays) -> Reply:
         """Bind regions, and return the share by which each vertex follows each of them."""
         n_regions = whole(meta, "n_regions", 1, MOST_REGIONS)
-        n_modes = None if meta.get("n_modes") is None else whole(meta, "n_modes", 1, MOST_MODES)
         names = [f"region{number}" for number in range(n_regions)]
         names += ["fixed"] if meta.get("fixed") else []
         missing = [name for name in names if name not in arrays]
@@ -129,7 +128,7 @@ class Bending:
         began = perf_counter()
         with self._of.changing:
             self.bound = None
-            binding = self._drag(Bound(regions, fixed, n_modes), [None] * n_regions)
+            binding = self._drag(Bound(regions, fixed, _n_modes(meta)), [None] * n_regions)
         facts = {
             "n_modes": binding.n_modes.tolist(),
             "pivots": [_rim_center(self._of.mesh, region) for region in regions],
@@ -192,8 +191,7 @@ class Bending:
         members = [np.flatnonzero(owners == region) for region in range(MOST_REGIONS + 1)]
         fixed = members.pop()
         regions = [region for region in members if len(region)]
-        n_modes = None if meta.get("n_modes") is None else whole(meta, "n_modes", 1, MOST_MODES)
-        return Bound(regions, fixed if len(fixed) else None, n_modes) if regions else None
+        return Bound(regions, fixed if len(fixed) else None, _n_modes(meta)) if regions else None
 
     def _listen(self, mode: str, work: Callable[[], Any]) -> Any:
         """Do some work, and keep what it warns of for the page."""
@@ -248,6 +246,10 @@ def handle_from(entry: Any) -> es.types.Handle:
     except (KeyError, TypeError) as err:
         raise RequestError(f"A handle must have all its entries; {err} is missing.") from err
     raise RequestError("The type of a handle must be rotation or translation.")
+
+
+def _n_modes(meta: Meta) -> int | None:
+    return None if meta.get("n_modes") is None else whole(meta, "n_modes", 1, MOST_MODES)
 
 
 def _rim_center(mesh: es.TriangleMesh, region: np.ndarray) -> list[float]:

@@ -32,7 +32,7 @@ class Changes:
     """
 
     def __init__(self, scene: Scene, searching: Searching) -> None:
-        self._of, self._searching = scene, searching
+        self._of, self._history, self._searching = scene, scene.history, searching
         self.works: Works = {
             "undo": self._undo,
             "redo": self._redo,
@@ -52,31 +52,31 @@ class Changes:
         }
 
     def _undo(self, _meta: Meta, _arrays: Arrays) -> None:
-        if not self._of.history.place:
+        if not self._history.place:
             raise RequestError("There must be an edit to undo; there is none.")
-        self._of.history.go(self._of.history.place - 1)
+        self._history.go(self._history.place - 1)
 
     def _redo(self, _meta: Meta, _arrays: Arrays) -> None:
-        if self._of.history.place == len(self._of.history.moments) - 1:
+        if self._history.place == len(self._history.moments) - 1:
             raise RequestError("There must be an undone edit to redo; there is none.")
-        self._of.history.go(self._of.history.place + 1)
+        self._history.go(self._history.place + 1)
 
     def _go(self, meta: Meta, _arrays: Arrays) -> None:
         """Go to a place of the history."""
-        self._of.history.go(whole(meta, "place", 0, len(self._of.history.moments) - 1))
+        self._history.go(whole(meta, "place", 0, len(self._history.moments) - 1))
 
     def _select(self, meta: Meta, arrays: Arrays) -> None:
         """Take the region of each vertex."""
         if "regions" not in arrays:
             raise RequestError("The call must have an array 'regions'.")
-        self._of.history.select(arrays["regions"], str(meta.get("text", "Select"))[:60])
+        self._history.select(arrays["regions"], str(meta.get("text", "Select"))[:60])
 
     def _choose(self, meta: Meta, _arrays: Arrays) -> None:
         """Show a shape of the list."""
-        self._of.history.choose(self._of.listed_shape(meta.get("shape")))
+        self._history.choose(self._of.listed_shape(meta.get("shape")))
 
     def _reset(self, _meta: Meta, _arrays: Arrays) -> None:
-        self._of.history.did("All undone", pose=self._of.history.now.shape.rest)
+        self._history.did("All undone", pose=self._history.now.shape.rest)
 
     def _repair(self, meta: Meta, _arrays: Arrays) -> None:
         """Repair the shape in its present pose, which becomes the shape."""
@@ -87,7 +87,7 @@ class Changes:
         if kept is not None:
             kept = es.io.carry_attributes(replace(kept, mesh=self._of.mesh), done.mesh)
         loaded = Loaded(done.mesh, kept, side=self._of.analysis.side)
-        self._of.history.show(loaded, self._of.analysis.name, f"Repair: {', '.join(names)}")
+        self._history.show(loaded, self._of.analysis.name, f"Repair: {', '.join(names)}")
         self._of.warnings += done.report
 
     def _lighten(self, _meta: Meta, _arrays: Arrays) -> None:
@@ -100,7 +100,7 @@ class Changes:
             if not np.isnan(field.values[source]).all()
         }
         name = f"{self._of.analysis.name}, lighter"
-        self._of.history.show(
+        self._history.show(
             Loaded(thin, fields=fields, side=self._of.analysis.side), name, "Lighter copy"
         )
         self._of.warnings.append(f"{thin.n_vertices:,} of {n_vertices:,} vertices were kept.")
@@ -117,7 +117,7 @@ class Changes:
         name = display_name(meta.get("name"))
         found = self._of.parse(name, file_bytes(arrays, "file"))
         loaded = Loaded(found.mesh, points=found.points)
-        self._of.history.show(loaded, name, f"Open {name}")
+        self._history.show(loaded, name, f"Open {name}")
 
     def _face(self, meta: Meta, _arrays: Arrays) -> None:
         """Let another direction be up and another side the front, now and later on."""
