@@ -125,10 +125,11 @@ class Bending:
             )
         regions = [np.unique(arrays[name].astype(np.int64)) for name in names]
         fixed = regions.pop() if meta.get("fixed") else None
+        bound = Bound(regions, fixed, _n_modes(meta))
         began = perf_counter()
         with self._of.changing:
             self.bound = None
-            binding = self._drag(Bound(regions, fixed, _n_modes(meta)), [None] * n_regions)
+            binding = self._drag(bound, [None] * n_regions)
         facts = {
             "n_modes": binding.n_modes.tolist(),
             "pivots": [_rim_center(self._of.mesh, region) for region in regions],
