@@ -385,27 +385,23 @@ def test_an_index_is_searched(tmp_path):
     assert "up" not in facts["matches"][1]
     assert arrays["pairs0"].max() < 500
     np.testing.assert_array_equal(page.array("match/0/faces"), fish.faces)
-    call = {"n_matches": 1, "name": "bird.ply"}
-    facts, _ = page.call("query", call, {"file": file_of(bird)})
-    assert facts["matches"][0]["name"] == "bird"
-    assert facts["warnings"] == []
-    # A part, and the shape itself
-    head = np.flatnonzero(fish.vertices[:, 2] > np.median(fish.vertices[:, 2])).astype("<u4")
-    itself = Page(Workspace(fish, index=tmp_path / "index"))
-    facts, arrays = itself.call("query", n_matches=2)
+    # The shape itself, and a part
+    assert page.call("finish", kind="open", match=0)[0]["state"]["name"] == "fish"
+    facts, arrays = page.call("query", n_matches=2)
     assert facts["itself"] == "fish"
     assert [match["name"] for match in facts["matches"]] == ["bird"]
+    head = np.flatnonzero(fish.vertices[:, 2] > np.median(fish.vertices[:, 2])).astype("<u4")
     facts, arrays = page.call("query", {"n_matches": 1}, {"region": head})
     assert np.isin(arrays["pairs0"].reshape(-1, 2)[:, 0], head).all()
     assert (
         "paint a larger one"
         in page.error("query", {"n_matches": 1}, {"region": head[:1]})["message"]
     )
-    page.call("query", n_matches=2)
-    page.call("query", call, {"file": file_of(bird)})
+    call = {"n_matches": 1, "name": "bird.ply"}
+    facts, _ = page.call("query", call, {"file": file_of(bird)})
+    assert facts["matches"][0]["name"] == "bird"
+    assert facts["warnings"] == []
     assert "without its file" in page.error("finish", kind="open", match=0)["message"]
-    page.call("query", n_matches=1)
-    assert page.call("finish", kind="open", match=0)[0]["state"]["name"] == "fish"
 
 
 def test_two_tabs_share_the_analysis_and_nothing_else(page, top):
