@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 import numpy as np
 import pytest
-from browser import build_page, find
+from browser import PATIENCE, build_page, find
 from conftest import stretched_ball
 from matplotlib.image import imread
 from playwright.sync_api import TimeoutError as NothingSeenError
@@ -137,7 +137,7 @@ def run_cell(page):
     key is pressed again, but never while the kernel works.
     """
     idle = page.locator(".jp-Notebook-ExecutionIndicator[data-status=idle]")
-    idle.wait_for(timeout=120_000)
+    idle.wait_for()
     cell = page.locator(".jp-Notebook .jp-CodeCell").first
     count = cell.locator(".jp-InputPrompt").filter(has_text=re.compile(r"\[\d+\]"))
     for _ in range(8):
@@ -154,6 +154,7 @@ def run_cell(page):
 def test_jupyterlab_shows_the_widget(lab, browser):
     pytest.importorskip("jupyterlab")
     with browser.new_page(viewport={"width": 1280, "height": 900}) as page:
+        page.set_default_timeout(1000 * PATIENCE)
         seen = []
         page.on("pageerror", lambda error: seen.append(str(error)))
         page.goto(lab)
@@ -161,11 +162,11 @@ def test_jupyterlab_shows_the_widget(lab, browser):
         error = page.locator("[data-mime-type='application/vnd.jupyter.error']")
         assert not error.count(), error.first.inner_text()
         canvas = page.locator(".jp-OutputArea canvas").first
-        canvas.wait_for(timeout=120_000)
-        find(page, "counts").get_by_text("642 vertices").wait_for(timeout=60_000)
+        canvas.wait_for()
+        find(page, "counts").get_by_text("642 vertices").wait_for()
         find(page, "legend").get_by_text("height, m").wait_for()  # the values that were given
         find(page, "tab-spectrum").click()
-        find(page, "panel-spectrum").get_by_text("none is missing").wait_for(timeout=60_000)
+        find(page, "panel-spectrum").get_by_text("none is missing").wait_for()
         shown = imread(BytesIO(canvas.screenshot()))
         assert shown.std() > 0.05  # the shape, and not one color
         assert not seen, seen
