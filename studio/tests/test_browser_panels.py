@@ -421,7 +421,7 @@ def picture_axes(page):
 def test_the_studio_opens_from_the_requested_side(browser, tmp_path, view):
     """The page shows what figures show: its camera has the axes of theirs."""
     path = tmp_path / "biped.ply"
-    es.write_mesh(es.make_creature("biped", n_vertices=300), path)
+    es.write_mesh(es.make_creature("biped", n_vertices=500), path)
     right, down, towards = es.plot.aim_camera(es.read_mesh(path), view=view, up="x").rotation
     with serve_studio(path, view=view, up="x") as url, open_page(browser, url) as page:
         # "top" may be 1e-3 off, and another 1e-6 where the page limits the angle
