@@ -11,6 +11,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 from time import monotonic
@@ -44,6 +45,8 @@ serve(
     announce=lambda url: print(url, flush=True), browse=False,
 )
 """
+# Tests wait for states. Only one that fails waits this long, so a machine with much else to do fails none.
+PATIENCE = 300.0  # seconds
 # The panel in which shapes are bent, in the code of the page.
 PANEL = "eigenshape.panels.find((panel) => panel.id === 'deform')"
 # Opens all that the page hides at first; there are panels soon after the shape.
@@ -69,6 +72,7 @@ def start_browser() -> Iterator[Browser]:
         browser.close()
 
 
+@cache
 def build_page() -> None:
     """Build the page if its sources have changed."""
     subprocess.run([sys.executable, "hatch_build.py"], cwd=STUDIO, check=True)
@@ -134,6 +138,7 @@ def open_page(
         viewport=viewport, color_scheme=scheme, has_touch=phone, is_mobile=phone
     )
     page = context.new_page()
+    page.set_default_timeout(1000 * PATIENCE)
     seen: list[str] = []
     page.on("pageerror", lambda error: seen.append(f"page error: {error}"))
     page.on(
@@ -158,8 +163,10 @@ def open_page(
     if more and ready == HAS_SHAPE:
         wait_until(page, "eigenshape.active !== null")
         page.evaluate(SHOW_MORE)
-    yield page
-    context.close()
+    try:
+        yield page
+    finally:
+        context.close()
     seen = [line for line in seen if not any(text in line for text in expected)]
     assert not seen, "\n".join(seen)
 
@@ -179,15 +186,16 @@ def move_slider(page: Page, name: str, value: float) -> None:
     find(page, name).fill(str(value))
 
 
-def wait_until(page: Page, condition: str, seconds: float = 60.0) -> None:
+def wait_until(page: Page, condition: str, seconds: float = PATIENCE) -> None:
     """Wait until an expression is true.
 
     `page.wait_for_function` would call eval, which the policy of the page forbids.
     """
-    end = monotonic() + seconds
+    end, pause = monotonic() + seconds, 20.0
     while not page.evaluate(condition):
         assert monotonic() < end, f"not true within {seconds} s: {condition}"
-        page.wait_for_timeout(50)
+        page.wait_for_timeout(pause)
+        pause = min(1.5 * pause, 300.0)  # to ask often would slow down what takes long
 
 
 def move_pointer(page: Page, x: float, y: float, steps: int = 1) -> None:
@@ -199,7 +207,7 @@ def move_pointer(page: Page, x: float, y: float, steps: int = 1) -> None:
 def wait_until_still(page: Page) -> None:
     """Wait until no request is under way, and two frames have been drawn."""
     page.evaluate(TWO_FRAMES)  # what was clicked may send a request only now
-    end = monotonic() + 60
+    end = monotonic() + PATIENCE
     while UNDER_WAY[page]:
         assert monotonic() < end, f"requests without an answer: {UNDER_WAY[page]}"
         page.wait_for_timeout(20)

@@ -69,7 +69,7 @@ def draw_shape(browser, folder, work, title, mesh, steps):
     paths = []
     es.write_mesh(mesh, work / f"{title}.ply")
     with serve_studio(work / f"{title}.ply") as url, open_page(browser, url) as page:
-        wait_until(page, "eigenshape.state.deformation.status === 'ready'", 120)
+        wait_until(page, "eigenshape.state.deformation.status === 'ready'")
         for name, act in steps.items():
             act(page)
             page.mouse.move(5, 5)
@@ -119,7 +119,7 @@ def show_second(page, path):
     with page.expect_file_chooser() as chooser:
         find(page, "second-file").click()
     chooser.value.set_files(path)
-    wait_until(page, "eigenshape.state.beside?.map.status === 'ready'", 240)
+    wait_until(page, "eigenshape.state.beside?.map.status === 'ready'")
 
 
 def bend_biped(page):

@@ -16,13 +16,13 @@ from browser import (
     wait_until,
     wait_until_still,
 )
+from conftest import N_VERTICES
 from test_company import collection  # noqa: F401  a fixture
 
 import eigenshape as es
 
 pytestmark = pytest.mark.long
 
-N_VERTICES = 800
 BOTH = ("eigenshape.viewer", "eigenshape.second.viewer")
 # Where both cameras stand, in the coordinates of their shapes
 EYES = """[eigenshape.viewer, eigenshape.second.viewer].map(({ camera, space }) =>
@@ -77,7 +77,7 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     with page.expect_file_chooser() as chooser:
         find(page, "second-file").click()
     chooser.value.set_files(other)
-    wait_until(page, "eigenshape.state.beside?.map.status === 'ready'", 120)
+    wait_until(page, "eigenshape.state.beside?.map.status === 'ready'")
     wait_until(page, "eigenshape.panels.find(({ id }) => id === 'compare').map !== null")
     wait_until_still(page)
 
@@ -111,14 +111,14 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     page.mouse.click(*place)
     _there, place = seen_vertex(page, 1)
     page.mouse.click(*place)
-    wait_until(page, "eigenshape.state.beside.pairs.length === 1", 60)
-    wait_until(page, "eigenshape.state.beside.map.status === 'ready'", 60)
+    wait_until(page, "eigenshape.state.beside.pairs.length === 1")
+    wait_until(page, "eigenshape.state.beside.map.status === 'ready'")
     wait_until_still(page)
     chosen = page.evaluate("eigenshape.state.beside.pairs[0]")
     assert page.evaluate(f"{compare}.partners[0][{chosen[0]}]") == chosen[1]
     page.keyboard.press("Control+z")
-    wait_until(page, "eigenshape.state.beside.pairs.length === 0", 60)
-    wait_until(page, "eigenshape.state.beside.map.status === 'ready'", 60)
+    wait_until(page, "eigenshape.state.beside.pairs.length === 0")
+    wait_until(page, "eigenshape.state.beside.map.status === 'ready'")
     wait_until_still(page)
 
     # What is painted on one is seen on the other.

@@ -21,7 +21,6 @@ from eigenshape.deformation import bend, bind
 
 pytestmark = pytest.mark.long
 
-N_VERTICES = 1000
 LIMBS = f"{PANEL}.limbs"
 HAS_LIMBS = f"{LIMBS}?.farthest()"
 
@@ -30,7 +29,7 @@ HAS_LIMBS = f"{LIMBS}?.farthest()"
 def page(browser, url):
     """A tab as a person finds it, when the limbs are found."""
     with open_page(browser, url, more=False) as page:
-        wait_until(page, HAS_LIMBS, 120)
+        wait_until(page, HAS_LIMBS)
         yield page
 
 
@@ -90,13 +89,13 @@ def test_samples_a_tour_and_once_is_enough(browser):
         assert page.evaluate("eigenshape.viewer.motion.n_moving.value") == 0
         assert page.evaluate("eigenshape.state.deformation.n_edits") == 0
         page.reload()
-        wait_until(page, HAS_LIMBS, 120)
+        wait_until(page, HAS_LIMBS)
         assert find(page, "welcome").count() == find(page, "tour-bar").count() == 0
         # A second studio has another port; the person is the same.
         page.evaluate("sessionStorage.clear()")
         page.reload()
         find(page, "sample-quadruped").click()
-        wait_until(page, HAS_LIMBS, 120)
+        wait_until(page, HAS_LIMBS)
         assert find(page, "tour-bar").count() == 0
 
 

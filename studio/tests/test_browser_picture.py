@@ -22,7 +22,6 @@ from PIL import Image
 
 pytestmark = pytest.mark.long
 
-N_VERTICES = 1000
 PHONE = (390, 780)
 AXE = STUDIO / "front" / "node_modules" / "axe-core" / "axe.min.js"
 
@@ -30,7 +29,7 @@ AXE = STUDIO / "front" / "node_modules" / "axe-core" / "axe.min.js"
 @pytest.fixture
 def page(browser, url):
     with open_page(browser, url) as page:
-        wait_until(page, "eigenshape.state.spectrum.k > 0", 120)
+        wait_until(page, "eigenshape.state.spectrum.k > 0")
         yield page
 
 
@@ -164,7 +163,7 @@ def touch(session, kind, *places):
 
 def test_on_a_phone_fingers_turn_zoom_and_bend_where_they_are_told_to(browser, url, mesh):
     with open_page(browser, url, size=PHONE, more=False) as page:
-        wait_until(page, f"{PANEL}?.limbs.farthest()", 120)
+        wait_until(page, f"{PANEL}?.limbs.farthest()")
         fingers = page.context.new_cdp_session(page)
         stage = find(page, "stage").bounding_box()
         assert stage["width"] == PHONE[0]
@@ -219,7 +218,7 @@ def find_faults(page):
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_axe_finds_nothing_serious_or_moderate(browser, url, dark):
     with open_page(browser, url, dark=dark) as page:
-        wait_until(page, f"{PANEL}?.limbs.farthest()", 120)
+        wait_until(page, f"{PANEL}?.limbs.farthest()")
         page.evaluate(AXE.read_text())
         for name in ("cut", "measure", "film"):
             find(page, name).click()

@@ -11,12 +11,12 @@ from test_workspace import Page, file_of
 import eigenshape as es
 from eigenshape.collections.collection import fit_file, save_collection, write_fit
 from eigenshape.matching.spectral_refinement import corners_of_faces
-from eigenshape_studio.beside import Beside
 from eigenshape_studio.calls import RequestError
-from eigenshape_studio.mapping import NEAR, correct_map, map_of_match
 from eigenshape_studio.opening import open_workspace
-from eigenshape_studio.sessions import SessionFile
-from eigenshape_studio.workspace import Workspace
+from eigenshape_studio.others.beside import Beside
+from eigenshape_studio.others.mapping import NEAR, correct_map, map_of_match
+from eigenshape_studio.tab.sessions import SessionFile
+from eigenshape_studio.tab.workspace import Workspace
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def test_a_scan_is_mapped_to_the_whole_from_the_page(poses):
     pairs = {"pairs": np.array([0, 0], "<u4")}
     assert "find it first" in page.error("finish", kind="correct", _arrays=pairs)["message"]
     page.call("finish", kind="map")
-    assert page.workspace.company.beside.job.wait(60)
+    assert page.workspace.company.beside.job.wait(600)
     np.testing.assert_allclose(
         page.array("beside/vertices").reshape(-1, 3), scan.mesh.vertices, atol=1e-6
     )
@@ -135,7 +135,7 @@ def test_what_lies_elsewhere_is_seen_from_the_same_side(poses):
     whole = es.TriangleMesh(3 * part.vertices @ turn.T + [1, 2, 3], part.faces)
     found = map_of_match(part, whole, match_of(whole, np.arange(part.n_vertices)))
     beside = Beside(part, whole, "turned", 1, found)
-    assert beside.job.wait(10)
+    assert beside.job.wait(600)
     laid = np.reshape(beside.facts()["similarity"], (3, 4))
     np.testing.assert_allclose(laid, np.column_stack([3 * turn, [1, 2, 3]]), atol=1e-12)
     back = found.similarity(1)
@@ -148,14 +148,14 @@ def test_a_correction_is_made_and_taken_back(poses):
     part, whole = poses
     first = map_of_match(part, whole, match_of(whole, np.arange(part.n_vertices)))
     beside = Beside(part, whole, "other", 1, first)
-    assert beside.job.wait(10)
+    assert beside.job.wait(600)
     near = int(np.argsort(np.linalg.norm(whole.vertices - whole.vertices[7], axis=1))[4])
     beside.correct(beside.check_pairs(np.array([7, near], "<u4")))
-    assert beside.job.wait(60)
+    assert beside.job.wait(600)
     assert beside.array("partners/0")[7] == near
     assert beside.facts()["pairs"] == [[7, near]]
     beside.correct(beside.check_pairs(np.empty(0, "<u4")))
-    assert beside.job.wait(10)
+    assert beside.job.wait(600)
     assert beside.require_map() is first
     for pairs, reason in (([7], "pairs of vertices"), ([7, 500], r"pair 0 is \[7, 500\]")):
         with pytest.raises(RequestError, match=reason):
@@ -264,7 +264,7 @@ def test_a_collection_opens_with_its_mean_modes_and_specimens(collection):
     assert np.linalg.norm(shape.shapes[0] - shape.shapes[1]) < 1e-3
 
     state = page.call("finish", kind="beside", specimen="b")[0]["state"]
-    assert page.workspace.company.beside.job.wait(10)
+    assert page.workspace.company.beside.job.wait(600)
     np.testing.assert_array_equal(page.array("beside/partners/0"), np.arange(162))
     assert (
         "must be that of a specimen" in page.error("finish", kind="beside", specimen="x")["message"]

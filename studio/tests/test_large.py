@@ -7,21 +7,23 @@ from conftest import stretched_ball
 from test_workspace import Page, file_of
 
 import eigenshape as es
-from eigenshape_studio import analysis, workspace
-from eigenshape_studio.analysis import frame_shape
 from eigenshape_studio.opening import open_workspace
-from eigenshape_studio.workspace import Workspace
+from eigenshape_studio.shape import analysis
+from eigenshape_studio.shape.analysis import frame_shape
+from eigenshape_studio.tab import changes
+from eigenshape_studio.tab.workspace import Workspace
 
 LOWER = """
-from eigenshape_studio import analysis, workspace
-analysis.LARGE, workspace.LIGHT = 500, 300
+from eigenshape_studio.shape import analysis
+from eigenshape_studio.tab import changes
+analysis.LARGE, changes.LIGHT = 500, 300
 """
 
 
 @pytest.fixture
 def page(monkeypatch):
     monkeypatch.setattr(analysis, "LARGE", 500)
-    monkeypatch.setattr(workspace, "LIGHT", 300)
+    monkeypatch.setattr(changes, "LIGHT", 300)
     mesh = stretched_ball()
     height = {"height (m)": mesh.vertices[:, 1]}
     return Page(Workspace(mesh, "ball.ply", values=height, shared=True).fork())
@@ -39,13 +41,13 @@ def test_nothing_is_computed_of_a_large_shape_before_it_is_asked_for(page):
     assert page.array("vertices").shape == (642, 3)
     found = page.call("finish", kind="examine")[0]["state"]
     assert found["spectrum"]["status"] == "none"
-    assert page.workspace.analysis.health.wait(60)
+    assert page.workspace.analysis.health.wait(600)
     assert page.call("meta")[0]["health"]["closed"]
 
 
 def test_a_large_shape_can_be_prepared_for_bending(page):
     page.call("finish", kind="prepare")
-    assert page.workspace.analysis.rig.wait(60)
+    assert page.workspace.analysis.rig.wait(600)
     state = page.call("meta")[0]
     assert state["large"] == ""
     assert state["deformation"]["status"] == "ready"
@@ -56,10 +58,10 @@ def test_the_spectrum_that_is_asked_for_is_the_one_for_bending(page):
     for_bending = found.spectrum
     page.call("finish", kind="solve", k=analysis.N_MODES)
     assert found.spectrum is for_bending
-    assert for_bending.wait(60)
+    assert for_bending.wait(600)
     page.call("finish", kind="solve", k=20)
     assert found.spectrum is not for_bending
-    assert found.health.wait(60)  # Weyl's law takes the area
+    assert found.health.wait(600)  # Weyl's law takes the area
 
 
 def test_a_shape_that_waits_still_does_when_it_is_shown_again(page):
@@ -67,7 +69,7 @@ def test_a_shape_that_waits_still_does_when_it_is_shown_again(page):
     page.call("finish", kind="undo")
     assert page.call("meta")[0]["spectrum"]["status"] == "none"
     page.call("finish", kind="prepare")
-    assert page.workspace.analysis.rig.wait(60)
+    assert page.workspace.analysis.rig.wait(600)
     assert page.call("meta")[0]["deformation"]["status"] == "ready"
 
 

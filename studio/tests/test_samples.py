@@ -5,10 +5,10 @@ import pytest
 
 import eigenshape as es
 from eigenshape_studio.opening import open_workspace
-from eigenshape_studio.samples import SAMPLES
-from eigenshape_studio.sides import sides_file
+from eigenshape_studio.shape.samples import SAMPLES
+from eigenshape_studio.shape.sides import sides_file
+from eigenshape_studio.tab.workspace import Workspace
 from eigenshape_studio.wire import decode, encode
-from eigenshape_studio.workspace import Workspace
 
 
 @pytest.fixture(autouse=True)

@@ -17,13 +17,13 @@ from conftest import stretched_ball
 from test_workspace import PULL, TURN, Page, bend, file_of
 
 import eigenshape as es
-from eigenshape_studio import sessions
-from eigenshape_studio.history import N_IN_MEMORY, History, Shape
-from eigenshape_studio.loading import Loaded
 from eigenshape_studio.server import Tabs
-from eigenshape_studio.sessions import SessionFile, remove_old
+from eigenshape_studio.shape.loading import Loaded
+from eigenshape_studio.tab import sessions
+from eigenshape_studio.tab.history import N_IN_MEMORY, History, Shape
+from eigenshape_studio.tab.sessions import SessionFile, remove_old
+from eigenshape_studio.tab.workspace import Workspace
 from eigenshape_studio.wire import decode, encode
-from eigenshape_studio.workspace import Workspace
 
 TAB = "a-tab-of-the-tests"
 
@@ -31,7 +31,7 @@ TAB = "a-tab-of-the-tests"
 @pytest.fixture(scope="module")
 def first():
     workspace = Workspace(stretched_ball(2), "ball.ply", shared=True)
-    assert workspace.analysis.rig.wait(120)
+    assert workspace.analysis.rig.wait(600)
     return workspace
 
 
@@ -139,7 +139,7 @@ def test_a_session_does_not_need_the_shape_that_the_server_shows(first, top, tmp
     # An edit that is sent while the modes are computed anew is sent again.
     call = {"kind": "commit", "handles": [PULL], "mode": "graded"}
     select(again, *top)
-    assert again.workspace.analysis.rig.wait(60)
+    assert again.workspace.analysis.rig.wait(600)
     again.call("finish", call)
     assert again.call("meta")[0]["deformation"]["n_edits"] == 2
     again.workspace.close()
@@ -234,7 +234,7 @@ def test_regions_of_another_shape_are_refused(first):
 SERVERS = """
 import os, signal, sys
 from pathlib import Path
-from eigenshape_studio.analysis import warm_up
+from eigenshape_studio.shape.analysis import warm_up
 from eigenshape_studio.server import serve
 
 warm_up()
@@ -332,7 +332,7 @@ def test_no_edit_is_lost_by_a_server_that_is_killed(first, top, tmp_path, in_tur
     es.write_mesh(first.mesh, tmp_path / "ball.ply")
     calls = script(top)
     steady = Page(Workspace(es.read_mesh(tmp_path / "ball.ply"), "ball.ply").fork())
-    assert steady.workspace.analysis.rig.wait(60)
+    assert steady.workspace.analysis.rig.wait(600)
     for meta, arrays in calls:
         steady.call("finish", meta, arrays)
     n_places = len(steady.call("meta")[0]["history"]) + 1

@@ -1,19 +1,24 @@
 """What a call of the page brings: whole numbers, files, arrays."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
+Meta = dict[str, Any]
 Arrays = Mapping[str, np.ndarray]
 Reply = tuple[Any, dict[str, np.ndarray]]
+# What changes something, by the kind of the call; it may return vertices to show.
+Works = Mapping[str, Callable[[Meta, Arrays], np.ndarray | None]]
+# What returns an array, by the first part of its name, of the rest of the name.
+Families = Mapping[str, Callable[[str], np.ndarray]]
 
 
 class RequestError(ValueError):
     """A call asks for what cannot be; the text says what."""
 
 
-def whole(meta: dict[str, Any], name: str, low: int, high: int, default: int | None = None) -> int:
+def whole(meta: Meta, name: str, low: int, high: int, default: int | None = None) -> int:
     """Return a whole number of a call; `default` is its value if it is missing.
 
     Raises

@@ -5,11 +5,11 @@ from functools import partial
 from pathlib import Path
 
 import eigenshape as es
-from eigenshape_studio.history import Shape
-from eigenshape_studio.loading import load_file
-from eigenshape_studio.samples import SAMPLES, sample_mesh
-from eigenshape_studio.specimens import Specimens, is_collection
-from eigenshape_studio.workspace import Workspace
+from eigenshape_studio.others.specimens import Specimens, is_collection
+from eigenshape_studio.shape.loading import load_file
+from eigenshape_studio.shape.samples import SAMPLES, sample_mesh
+from eigenshape_studio.tab.history import Shape
+from eigenshape_studio.tab.workspace import Workspace
 
 MOST_LISTED = 500  # shapes that stand in the list of the page
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import eigenshape as es
 from eigenshape.plot.camera import Up, View
-from eigenshape_studio.onefile import N_MODES, report_page
-from eigenshape_studio.workspace import Workspace
+from eigenshape_studio.onefile import N_MODES
+from eigenshape_studio.tab.workspace import Workspace
 
 
 def write_report(  # noqa: PLR0913  one for each option of the command
@@ -55,7 +55,7 @@ def write_report(  # noqa: PLR0913  one for each option of the command
     """
     workspace = Workspace(mesh, name, values=values, n_modes=n_modes)
     workspace.analysis.look_from(view, up)
-    page = report_page(workspace, progress)
+    page = workspace.report(progress)
     path = Path(path)
     with NamedTemporaryFile(dir=path.parent, suffix=".html", delete=False) as file:
         file.write(page)

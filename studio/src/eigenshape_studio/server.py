@@ -27,8 +27,8 @@ from eigenshape_studio.listening import (
 )
 from eigenshape_studio.memory import share_one_arena, trim_memory
 from eigenshape_studio.opening import open_workspace
-from eigenshape_studio.sessions import SessionFile, remove_old, sessions_folder
-from eigenshape_studio.workspace import Answer, Workspace, error_message
+from eigenshape_studio.tab.sessions import SessionFile, remove_old, sessions_folder
+from eigenshape_studio.tab.workspace import Answer, Workspace, error_message
 
 FILES = {"index.html": "text/html; charset=utf-8", "studio.js": "text/javascript; charset=utf-8"}
 TAB = re.compile(r"[A-Za-z0-9_-]{8,64}")

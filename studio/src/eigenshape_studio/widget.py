@@ -11,7 +11,7 @@ import traitlets
 import eigenshape as es
 from eigenshape.plot.camera import Up, View
 from eigenshape_studio.bundle import bundle_text
-from eigenshape_studio.workspace import Workspace
+from eigenshape_studio.tab.workspace import Workspace
 
 
 class ShapeWidget(anywidget.AnyWidget):

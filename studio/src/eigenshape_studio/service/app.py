@@ -27,12 +27,12 @@ import eigenshape as es
 from eigenshape.retrieval.store.filters import parse_filters
 from eigenshape.retrieval.store.writing import facts_text, require_name, require_text
 from eigenshape_studio.guard import App, Guard, Rules, bearer_of, is_secret
-from eigenshape_studio.parse import display_name, shape_suffix
 from eigenshape_studio.service import openapi
 from eigenshape_studio.service.describing import Describers, MeshRefusedError, Picture
 from eigenshape_studio.service.metrics import Metrics, count_requests
 from eigenshape_studio.service.parameters import RequestError, read_parameters
 from eigenshape_studio.service.shelf import Found, Shape, ShelfReader
+from eigenshape_studio.shape.parse import display_name, shape_suffix
 
 PAGE = Path(__file__).parent / "page"
 # Names of the two pages, each a body (.html) and a script (.js), and their titles.

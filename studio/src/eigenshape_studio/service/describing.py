@@ -20,8 +20,8 @@ from matplotlib.image import imsave
 import eigenshape as es
 from eigenshape._workers import outcome_of, schedule_work, start_pool
 from eigenshape.retrieval.kinds import describe_to_store
-from eigenshape_studio.parse import Limits, read_upload
-from eigenshape_studio.search import color_places
+from eigenshape_studio.others.search import color_places
+from eigenshape_studio.shape.parse import Limits, read_upload
 
 T = TypeVar("T")
 Recipe = Any  # HeatRecipe or PatchRecipe

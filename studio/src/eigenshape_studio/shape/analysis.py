@@ -9,8 +9,8 @@ import scipy.sparse as sp
 
 import eigenshape as es
 from eigenshape.plot.camera import Up, View, upward_direction
-from eigenshape_studio.jobs import NO_JOB, Job, Progress
-from eigenshape_studio.sides import recall_side
+from eigenshape_studio.shape.jobs import NO_JOB, Job, Progress
+from eigenshape_studio.shape.sides import recall_side
 
 # Modes that are solved for when a shape is opened, beside one for each further component: as many
 # as `es.rig_shape` takes, so that both give the same rig.

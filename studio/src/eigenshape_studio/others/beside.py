@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
-from eigenshape_studio.analysis import frame_shape
 from eigenshape_studio.calls import RequestError
-from eigenshape_studio.jobs import NO_JOB, Job, Progress
-from eigenshape_studio.mapping import DenseMap, correct_map, map_of_match
+from eigenshape_studio.others.mapping import DenseMap, correct_map, map_of_match
+from eigenshape_studio.shape.analysis import frame_shape
+from eigenshape_studio.shape.jobs import NO_JOB, Job, Progress
 
 MOST_PAIRS = 100  # corrections by hand
 SURE = 0.5  # confidence from which a vertex counts as mapped

@@ -10,8 +10,8 @@ from matplotlib.image import imsave
 
 import eigenshape as es
 from eigenshape.geometry.topology import submesh
-from eigenshape_studio.analysis import upright_view
 from eigenshape_studio.calls import RequestError
+from eigenshape_studio.shape.analysis import upright_view
 
 THUMBNAIL = 144  # pixels
 N_KEPT = 256  # pictures that are kept in memory, about 10 kB each

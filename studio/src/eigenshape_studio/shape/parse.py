@@ -88,7 +88,7 @@ def parse_surface(name: str, data: bytes, limits: Limits | None = None) -> Uploa
     """
     limits = limits or Limits()
     suffix = shape_suffix(name)
-    command = [sys.executable, "-m", "eigenshape_studio.parse", suffix]
+    command = [sys.executable, "-m", "eigenshape_studio.shape.parse", suffix]
     numbers = [limits.seconds, limits.memory, limits.n_faces]
     try:
         done = subprocess.run(

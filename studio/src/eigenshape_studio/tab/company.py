@@ -1,40 +1,37 @@
 """What stands beside the shape of a tab: a second shape with a map, landmarks, a collection."""
 
-from __future__ import annotations
-
 import threading
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import eigenshape as es
-from eigenshape_studio.beside import Beside
-from eigenshape_studio.calls import Arrays, RequestError, file_bytes
-from eigenshape_studio.history import Shape
-from eigenshape_studio.landmarks import (
+from eigenshape_studio.calls import Arrays, Families, Meta, RequestError, Works, file_bytes
+from eigenshape_studio.others.beside import Beside
+from eigenshape_studio.others.landmarks import (
     SurfaceLandmarks,
     landmark_file,
     parse_landmarks,
     place_landmarks,
 )
-from eigenshape_studio.loading import Loaded
-from eigenshape_studio.mapping import DenseMap
-from eigenshape_studio.parse import display_name
-from eigenshape_studio.specimens import Specimens
-
-if TYPE_CHECKING:
-    from eigenshape_studio.workspace import Workspace
+from eigenshape_studio.others.mapping import DenseMap
+from eigenshape_studio.others.specimens import Specimens
+from eigenshape_studio.shape.loading import Loaded
+from eigenshape_studio.shape.parse import display_name
+from eigenshape_studio.tab.history import Shape
+from eigenshape_studio.tab.scene import Scene
+from eigenshape_studio.tab.searching import Searching
 
 SAMPLE_POSE = 1  # of a sample beside the shape; the one that opens as the shape has pose 0
 
 
 class Company:
-    """The second shape, landmarks and collection of a workspace.
+    """The second shape, landmarks and collection of a tab.
 
     Parameters
     ----------
-    workspace : Workspace
+    scene : Scene
+    searching : Searching
 
     Attributes
     ----------
@@ -44,11 +41,11 @@ class Company:
         What returns an array, by the first part of its name.
     """
 
-    def __init__(self, workspace: Workspace) -> None:
-        self._of = workspace
+    def __init__(self, scene: Scene, searching: Searching) -> None:
+        self._of, self._searching = scene, searching
         self._beside: Beside | None = None  # of the shape at rest and the second one
         self._lock = threading.Lock()
-        self.works: dict[str, Callable[[dict[str, Any], Arrays], None]] = {
+        self.works: Works = {
             "beside": self._open,
             "map": lambda *_: self._require_beside().start(),
             "correct": self._correct,
@@ -56,7 +53,7 @@ class Company:
             "landmarks": self._set_landmarks,
             "mean": self._show_mean,
         }
-        self.families: dict[str, Callable[[str], np.ndarray]] = {
+        self.families: Families = {
             "beside": lambda tail: self._require_beside().array(tail),
             "landmarks": self._landmarks_array,
             "collection": lambda tail: self._require_specimens().array(tail),
@@ -125,7 +122,7 @@ class Company:
             raise RequestError("There must be a collection; open the studio with its folder.")
         return self._of.specimens
 
-    def _open(self, meta: dict[str, Any], arrays: Arrays) -> None:
+    def _open(self, meta: Meta, arrays: Arrays) -> None:
         """Show a second shape: of the list, a file, a match, a sample or a specimen; or none."""
         history = self._of.history
         if meta.get("close"):
@@ -139,10 +136,10 @@ class Company:
         second.mesh  # noqa: B018  a file that cannot be read must not stand beside
         history.did(f"{second.name} beside", beside=second.number, pairs=b"")
 
-    def _read(self, meta: dict[str, Any], arrays: Arrays) -> tuple[es.TriangleMesh, str]:
+    def _read(self, meta: Meta, arrays: Arrays) -> tuple[es.TriangleMesh, str]:
         """Return the mesh and the name of what a call wants to see."""
         if "match" in meta:
-            return self._of.read_match(meta["match"])
+            return self._searching.read_match(meta["match"])
         if "sample" in meta:
             kind = str(meta["sample"])
             return es.make_creature(kind, SAMPLE_POSE), kind
@@ -150,24 +147,24 @@ class Company:
             name = str(meta["specimen"])
             return self._require_specimens().mesh(name), name
         name = display_name(meta.get("name"))
-        return self._of.read_surface(name, file_bytes(arrays, "file")), name
+        return self._of.parse(name, file_bytes(arrays, "file")).mesh, name
 
-    def _correct(self, _meta: dict[str, Any], arrays: Arrays) -> None:
+    def _correct(self, _meta: Meta, arrays: Arrays) -> None:
         """Correct the map by pairs of vertices."""
         given = arrays.get("pairs", np.empty(0, dtype=np.int64))
         pairs = self._require_beside().check_pairs(given)
         self._of.history.did("Correct the map", pairs=pairs.tobytes())
 
-    def _take_pose(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _take_pose(self, _meta: Meta, _arrays: Arrays) -> None:
         """Bend the shape into the pose of the second one; the result becomes the shape."""
         self._of.show(self._require_beside().take_pose(), self._of.analysis.name)
 
-    def _show_mean(self, _meta: dict[str, Any], _arrays: Arrays) -> None:
+    def _show_mean(self, _meta: Meta, _arrays: Arrays) -> None:
         """Show the mean of the collection."""
         specimens = self._require_specimens()
         self._of.show(specimens.mean, specimens.title)
 
-    def _set_landmarks(self, meta: dict[str, Any], arrays: Arrays) -> None:
+    def _set_landmarks(self, meta: Meta, arrays: Arrays) -> None:
         """Take all landmarks anew: by names and points, or from a file."""
         names, points = meta.get("names"), arrays.get("points", np.empty(0))
         if "file" in arrays:
@@ -178,7 +175,7 @@ class Company:
             raise RequestError("names must be a list of the names of landmarks.")
         placed, told = place_landmarks(self._of.mesh, names, points)
         self._of.history.did("Landmarks", landmarks=placed.write())
-        self._of.warn(told)
+        self._of.warnings += told
 
     def _landmarks_array(self, tail: str) -> np.ndarray:
         """Return a file of the landmarks of a side, as "0/fcsv", or vertices near carried ones."""

@@ -10,7 +10,7 @@ import numpy as np
 
 import eigenshape as es
 from eigenshape.plot.camera import Up, View
-from eigenshape_studio.parse import points_in
+from eigenshape_studio.shape.parse import points_in
 
 
 @dataclass(frozen=True, eq=False)

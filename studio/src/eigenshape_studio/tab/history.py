@@ -12,10 +12,10 @@ import numpy as np
 
 import eigenshape as es
 from eigenshape.deformation.edits import mesh_fingerprint
-from eigenshape_studio.analysis import Analysis
 from eigenshape_studio.calls import RequestError
-from eigenshape_studio.loading import Field, Loaded, load_file
-from eigenshape_studio.sessions import Row, SessionFile, edits_text
+from eigenshape_studio.shape.analysis import Analysis
+from eigenshape_studio.shape.loading import Field, Loaded, load_file
+from eigenshape_studio.tab.sessions import Row, SessionFile, edits_text
 from eigenshape_studio.wire import decode, encode
 
 MOST_MOMENTS = 2000  # of one tab; the oldest are forgotten

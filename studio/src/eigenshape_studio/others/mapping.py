@@ -7,8 +7,8 @@ import numpy as np
 import eigenshape as es
 from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, refine_places
-from eigenshape_studio.jobs import Progress
-from eigenshape_studio.search import color_places
+from eigenshape_studio.others.search import color_places
+from eigenshape_studio.shape.jobs import Progress
 
 # A point of the whole farther than this share of its √area from the image of the part has no partner:
 # the distance that the confidence of a match is about.

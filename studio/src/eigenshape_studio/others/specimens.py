@@ -7,7 +7,7 @@ import numpy as np
 
 import eigenshape as es
 from eigenshape_studio.calls import RequestError
-from eigenshape_studio.mapping import DenseMap, map_between
+from eigenshape_studio.others.mapping import DenseMap, map_between
 
 N_MODES = 5  # sliders, as in the report of a collection
 

@@ -1,0 +1,79 @@
+"""The present shape of one tab, as all that reads and changes it sees it."""
+
+import threading
+from typing import Any
+
+import eigenshape as es
+from eigenshape_studio.calls import RequestError
+from eigenshape_studio.others.specimens import Specimens
+from eigenshape_studio.shape.analysis import Analysis
+from eigenshape_studio.shape.loading import Field, Loaded
+from eigenshape_studio.shape.parse import Upload, parse_surface
+from eigenshape_studio.tab.history import History, Shape
+
+
+class Scene:
+    """The shapes of one tab, the one that is shown, and what the page is told with the next answer.
+
+    Parameters
+    ----------
+    history : History
+    specimens : Specimens, optional
+        Of the collection that the studio was opened with.
+
+    Attributes
+    ----------
+    warnings : list of str
+        They go with the answer to the present call.
+    changing : RLock
+        Whoever changes something holds it.
+    """
+
+    def __init__(self, history: History, specimens: Specimens | None = None) -> None:
+        self.history, self.specimens = history, specimens
+        self.warnings: list[str] = []
+        self.changing = threading.RLock()
+
+    @property
+    def analysis(self) -> Analysis:
+        """What is computed of the shape."""
+        return self.history.now.shape.analysis
+
+    @property
+    def fields(self) -> dict[str, Field]:
+        """Functions on the vertices of the shape."""
+        self.analysis  # noqa: B018  they are read with the mesh
+        return self.history.now.shape.fields
+
+    @property
+    def attributes(self) -> es.io.MeshAttributes | None:
+        """What the file of the shape holds besides."""
+        self.analysis  # noqa: B018  they are read with the mesh
+        return self.history.now.shape.attributes
+
+    @property
+    def mesh(self) -> es.TriangleMesh:
+        """The shape in its present pose."""
+        return self.history.mesh(self.history.now.pose)
+
+    @property
+    def edits(self) -> tuple[es.deformation.Edit, ...]:
+        """The edits that lead to the present pose, oldest first."""
+        return self.history.edits(self.history.now.pose)
+
+    def listed_shape(self, number: Any) -> Shape:
+        """Return a shape of the list."""
+        shapes = self.history.shapes
+        if not isinstance(number, int) or number not in shapes:
+            raise RequestError(f"shape must be one of {[*shapes]}; it is {number!r:.80}.")
+        return shapes[number]
+
+    def parse(self, name: str, data: bytes) -> Upload:
+        """Read a file from outside; what had to be made of points is told with the answer."""
+        found = parse_surface(name, data)
+        self.warnings += found.report
+        return found
+
+    def show(self, mesh: es.TriangleMesh, name: str) -> None:
+        """Show another shape; those before stay in the list, with their edits."""
+        self.history.show(Loaded(mesh), name, f"Open {name}")
