@@ -1,11 +1,12 @@
 """Shapes, a browser, and a tab of the studio that the tests share."""
 
+from contextlib import ExitStack
+from functools import cache
+
 import pytest
 from browser import build_page, open_page, serve_studio, start_browser, wait_until
 
 import eigenshape as es
-
-N_VERTICES = 1000  # of the quadruped
 
 
 def pytest_configure(config):
@@ -20,7 +21,7 @@ def stretched_ball(level=3):
     return es.TriangleMesh(ball.vertices * [1.0, 1.7, 0.8], ball.faces)
 
 
-# One browser, and one studio whose shape is analyzed once: each page is a tab of its own there.
+# One browser, and one studio for each shape, which is analyzed once: each page is a tab of its own.
 
 
 @pytest.fixture(scope="session")
@@ -31,27 +32,38 @@ def browser():
 
 
 @pytest.fixture(scope="session")
-def path(tmp_path_factory):
-    """The file of a quadruped."""
-    path = tmp_path_factory.mktemp("shape") / "quadruped.ply"
-    es.write_mesh(es.make_creature("quadruped", n_vertices=N_VERTICES), path)
-    return path
+def studio_of(tmp_path_factory):
+    """Return a function that starts a studio with a quadruped of so many vertices, or returns the one that runs."""
+    with ExitStack() as running:
+
+        @cache
+        def start(n_vertices):
+            path = tmp_path_factory.mktemp("shape") / "quadruped.ply"
+            es.write_mesh(es.make_creature("quadruped", n_vertices=n_vertices), path)
+            return path, running.enter_context(serve_studio(path))
+
+        yield start
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
+def path(request, studio_of):
+    """The file of a quadruped with as many vertices as the module of the test says."""
+    return studio_of(request.module.N_VERTICES)[0]
+
+
+@pytest.fixture(scope="module")
 def mesh(path):
     return es.read_mesh(path)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def rig(mesh):
     return es.rig_shape(mesh)
 
 
-@pytest.fixture(scope="session")
-def url(path):
-    with serve_studio(path) as url:
-        yield url
+@pytest.fixture(scope="module")
+def url(request, studio_of):
+    return studio_of(request.module.N_VERTICES)[1]
 
 
 @pytest.fixture

@@ -16,13 +16,13 @@ from browser import (
     wait_until,
     wait_until_still,
 )
-from conftest import N_VERTICES
 from test_company import collection  # noqa: F401  a fixture
 
 import eigenshape as es
 
 pytestmark = pytest.mark.long
 
+N_VERTICES = 800
 BOTH = ("eigenshape.viewer", "eigenshape.second.viewer")
 # Where both cameras stand, in the coordinates of their shapes
 EYES = """[eigenshape.viewer, eigenshape.second.viewer].map(({ camera, space }) =>

@@ -21,6 +21,7 @@ from eigenshape.deformation import BoxRegion, BrushRegion, bend, bind, region_ma
 
 pytestmark = pytest.mark.long
 
+N_VERTICES = 2000
 SHADER = 1e-5  # single precision: the largest error that the shader may have, in lengths of about 1
 
 

@@ -28,6 +28,7 @@ HEAD = 0.4  # height above which the quadruped is chosen: head and neck
 READY = "eigenshape.state.deformation.status === 'ready'"
 REGION = f"{PANEL}.selection.regions.vertices(0)"
 RED = [0xD8, 0x30, 0x1F]  # of faces that cross
+N_VERTICES = 1000
 SHADER = 1e-5  # single precision: the largest error that the shader may have, in lengths of about 1
 
 

@@ -21,6 +21,7 @@ from eigenshape.deformation import bend, bind
 
 pytestmark = pytest.mark.long
 
+N_VERTICES = 1000
 LIMBS = f"{PANEL}.limbs"
 HAS_LIMBS = f"{LIMBS}?.farthest()"
 

@@ -16,7 +16,6 @@ from browser import (
     wait_until,
     wait_until_still,
 )
-from conftest import N_VERTICES
 from scipy.ndimage import binary_erosion, maximum_filter, minimum_filter
 
 import eigenshape as es
@@ -27,6 +26,7 @@ from eigenshape_studio.shape.analysis import vertex_labels as label_vertices
 
 pytestmark = pytest.mark.long
 
+N_VERTICES = 1000
 FRONT, BOTH_SIDES = 0, 2  # of faces, in three.js
 SIDE = "eigenshape.viewer.surface.material.side"
 SINGLE = 2e-5  # relative error of sums of 300 products in single precision

@@ -22,6 +22,7 @@ from PIL import Image
 
 pytestmark = pytest.mark.long
 
+N_VERTICES = 1000
 PHONE = (390, 780)
 AXE = STUDIO / "front" / "node_modules" / "axe-core" / "axe.min.js"
 

@@ -19,6 +19,7 @@ import eigenshape as es
 
 pytestmark = pytest.mark.long
 
+N_VERTICES = 500
 HEAD = 0.4
 DONE = "eigenshape.state.history"
 STATUS = "eigenshape.main.querySelector('[data-test=status]').textContent"
