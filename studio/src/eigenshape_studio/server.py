@@ -17,6 +17,7 @@ from starlette.routing import Route
 
 from eigenshape.plot.camera import Up, View
 from eigenshape_studio.bundle import NotBuiltError, read_static
+from eigenshape_studio.folders import Folders
 from eigenshape_studio.guard import App, Guard, Rules
 from eigenshape_studio.listening import (
     listen,
@@ -192,6 +193,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
     share_one_arena()
     first = open_workspace(paths, index)
     first.analysis.look_from(view, up)
+    # Who may come from another machine must not see the folders of this one.
+    first.folders = None if allow_remote else Folders(Path.cwd())
     listening = _listen(host, port)
     port = listening.getsockname()[1]
     token = secrets.token_urlsafe(32)

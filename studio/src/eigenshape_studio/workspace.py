@@ -4,6 +4,7 @@ import json
 import threading
 import warnings
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -24,8 +25,10 @@ from eigenshape_studio.analysis import (
     diagram_rows,
     vertex_labels,
 )
+from eigenshape_studio.brush import Brush
 from eigenshape_studio.calls import Arrays, Reply, RequestError, file_bytes, whole
 from eigenshape_studio.company import Company
+from eigenshape_studio.folders import Folders, look_in
 from eigenshape_studio.history import History, Pose, Shape
 from eigenshape_studio.jobs import NO_JOB, PreparingError, window_message
 from eigenshape_studio.loading import Field, Loaded, check_fields
@@ -121,6 +124,7 @@ class Workspace:
         self.matches: list[str] = []  # names, of the last query
         self._searched: tuple[Any, Reply] | None = None  # for what, and what was found
         self.specimens: Specimens | None = None  # of the collection that the studio was opened with
+        self.folders: Folders | None = None  # that the page may open
         self.notes: list[str] = []  # what the page says when it is opened
         self.mode = "graded"
         self.welcome = False  # whether the page offers samples first
@@ -130,9 +134,7 @@ class Workspace:
         """Set up what no two workspaces share."""
         self.company = Company(self)
         self._changing = threading.RLock()
-        self._painting = threading.Lock()
-        # The pose that the brush last painted on, and the function that computes distances on it.
-        self._waves: tuple[Any, Any] = (None, None)
+        self._brush = Brush()
         # The pose that is dragged, and the session in which it is.
         self._dragged: tuple[Pose | None, es.DeformationSession | None] = (None, None)
 
@@ -144,6 +146,8 @@ class Workspace:
         twin.history = History([shape.fork() for shape in shapes], file)
         twin.bound, twin.mode, twin.matches = None, "graded", []
         twin._begin()
+        with suppress(es.EigenshapeError, OSError):  # they may have gone
+            twin._use(twin.history.index, twin.history.collection)
         return twin
 
     def close(self) -> None:
@@ -213,6 +217,7 @@ class Workspace:
         now = history.now
         capabilities = [name for name in CAPABILITIES if name != "query" or self.shelf is not None]
         capabilities += [] if self.specimens is None else ["collection"]
+        capabilities += [] if self.folders is None else ["folders"]
         return {
             "name": analysis.name,
             "n_vertices": analysis.mesh.n_vertices,
@@ -285,9 +290,10 @@ class Workspace:
             "parts": self._parts_array,
             "values": self._values_array,
             "skeleton": self._skeleton,
-            "disc": self._disc,
+            "disc": lambda tail: self._brush.disc(self.mesh, tail),
             "file": self._file,
             "match": self._match_array,
+            "folder": lambda tail: self._require_folders().list(tail),
             **self.company.families,
             "sample": sample_picture,
         }
@@ -372,31 +378,6 @@ class Workspace:
                 f"A skeleton must be of 1 to {rig.n_modes} modes; not {tail[:80]!r}."
             )
         return es.deformation.eigen_skeleton(rig, int(tail)).astype("<f4")
-
-    def _disc(self, tail: str) -> np.ndarray:
-        """Return the vertices within a geodesic radius of a vertex; `tail` is "vertex/radius".
-
-        A stroke of the brush asks for many discs, so what they have in common is kept.
-        """
-        vertex, _, radius = tail.partition("/")
-        try:
-            source, reach = int(vertex), float(radius)
-        except ValueError as err:
-            raise RequestError(
-                f"A disc must be named by its vertex and its radius, as 'disc/7/0.5'; not {tail[:80]!r}."
-            ) from err
-        if not (0 <= source < self.mesh.n_vertices and 0 < reach < np.inf):
-            raise RequestError(
-                f"A disc must have one of the {self.mesh.n_vertices} vertices and a positive, finite "
-                f"radius; it has vertex {source} and radius {reach:g}."
-            )
-        with self._painting:
-            mesh, wave = self._waves
-            if mesh is not self.mesh:
-                mesh = self.mesh
-                wave = es.geometry.geodesic_waves(mesh)
-                self._waves = mesh, wave
-        return np.flatnonzero(wave(source, reach) <= reach).astype("<u4")
 
     def _file(self, tail: str) -> np.ndarray:
         if tail not in ("ply", "obj", "glb", "html", "edits"):
@@ -507,6 +488,7 @@ class Workspace:
             "replay": self._replay,
             "repair": self._repair,
             "open": self._open,
+            "folder": self._open_folder,
             "solve": self._solve,
             "examine": lambda *_: self.analysis.health.start(),
             "prepare": lambda *_: self.analysis.prepare(),
@@ -688,6 +670,32 @@ class Workspace:
         found = self._parse(name, file_bytes(arrays, "file"))
         loaded = Loaded(found.mesh, points=found.points)
         self.history.show(loaded, name, f"Open {name}")
+
+    def _require_folders(self) -> Folders:
+        if self.folders is None:
+            raise RequestError("Folders of this machine are opened from the command line here.")
+        return self.folders
+
+    def _open_folder(self, meta: dict[str, Any], _arrays: Arrays) -> None:
+        """Show what a folder holds: a collection, or the first shape of an index or of files."""
+        folder = self._require_folders().path(str(meta.get("folder")))
+        found, before = look_in(folder), self.history.now
+        if found.files:
+            self._warnings += self.history.open_files(found.files)
+        self._use(found.index, found.collection)
+        if found.collection and self.specimens is not None:
+            self.show(self.specimens.mean, self.specimens.title)
+        if self.history.now is before:  # no file is there, or its shape is shown already
+            self.history.did(f"Open {folder.name}")
+
+    def _use(self, index: str | Path | None, collection: str | Path | None) -> None:
+        """Search in another index, and show another collection; None leaves what was there."""
+        if index:
+            self.shelf, self.matches, self._searched = Shelf(index), [], None
+            self.history.index = str(index)
+        if collection:
+            self.specimens = Specimens(collection)
+            self.history.collection = str(collection)
 
     def read_surface(self, name: str, data: bytes) -> es.TriangleMesh:
         """Read a surface from the bytes of a file from outside."""
