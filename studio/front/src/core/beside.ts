@@ -17,7 +17,11 @@ export interface Stand {
 
 export class Beside {
   readonly viewer: Viewer;
-  readonly stage = h("div", { class: "stage", "data-test": "beside" });
+  readonly stage = h("section", {
+    class: "stage",
+    "data-test": "beside",
+    "aria-label": "The second shape",
+  });
   private readonly watch: ResizeObserver;
   private link: three.Matrix4 | null = null; // from the scene of the first to that of the second
   private similarity: number[] | null = null; // lays the first shape on the second
