@@ -23,6 +23,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Locator, Page, Request, sync_playwright
 
 STUDIO = Path(__file__).parents[1]
+AXE = STUDIO / "front" / "node_modules" / "axe-core" / "axe.min.js"
 # WebGL2 in software, the same on every machine, and no request of the browser's own.
 FLAGS = (
     "--no-sandbox",
@@ -179,6 +180,15 @@ def is_local(url: str) -> bool:
 def find(page: Page, name: str) -> Locator:
     """Return the element with this name in `data-test`."""
     return page.locator(f'[data-test="{name}"]')
+
+
+def find_faults(page: Page) -> list[list[object]]:
+    """Return what axe finds that is serious or moderate: rules, and the elements that break them."""
+    page.evaluate(AXE.read_text())
+    code = """async () => (await axe.run()).violations
+        .filter(({ impact }) => impact !== "minor")
+        .map(({ id, nodes }) => [id, nodes.map(({ target }) => target.flat().join(" "))])"""
+    return list(page.evaluate(code))
 
 
 def move_slider(page: Page, name: str, value: float) -> None:

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from browser import (
     find,
+    find_faults,
     move_pointer,
     move_slider,
     open_page,
     place_of,
     positions,
+    region,
     serve_studio,
     vertex_values,
     wait_until,
@@ -19,10 +21,12 @@ from browser import (
 from test_company import collection  # noqa: F401  a fixture
 
 import eigenshape as es
+from eigenshape_studio.wire import decode
 
 pytestmark = pytest.mark.long
 
 N_VERTICES = 800
+MAP = "eigenshape.panels.find(({ id }) => id === 'compare').map"
 BOTH = ("eigenshape.viewer", "eigenshape.second.viewer")
 # Where both cameras stand, in the coordinates of their shapes
 EYES = """[eigenshape.viewer, eigenshape.second.viewer].map(({ camera, space }) =>
@@ -65,6 +69,12 @@ def seen_vertex(page, side):
     return vertex, place_of(page, point) if side == 0 else place_in_second(page, point)
 
 
+def asks_for_disc(request):
+    """Say whether a call asks for a disc on the second shape."""
+    body = request.post_data_buffer
+    return body is not None and b"beside/disc/" in body
+
+
 @pytest.fixture(scope="module")
 def other(tmp_path_factory):
     path = tmp_path_factory.mktemp("second") / "other.ply"
@@ -90,10 +100,7 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
         np.testing.assert_allclose(theirs, laid[:, :3] @ ours + laid[:, 3], atol=1e-5)
 
     # Equal colors correspond; what is not sure is gray.
-    compare = "eigenshape.panels.find(({ id }) => id === 'compare').map"
-    partners, back = (
-        np.array(page.evaluate(f"Array.from({compare}.partners[{i}])")) for i in (0, 1)
-    )
+    partners, back = (np.array(page.evaluate(f"Array.from({MAP}.partners[{i}])")) for i in (0, 1))
     ours, theirs = (attribute(page, "mark", side).reshape(-1, 4).astype(int) for side in (0, 1))
     assert (ours[:, 3] == 255).all()
     assert np.median(np.abs(ours[:, :3] - theirs[partners, :3])) <= 6
@@ -105,6 +112,8 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     assert discs(page, 1) == [partners[discs(page, 0)[0]]]
     assert find(page, "under-pointer").inner_text().startswith("Right by ")
 
+    assert find_faults(page) == []
+
     # Two points that belong together: the map goes through them, and Ctrl+Z takes that back.
     find(page, "correct").click()
     _vertex, place = seen_vertex(page, 0)
@@ -115,7 +124,7 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     wait_until(page, "eigenshape.state.beside.map.status === 'ready'")
     wait_until_still(page)
     chosen = page.evaluate("eigenshape.state.beside.pairs[0]")
-    assert page.evaluate(f"{compare}.partners[0][{chosen[0]}]") == chosen[1]
+    assert page.evaluate(f"{MAP}.partners[0][{chosen[0]}]") == chosen[1]
     page.keyboard.press("Control+z")
     wait_until(page, "eigenshape.state.beside.pairs.length === 0")
     wait_until(page, "eigenshape.state.beside.map.status === 'ready'")
@@ -127,14 +136,36 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     _, place = seen_vertex(page, 0)
     page.mouse.click(*place)
     wait_until_still(page)
-    back = np.array(page.evaluate(f"Array.from({compare}.partners[1])"))
+    back = np.array(page.evaluate(f"Array.from({MAP}.partners[1])"))
     ours, theirs = (attribute(page, "mark", side).reshape(-1, 4) for side in (0, 1))
     assert (ours[:, 3] > 0).any()
     np.testing.assert_array_equal(theirs[back >= 0], ours[back[back >= 0]])
 
+    check_painting_on_the_second(page, es.read_mesh(other))
+
     find(page, "close-match").click()
     wait_until(page, "eigenshape.second === null")
     assert page.locator('[data-test="canvas"]').count() == 1
+
+
+def check_painting_on_the_second(page, second):
+    """What is painted there is chosen on the first, by the keyboard as well: a disc of the second."""
+    _, place = seen_vertex(page, 1)
+    for paint in (
+        lambda: page.mouse.click(*place),
+        lambda: page.locator('[data-test="canvas"]').nth(1).press(" "),
+    ):
+        find(page, "clear").click()
+        wait_until_still(page)
+        with page.expect_request(asks_for_disc) as asked:
+            paint()
+        wait_until_still(page)
+        name = decode(asked.value.post_data_buffer)[0]["name"]
+        _, _, vertex, radius = name.split("/")
+        near = es.geometry.geodesic_waves(second)(int(vertex), float(radius)) <= float(radius)
+        there = np.array(page.evaluate(f"Array.from({MAP}.partners[0])"))
+        assert near.any()
+        np.testing.assert_array_equal(region(page), np.flatnonzero((there >= 0) & near[there]))
 
 
 def test_landmarks_are_placed_named_moved_saved_and_loaded(page, tmp_path):
@@ -148,6 +179,7 @@ def test_landmarks_are_placed_named_moved_saved_and_loaded(page, tmp_path):
     find(page, "place").click()
     wait_until_still(page)
     assert len(discs(page, 0)) == 2
+    assert find_faults(page) == []
     name = find(page, "landmark-0").locator("input")
     name.fill("withers")
     name.press("Enter")
@@ -197,9 +229,25 @@ def test_a_cloud_is_shown_as_points_or_as_its_surface(page, tmp_path):
     assert page.evaluate("eigenshape.viewer.surface.visible")
 
 
-def test_a_collection_has_sliders_and_specimens(browser, collection):  # noqa: F811
-    with serve_studio(collection) as url, open_page(browser, url) as page:
+def test_a_collection_is_opened_from_the_window_and_has_sliders_and_specimens(
+    browser,
+    collection,  # noqa: F811
+    monkeypatch,
+):
+    # The page may open what lies in the folder in which the studio is started.
+    monkeypatch.chdir(collection.parent)
+    ball = collection.parent / "ball.ply"
+    es.write_mesh(es.icosphere(1), ball)
+    with serve_studio(ball) as url, open_page(browser, url) as page:
+        find(page, "tab-shape").click()
+        find(page, "open-folder").click()
+        find(page, f"folder-{collection.name}").wait_for()
+        assert find(page, "folder-open").inner_text() == "Open the 1 shapes here"
+        assert find_faults(page) == []
+        find(page, f"folder-{collection.name}").click()
         find(page, "tab-collection").click()
+        wait_until_still(page)
+        assert find_faults(page) == []
         mean = positions(page)
         move_slider(page, "mode-0", 2)
         wait_until(page, "eigenshape.panels.find(({ id }) => id === 'collection').modes !== null")

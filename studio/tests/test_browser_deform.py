@@ -211,6 +211,26 @@ def test_edits_are_saved_and_loaded(page, mesh, tmp_path):
     np.testing.assert_array_equal(positions(page), posed)
 
 
+def test_a_limb_is_bent_by_the_keyboard_alone(page, rig):
+    wait_until(page, f"{PANEL}.limbs.labels !== null", 120)
+    page.keyboard.press("n")
+    labels = np.array(page.evaluate(f"Array.from({PANEL}.limbs.labels)"))
+    limb = page.evaluate(f"{PANEL}.limbs.lit")
+    assert limb >= 0
+    page.keyboard.press("Shift+ArrowUp")
+    wait_until_bound(page)
+    for key in ("Shift+ArrowUp", "Shift+ArrowUp", "Shift+ArrowLeft", "Shift+ArrowRight"):
+        page.keyboard.press(key)
+    axis = page.evaluate("eigenshape.viewer.axes.right.toArray()")
+    wait_until(page, f"Math.abs({PANEL}.motion.handles[0]?.angle - {np.pi / 12}) < 1e-6")
+    pivot = page.evaluate(f"{PANEL}.limbs.pivot.toArray()")
+    page.keyboard.press("Enter")
+    wait_for_edits(page, 1)
+    turn = es.Rotation(pivot, [-one for one in axis], np.pi / 12)
+    bent = es.deform(rig, np.flatnonzero(labels == limb), turn)
+    np.testing.assert_allclose(positions(page), bent.vertices, atol=SHADER)
+
+
 def test_the_picture_returns_after_a_loss_of_the_context(page):
     page.evaluate(
         "window.loss = eigenshape.viewer.canvas.getContext('webgl2')"

@@ -7,6 +7,7 @@ import pytest
 from browser import (
     drop_file,
     find,
+    find_faults,
     move_slider,
     open_page,
     picture,
@@ -390,6 +391,7 @@ def test_search_ranks_shapes_and_shows_corresponding_points(page, folder, mesh):
     assert page.locator('[data-test="canvas"]').count() == 2
     marked = page.evaluate("eigenshape.viewer.discs.geometry.index.count")
     assert marked == len(matches[1].correspondences)
+    assert find_faults(page) == []
     find(page, "close-match").click()
     wait_until(page, "eigenshape.second === null")
     assert page.locator('[data-test="canvas"]').count() == 1

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from browser import (
     PANEL,
-    STUDIO,
     find,
+    find_faults,
     move_pointer,
     move_slider,
     open_page,
@@ -24,7 +24,6 @@ pytestmark = pytest.mark.long
 
 N_VERTICES = 1000
 PHONE = (390, 780)
-AXE = STUDIO / "front" / "node_modules" / "axe-core" / "axe.min.js"
 
 
 @pytest.fixture
@@ -208,19 +207,10 @@ def swipe(page, fingers, x, y):
     wait_until_still(page)
 
 
-def find_faults(page):
-    """Return what axe finds that is serious or moderate; the page must have axe."""
-    code = """async () => (await axe.run()).violations
-        .filter(({ impact }) => impact !== "minor")
-        .map(({ id, nodes }) => [id, nodes.map(({ target }) => target.flat().join(" "))])"""
-    return page.evaluate(code)
-
-
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_axe_finds_nothing_serious_or_moderate(browser, url, dark):
     with open_page(browser, url, dark=dark) as page:
         wait_until(page, f"{PANEL}?.limbs.farthest()")
-        page.evaluate(AXE.read_text())
         for name in ("cut", "measure", "film"):
             find(page, name).click()
         for panel in ("deform", "shape", "spectrum", "heat", "parts"):

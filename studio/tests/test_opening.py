@@ -5,8 +5,8 @@ import pytest
 from test_workspace import Page
 
 import eigenshape as es
-from eigenshape_studio import opening
 from eigenshape_studio.opening import open_workspace
+from eigenshape_studio.others import folders
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_a_folder_stands_for_its_files(folder, tmp_path, monkeypatch):
     assert [name for _, name in state["shapes"]] == ["a", "b", "c"]
     with pytest.raises(es.InvalidParameterError, match="There must be meshes or points"):
         open_workspace([tmp_path])
-    monkeypatch.setattr(opening, "MOST_LISTED", 2)
+    monkeypatch.setattr(folders, "MOST_LISTED", 2)
     assert len(opened(folder)["shapes"]) == 2
 
 

@@ -8,6 +8,7 @@ import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile 
 import type { Film } from "./core/film";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
+import { FolderDialog } from "./folders";
 import { LargeNote } from "./large";
 import { DeformPanel } from "./panels/deform/deform";
 import { Strip } from "./strip";
@@ -48,6 +49,11 @@ export interface Panel {
   films?(): Film[];
 }
 
+const FORMATS = {
+  ply: "Save the shape as PLY",
+  obj: "Save positions and faces as OBJ; GLB keeps textures, too",
+  glb: "Save the shape as GLB",
+};
 const SEEN = "eigenshape-tour=1"; // cookie: the ports of one machine share it, unlike storage
 const POLL = 300; // ms between two questions while the server computes
 
@@ -58,13 +64,14 @@ export class Studio {
   readonly main = this.page.root;
   private readonly status = this.page.get("status");
   private readonly large = new LargeNote(this);
+  readonly folders = new FolderDialog(this);
   private readonly help = this.page.get<HTMLDialogElement>("help");
   private readonly shortcuts = new Map<string, { text: string; action: () => void }>();
   private readonly pages = new Map<string, { panel: Panel; tab: HTMLElement; page: HTMLElement }>();
   private active: Panel | null = null;
   private cloud: Cloud | null = null; // the points that the surface was made of
   second: Beside | null = null; // picture of the second shape
-  secondShown: (second: Beside) => void = () => {}; // called when its shape is there
+  readonly secondShown: ((second: Beside) => void)[] = []; // called when its shape is there
   private strip: Strip | null = null;
   private showing: Promise<void> = Promise.resolve(); // the newest state
   private busy = 0;
@@ -120,7 +127,7 @@ export class Studio {
     if (!(await this.run("Loading the shape", loading))) return;
     const view = this.settings.get<View | null>("view", null);
     if (view && view.shape === this.state.shape) this.viewer.setView(view);
-    for (const panel of this.panels) this.addPanel(panel);
+    this.addPanels();
     this.strip = new Strip(this);
     const usable = [...this.pages.keys()];
     // Whoever brings values wants to see them.
@@ -250,12 +257,13 @@ export class Studio {
     if (file) download(file, this.fileName(ending));
   }
 
-  /** Let the buttons of a form that name a format save the shape. */
-  addExports(form: Form, usable = true): void {
-    for (const button of form.root.querySelectorAll<HTMLElement>("[data-format]")) {
-      const format = button.dataset.format!;
-      button.hidden = !usable;
-      button.addEventListener("click", () => this.save(format, format));
+  /** Add buttons that save the shape, one for each format, to the row of a form with this name. */
+  addExports(form: Form, row: string): void {
+    if (!this.state.capabilities.includes("finish")) return;
+    for (const [format, title] of Object.entries(FORMATS)) {
+      const click = () => this.save(format, format);
+      const button = { type: "button", "data-test": `${row}-${format}`, title, click };
+      form.get(row).append(h("button", button, format.toUpperCase()));
     }
   }
 
@@ -296,9 +304,15 @@ export class Studio {
     this.cloud?.show(this.active?.id === "shape");
   }
 
-  private addPanel(panel: Panel): void {
+  /** Add the panels that can be used now: an index or a collection may have been opened. */
+  private addPanels(): void {
     const { capabilities } = this.state;
-    if (!panel.needs.every((need) => capabilities.includes(need))) return;
+    for (const panel of this.panels)
+      if (!this.pages.has(panel.id) && panel.needs.every((need) => capabilities.includes(need)))
+        this.addPanel(panel);
+  }
+
+  private addPanel(panel: Panel): void {
     const number = this.pages.size + 1;
     const [tabId, pageId] = [`tab-${panel.id}`, `panel-${panel.id}`];
     const click = () => {
@@ -368,6 +382,7 @@ export class Studio {
   }
 
   private refreshPanels(): void {
+    if (this.active) this.addPanels();
     this.large.refresh(this.state);
     for (const { panel } of this.pages.values()) panel.refresh(this.state);
   }
@@ -404,7 +419,7 @@ export class Studio {
 
   private showHelp(): void {
     const rows = [...this.shortcuts].map(([key, { text }]) =>
-      h("div", {}, h("kbd", {}, key.replaceAll("+", " + ")), text),
+      h("div", {}, h("kbd", {}, key.replaceAll("+", " + ").replace("Arrow", "")), text),
     );
     this.page.get("keys").replaceChildren(...rows);
     this.help.showModal();
@@ -413,7 +428,7 @@ export class Studio {
   private press(event: KeyboardEvent): void {
     const target = event.composedPath()[0] as HTMLElement;
     const typing = target.matches?.("select, input:not([type=range], [type=checkbox])");
-    if (typing || this.help.open) return;
+    if (typing || this.main.querySelector("dialog[open]")) return;
     if (["BUTTON", "SUMMARY"].includes(target.tagName) && event.key === "Enter") return; // it presses the button
     const letter = event.key.length === 1 ? event.key.toUpperCase() : event.key;
     const control = event.ctrlKey || event.metaKey;
@@ -421,7 +436,8 @@ export class Studio {
     const shift = event.shiftKey && /^[A-Z]/.test(letter);
     const key = `${control ? "Ctrl+" : ""}${shift ? "Shift+" : ""}${letter}`;
     const found = this.shortcuts.get(key);
-    if (!found) return;
+    const slides = target.matches?.("input[type=range]") && letter.startsWith("Arrow");
+    if (!found || slides) return;
     event.preventDefault();
     found.action();
   }

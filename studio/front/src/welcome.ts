@@ -34,12 +34,15 @@ export function welcome(app: Studio): void {
     return button;
   });
   const open = { type: "button", class: "primary", "data-test": "welcome-open", click: choose };
+  const showFolders = () => opened(app.folders.show());
+  const openFolder = { type: "button", "data-test": "welcome-folder", click: showFolders };
   const card = h(
     "section",
     { class: "welcome", "data-test": "welcome", "aria-label": "Open a shape" },
     h("h2", {}, "Drop a 3D file here"),
     h("p", { class: "note" }, app.state.suffixes.split(",").slice(0, 6).join("  "), " and others"),
     h("button", open, "Choose a file …"),
+    app.state.capabilities.includes("folders") && h("button", openFolder, "A folder …"),
     h("p", {}, "or try a sample"),
     h("div", { class: "samples" }, ...buttons),
   );

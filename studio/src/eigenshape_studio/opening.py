@@ -5,13 +5,12 @@ from functools import partial
 from pathlib import Path
 
 import eigenshape as es
-from eigenshape_studio.others.specimens import Specimens, is_collection
+from eigenshape_studio.others import folders
+from eigenshape_studio.others.specimens import Specimens
 from eigenshape_studio.shape.loading import load_file
 from eigenshape_studio.shape.samples import SAMPLES, sample_mesh
 from eigenshape_studio.tab.history import Shape
 from eigenshape_studio.tab.workspace import Workspace
-
-MOST_LISTED = 500  # shapes that stand in the list of the page
 
 
 def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = None) -> Workspace:
@@ -36,17 +35,10 @@ def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = 
     found: list[tuple[str, Path]] = []
     collection: Path | None = None
     for one in paths:
-        path = Path(one).absolute()
-        held = _index_in(path) if path.is_dir() else None
-        if held is not None:
-            index = index or path
-            found += _files_of(held)
-        elif is_collection(path):
-            collection = path
-        elif path.is_dir():
-            found += [(item.name, item.path.absolute()) for item in es.io.find_items(path)]
-        else:
-            found.append((path.name, path))
+        there = folders.look_in(Path(one).absolute())
+        found += there.files
+        index = index or there.index
+        collection = there.collection or collection
     if collection is not None:
         specimens = Specimens(collection)
         workspace = Workspace(specimens.mean, specimens.title, index=index, shared=True)
@@ -59,7 +51,7 @@ def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = 
     first, notes = _open_first(found)
     listed = [
         Shape(number, name, partial(load_file, path), path=str(path))
-        for number, (name, path) in enumerate(found[1:MOST_LISTED], 1)
+        for number, (name, path) in enumerate(found[1 : folders.MOST_LISTED], 1)
     ]
     workspace = Workspace([first, *listed], index=index, shared=True)
     workspace.notes = notes
@@ -84,17 +76,3 @@ def _open_first(found: list[tuple[str, Path]]) -> tuple[Shape, list[str]]:
             del found[0]
         else:
             return shape, notes
-
-
-def _index_in(folder: Path) -> es.ShapeIndex | None:
-    """Return the index in a folder, if there is one."""
-    try:
-        return es.ShapeIndex.open(folder)
-    except es.StoreError:
-        return None
-
-
-def _files_of(index: es.ShapeIndex) -> list[tuple[str, Path]]:
-    """Return names and files of the shapes of an index whose files are still there."""
-    named = [(record.name, record.source) for record in index.records()]
-    return [(name, Path(source)) for name, source in named if source and Path(source).exists()]

@@ -27,6 +27,7 @@ from eigenshape_studio.listening import (
 )
 from eigenshape_studio.memory import share_one_arena, trim_memory
 from eigenshape_studio.opening import open_workspace
+from eigenshape_studio.others.folders import Folders
 from eigenshape_studio.tab.sessions import SessionFile, remove_old, sessions_folder
 from eigenshape_studio.tab.workspace import Answer, Workspace, error_message
 
@@ -192,6 +193,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
     share_one_arena()
     first = open_workspace(paths, index)
     first.analysis.look_from(view, up)
+    # Who may come from another machine must not see the folders of this one.
+    first.folders = None if allow_remote else Folders(Path.cwd())
     listening = _listen(host, port)
     port = listening.getsockname()[1]
     token = secrets.token_urlsafe(32)

@@ -100,6 +100,7 @@ export interface Change {
   sample?: string;
   match?: number;
   specimen?: string;
+  folder?: string;
   close?: boolean;
   up?: Vec3;
   towards?: Vec3;

@@ -17,12 +17,16 @@ export interface Stand {
 
 export class Beside {
   readonly viewer: Viewer;
-  readonly stage = h("div", { class: "stage", "data-test": "beside" });
+  readonly stage = h("section", {
+    class: "stage",
+    "data-test": "beside",
+    "aria-label": "The second shape",
+  });
   private readonly watch: ResizeObserver;
   private link: three.Matrix4 | null = null; // from the scene of the first to that of the second
   private similarity: number[] | null = null; // lays the first shape on the second
   private following = false;
-  private partners: Int32Array | null = null; // vertex of the first for each of the second
+  private map: [Int32Array, Int32Array] | null = null; // the other's vertex for each of both, or -1
   private marks: Uint8Array | null = null; // of the first
 
   constructor(
@@ -93,27 +97,39 @@ export class Beside {
     this.following = false;
   }
 
-  /** Show on the second what the first shows, by the vertex of the first for each of the second. */
-  carryBy(partners: Int32Array | null): void {
-    this.partners = partners;
-    this.first.twin = partners && this.twin;
+  /** Show on the second what the first shows, by the other's vertex for each vertex of both. */
+  carryBy(map: [Int32Array, Int32Array] | null): void {
+    this.map = map;
+    this.first.twin = map && this.twin;
     this.viewer.setScalars(null);
     this.setMarks(this.marks);
   }
 
+  /** Return the vertex of the first that corresponds to one of the second, or -1. */
+  partnerOf(vertex: number): number {
+    return this.map?.[1][vertex] ?? -1;
+  }
+
+  /** Return the vertices of the first that correspond to some of the second. */
+  bringBack(vertices: Uint32Array): Uint32Array {
+    const there = new Set(vertices);
+    const ours = this.map?.[0] ?? new Int32Array(0);
+    return Uint32Array.from(ours.keys()).filter((vertex) => there.has(ours[vertex]!));
+  }
+
   private readonly twin: Colors = {
     setScalars: (values, scale?: Scale) => {
-      this.viewer.setScalars(values && carry(values, this.partners!, 1, scale?.range[0]), scale);
+      this.viewer.setScalars(values && carry(values, this.map![1], 1, scale?.range[0]), scale);
     },
     setLabels: (labels, palette) => {
-      this.viewer.setLabels(labels && carry(labels, this.partners!, 1, -1), palette);
+      this.viewer.setLabels(labels && carry(labels, this.map![1], 1, -1), palette);
     },
     setMarks: (marks) => this.setMarks(marks),
   };
 
   private setMarks(marks: Uint8Array | null): void {
     this.marks = marks;
-    const { partners } = this;
+    const partners = this.map?.[1];
     if (!partners) return this.viewer.setMarks(new Uint8Array((4 * this.viewer.vertices.length) / 3));
     const carried = carry(marks ?? new Uint8Array((4 * this.first.vertices.length) / 3), partners, 4);
     partners.forEach((partner, vertex) => partner < 0 && carried.set(GRAY, 4 * vertex));

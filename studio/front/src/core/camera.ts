@@ -6,6 +6,7 @@ import type { Vec3 } from "./backend";
 
 const FIELD_OF_VIEW = 26; // degrees: almost parallel, as in the library's pictures
 const TANGENT = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
+const STEP = 40; // pixels by which a key moves the shape
 const MARGIN = 0.84; // share of the window that the shape fills
 
 export class Eye {
@@ -102,7 +103,13 @@ export class Eye {
 
   private turnByKey(event: KeyboardEvent): void {
     const { controls } = this;
-    const actions: Record<string, () => void> = {
+    const moves: Record<string, () => void> = {
+      ArrowLeft: () => controls.pan(STEP, 0),
+      ArrowRight: () => controls.pan(-STEP, 0),
+      ArrowUp: () => controls.pan(0, STEP),
+      ArrowDown: () => controls.pan(0, -STEP),
+    };
+    const turns: Record<string, () => void> = {
       ArrowLeft: () => controls.rotateLeft(0.1),
       ArrowRight: () => controls.rotateLeft(-0.1),
       ArrowUp: () => controls.rotateUp(0.1),
@@ -110,10 +117,12 @@ export class Eye {
       "+": () => controls.dollyIn(0.9),
       "-": () => controls.dollyOut(0.9),
     };
-    const action = actions[event.key];
+    if (event.shiftKey && event.key in moves) return; // these keys bend a limb
+    const action = (event.ctrlKey ? moves : turns)[event.key];
     if (!action) return;
     event.preventDefault();
     action();
+    controls.update();
     controls.dispatchEvent({ type: "end" });
   }
 }

@@ -4,6 +4,8 @@ import type { Progress } from "./backend";
 
 type Child = Node | string | null | undefined | false;
 
+export const nextFrame = () => new Promise(requestAnimationFrame);
+
 /** Return an element: functions are listeners, booleans are flags, the rest are attributes. */
 export function h<K extends keyof HTMLElementTagNameMap>(
   tag: K,
@@ -21,13 +23,16 @@ export function h<K extends keyof HTMLElementTagNameMap>(
 }
 
 /** Controls, made out of HTML, by the names in their `data-test`. */
-export class Form {
-  readonly root: HTMLElement;
+export class Form<Root extends HTMLElement = HTMLElement> {
+  readonly root: Root;
 
   constructor(html: string) {
     const holder = h("div");
     holder.innerHTML = html;
-    this.root = holder.firstElementChild as HTMLElement;
+    this.root = holder.firstElementChild as Root;
+    // A screen reader reads the title of a control that has no words beside it.
+    for (const control of this.root.querySelectorAll<HTMLElement>("input[title], select[title]"))
+      control.ariaLabel ??= control.title;
   }
 
   /** Return an element by its name; most are inputs. */

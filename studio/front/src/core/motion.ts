@@ -23,6 +23,7 @@ export class Motion {
   readonly direction = { value: vectors() };
   readonly angle = { value: new Float32Array(MAX_REGIONS) };
   readonly blend = { value: 0 }; // of the exact result
+  private readonly materials: three.ShaderMaterial[] = [];
   readonly clip = { value: new three.Vector4() }; // of materials that are CLIPPED
 
   set(handles: Handle[]): void {
@@ -36,6 +37,9 @@ export class Motion {
       } else if (handle) this.direction.value[region]!.set(...handle.vector);
     });
     this.blend.value = 0;
+    // A shape at rest is drawn without what only a motion needs.
+    const moving = this.n_moving.value ? 1 : undefined;
+    for (const material of this.materials) define(material, "MOVING", moving);
   }
 
   /** Cut off what lies beyond a plane, or nothing. */
@@ -46,9 +50,12 @@ export class Motion {
 
   /** Return a material whose vertices move as `moved.glsl` says. */
   material(vertex: string, fragmentShader: string, own: Record<string, three.IUniform>) {
-    const uniforms = { ...this, ...own };
+    const { n_moving, kind, pivot, direction, angle, blend, clip } = this;
+    const uniforms = { n_moving, kind, pivot, direction, angle, blend, clip, ...own };
     const vertexShader = movedSource + vertex;
     const glslVersion = three.GLSL3;
-    return new three.ShaderMaterial({ glslVersion, vertexShader, fragmentShader, uniforms });
+    const made = new three.ShaderMaterial({ glslVersion, vertexShader, fragmentShader, uniforms });
+    this.materials.push(made);
+    return made;
   }
 }

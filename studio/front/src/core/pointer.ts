@@ -72,8 +72,24 @@ export class Pointer {
       place = null;
       timer ||= window.setTimeout(look, LOOK);
     });
+    canvas.addEventListener("keydown", (event) => {
+      if (event.key !== " ") return;
+      event.preventDefault();
+      this.clickMiddle(event.shiftKey);
+    });
     canvas.addEventListener("pointerup", release);
     canvas.addEventListener("pointercancel", release);
+  }
+
+  /** Do what a click in the middle of the picture does: so the keyboard paints and marks, too. */
+  private clickMiddle(shiftKey: boolean): void {
+    const { clientWidth, clientHeight } = this.canvas;
+    const [offsetX, offsetY] = [clientWidth / 2, clientHeight / 2];
+    const event = { offsetX, offsetY, shiftKey } as PointerEvent; // what tools and clicks read of one
+    const click = this.first ?? this.click;
+    if (!this.first && this.tool?.down(event)) return this.tool.up();
+    const hit = click && this.pick(offsetX, offsetY);
+    if (hit) click!(hit, event);
   }
 
   /** Give the pointer to a tool that drags, or to what a click does; else it turns the camera. */

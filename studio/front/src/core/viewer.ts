@@ -5,7 +5,7 @@ import { Ambient } from "./ambient";
 import type { Handle, Vec3 } from "./backend";
 import { Eye } from "./camera";
 import { buildLegend, formatNumber, rgbOf, type Scale } from "./colors";
-import { h } from "./dom";
+import { h, nextFrame } from "./dom";
 import { Edges } from "./edges";
 import { Motion } from "./motion";
 import { Picker, type Hit } from "./picking";
@@ -67,7 +67,7 @@ export class Viewer {
   /** Color maps and ranges that the person chose, by the title of the function. */
   private readonly chosen = new Map<string, Partial<Scale>>();
   private frame = 0;
-  private resting = 0;
+  private drawings = 0;
   private fading = 0;
   private up: Vec3 = [0, 1, 0];
   private solid = false;
@@ -76,8 +76,11 @@ export class Viewer {
 
   constructor(readonly stage: HTMLElement) {
     const { canvas, surface, skeleton, discs } = this;
-    stage.append(canvas, this.tip);
-    canvas.setAttribute("aria-label", "The shape. Arrow keys turn it, + and - zoom.");
+    stage.append(canvas, h("div", { class: "cross" }), this.tip);
+    canvas.setAttribute(
+      "aria-label",
+      "The shape. Arrow keys turn it, with Ctrl they move it, + and - zoom, Space clicks in the middle.",
+    );
     skeleton.visible = discs.visible = false;
     skeleton.material.transparent = discs.material.transparent = true;
     // The skeleton is drawn over the veil of the surface, also where it lies behind it.
@@ -251,6 +254,7 @@ export class Viewer {
     const materials = [this.surface.material, this.edges.material, this.picker?.material];
     this.motion.cut(plane, materials.filter((material) => material !== undefined));
     this.setSolid(this.solid);
+    this.invalidate();
   }
 
   private planeAt(direction: three.Vector3, share: number): three.Vector4 {
@@ -283,7 +287,9 @@ export class Viewer {
   setSolid(solid: boolean): void {
     this.solid = solid;
     const inside = this.folded || this.clipped || !solid;
-    this.surface.material.side = inside ? three.DoubleSide : three.FrontSide;
+    const side = inside ? three.DoubleSide : three.FrontSide;
+    if (side === this.surface.material.side) return; // the page asks with each state that it hears of
+    this.surface.material.side = side;
     this.invalidate();
   }
 
@@ -338,7 +344,7 @@ export class Viewer {
   /** Give the graphics memory back: browsers allow only few pictures at a time. */
   dispose(): void {
     cancelAnimationFrame(this.frame);
-    clearTimeout(this.resting);
+    this.drawings += 1; // whoever waits for a rest hears that it is over
     this.ambient?.dispose();
     this.watch.disconnect();
     this.controls.dispose();
@@ -417,7 +423,7 @@ export class Viewer {
   /** Draw now. In software, edges are smooth only in a `fine` picture, drawn when all is at rest. */
   private draw(fine = !this.inSoftware): void {
     cancelAnimationFrame(this.frame);
-    clearTimeout(this.resting);
+    this.drawings += 1;
     this.frame = 0;
     const { renderer } = this;
     if (!renderer || !this.vertices.length) return;
@@ -427,6 +433,16 @@ export class Viewer {
     this.surface.material.uniforms.line!.value = ratio;
     renderer.render(this.scene, this.camera);
     for (const act of this.onDraw) act();
-    if (!fine) this.resting = window.setTimeout(() => this.draw(true), REST);
+    if (!fine) this.drawFineAtRest();
+  }
+
+  /** Draw with smooth edges when nothing has moved for a while. */
+  private async drawFineAtRest(): Promise<void> {
+    const drawn = this.drawings;
+    // A slow frame is no rest: two frames later this one has been shown.
+    await nextFrame();
+    await nextFrame();
+    await new Promise((done) => setTimeout(done, REST));
+    if (drawn === this.drawings) this.draw(true);
   }
 }

@@ -22,6 +22,7 @@ export class CollectionPanel implements Panel {
   private mean = new Float32Array(0); // vertices, and their normals
   private normals = new Float32Array();
   private most = 0; // displacement at the end of the color map
+  private listed = ""; // what tells the collection that is shown from others
   private pose = "";
   private active = false;
 
@@ -32,7 +33,13 @@ export class CollectionPanel implements Panel {
       mean: () => this.set([]),
       "to-mean": () => app.change({ kind: "mean" }, "Loading the mean"),
     });
-    const collection = app.state.collection!;
+    return form.root;
+  }
+
+  /** Show another collection: its sliders, its specimens, and what failed. */
+  private list(collection: Collection): void {
+    const { form } = this;
+    form.get("sliders").replaceChildren();
     this.sliders = collection.shares.map((share, mode) => this.addSlider(share, mode));
     const rows = collection.specimens.map((each) => this.buildRow(each));
     form.get("specimens").replaceChildren(...rows);
@@ -43,7 +50,7 @@ export class CollectionPanel implements Panel {
     form.get("failures-part").hidden = !failed.length;
     const count = collection.specimens.length;
     form.text("about-collection", `${count} specimens of ${collection.title}, in correspondence.`);
-    return form.root;
+    this.modes = null;
   }
 
   private addSlider(share: number, mode: number): HTMLInputElement {
@@ -70,7 +77,10 @@ export class CollectionPanel implements Panel {
   }
 
   refresh(state: State): void {
-    const { is_mean } = state.collection!;
+    const { title, is_mean, specimens } = state.collection!;
+    const listed = [title, ...specimens.map(({ name }) => name)].join();
+    if (listed !== this.listed) this.list(state.collection!);
+    this.listed = listed;
     this.form.get("modes-part").hidden = !is_mean;
     this.form.get("to-mean-part").hidden = is_mean;
     const pose = `${state.shape} ${state.pose}`;

@@ -5,7 +5,7 @@ import type { Change, Second, State } from "../core/backend";
 import { Beside } from "../core/beside";
 import { coverWith } from "../core/carry";
 import { partColors, rgbOf, type Scale } from "../core/colors";
-import { Form, h, type NamedFile } from "../core/dom";
+import { Form, h, nextFrame, type NamedFile } from "../core/dom";
 import type { Viewer } from "../core/viewer";
 import type { Arrays as WireArrays } from "../core/wire";
 import markup from "./compare.html?raw";
@@ -13,7 +13,6 @@ import markup from "./compare.html?raw";
 const SURE: Scale = { map: "viridis", range: [0, 1], title: "Confidence" };
 const HOVER = "#d62728";
 const HINT = "The map follows two points that you choose. Ctrl+Z takes them back.";
-const nextFrame = () => new Promise(requestAnimationFrame);
 
 type Both<T> = [T, T]; // of this shape, and of the second one
 interface Arrays {
@@ -150,7 +149,7 @@ export class ComparePanel implements Panel {
     const loaded = await app.run("Loading the second shape", loading);
     if (!loaded || app.second !== second) return;
     second.show(...loaded);
-    app.secondShown(second);
+    for (const hear of app.secondShown) hear(second);
     this.paint();
   }
 
@@ -179,7 +178,7 @@ export class ComparePanel implements Panel {
     const { app, map } = this;
     const { second } = app;
     if (!second?.viewer.vertices.length) return;
-    second.carryBy(map?.partners[1] ?? null);
+    second.carryBy(map?.partners ?? null);
     if (!this.active) return;
     const pressed = this.form.choice("mapcolor").find(([, each]) => each.ariaPressed === "true");
     const views = [app.viewer, second.viewer];

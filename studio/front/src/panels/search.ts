@@ -26,6 +26,7 @@ export class SearchPanel implements Panel {
   private found: Matches | null = null;
   private opened = -1; // match that is shown beside
   private shape = -1; // which the matches belong to
+  private path = ""; // of the index
   private active = false;
 
   /** `painted` returns the vertices that are selected, if any are. */
@@ -39,7 +40,7 @@ export class SearchPanel implements Panel {
       "search-file": async () => (await app.choose()).forEach((file) => this.searchFile(file)),
     });
     app.acceptDrops(this.form.root, (file) => this.searchFile(file));
-    app.secondShown = (second) => this.mark(second);
+    app.secondShown.push((second) => this.mark(second));
     return this.form.root;
   }
 
@@ -47,8 +48,8 @@ export class SearchPanel implements Panel {
     const about = `${index!.n_shapes.toLocaleString("en")} shapes in ${index!.path}.`;
     const help = "A smaller score is more alike. Drop a file here to search with it.";
     this.form.text("index", `${about} ${help}`);
-    if (shape !== this.shape) this.clear();
-    this.shape = shape;
+    if (shape !== this.shape || index!.path !== this.path) this.clear();
+    [this.shape, this.path] = [shape, index!.path];
     if (!beside) this.opened = -1;
     this.list.querySelectorAll("li").forEach((card, i) => {
       card.classList.toggle("chosen", i === this.opened);

@@ -29,14 +29,16 @@ export class ShapePanel extends ColoringPanel {
     const choose = async () => (await app.choose()).forEach((file) => app.openFile(file));
     form.on({
       open: choose,
+      "open-folder": () => app.folders.show(),
       values: () => this.start(),
       "save-png": () => this.savePicture(),
       "roll-left": () => this.roll(1),
       "roll-right": () => this.roll(-1),
       front: () => this.faceFront(),
     });
-    app.addExports(form, can.includes("finish"));
+    app.addExports(form, "save");
     form.get("opening").hidden = !can.includes("open");
+    form.get("open-folder").hidden = !can.includes("folders");
     form.get("facing").hidden = !can.includes("finish");
     if (can.includes("open")) {
       app.shortcut("O", "Open a file", choose);

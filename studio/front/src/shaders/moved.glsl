@@ -2,9 +2,11 @@
 // by exp(share * log r) (Rodrigues' formula), so a twist does not pinch. `blend` fades to `exact`,
 // the result of the server.
 #define REGIONS 4
+#ifdef MOVING
 in vec4 shares;
 in vec3 exact;
-uniform int n_moving;            // regions beyond are at rest; 0 saves a third of the time of a frame
+in vec3 exact_normal;
+uniform int n_moving;            // regions beyond are at rest
 uniform int kind[REGIONS];       // 0: at rest, 1: rotation, 2: translation
 uniform vec3 pivot[REGIONS];
 uniform vec3 direction[REGIONS]; // unit axis, or the vector of the translation
@@ -44,7 +46,21 @@ vec3 moved(out vec3 turn) {
 }
 
 vec3 turned(vec3 vector, vec3 turn) {
-  if (n_moving == 0) return vector;
   float size = max(length(turn), 1e-20);
   return vector + across(turn / size, size, vector);
 }
+
+// The normal of this vertex, after the turn of `moved`.
+vec3 moved_normal(vec3 turn) {
+  return mix(turned(normal, turn), exact_normal, blend);
+}
+#else
+vec3 moved(out vec3 turn) {
+  turn = vec3(0.0);
+  return position;
+}
+
+vec3 moved_normal(vec3 turn) {
+  return normal;
+}
+#endif

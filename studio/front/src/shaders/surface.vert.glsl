@@ -1,4 +1,3 @@
-in vec3 exact_normal;
 in float ambient;
 out float v_ambient;
 #if COLORING == 1
@@ -33,7 +32,7 @@ void main() {
   v_place = place;
 #endif
   vec4 seen = modelViewMatrix * vec4(place, 1.0);
-  v_normal = normalMatrix * mix(turned(normal, turn), exact_normal, blend);
+  v_normal = normalMatrix * moved_normal(turn);
   v_view = -seen.xyz;
   v_ambient = ambient;
 #if COLORING == 1

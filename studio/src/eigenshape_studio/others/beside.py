@@ -8,6 +8,7 @@ import eigenshape as es
 from eigenshape_studio.calls import RequestError
 from eigenshape_studio.others.mapping import DenseMap, correct_map, map_of_match
 from eigenshape_studio.shape.analysis import frame_shape
+from eigenshape_studio.shape.brush import Brush
 from eigenshape_studio.shape.jobs import NO_JOB, Job, Progress
 
 MOST_PAIRS = 100  # corrections by hand
@@ -47,6 +48,7 @@ class Beside:
             known is None and es.geometry.is_closed(mesh) and not es.geometry.is_closed(other)
         )
         self._view = frame_shape(other)
+        self._brush = Brush()
         self._first = known  # the map before corrections
         self.job: Job[DenseMap] | None = None if known is None else Job(lambda _: known)
 
@@ -113,7 +115,7 @@ class Beside:
         }
 
     def array(self, tail: str) -> np.ndarray:
-        """Return an array by its name: vertices, faces; of the map "partners/0", "confidence/1", ...
+        """Return an array by its name: vertices, faces, "disc/7/0.5"; of the map "partners/0", ...
 
         Raises
         ------
@@ -126,9 +128,11 @@ class Beside:
         if tail == "faces":
             return other.faces.astype("<u4")
         name, _, side = tail.partition("/")
+        if name == "disc":
+            return self._brush.disc(other, side)
         if side not in ("0", "1") or name not in ("partners", "confidence", "colors"):
             raise RequestError(
-                "Of a second shape there are vertices, faces, and partners, confidence and colors "
+                "Of a second shape there are vertices, faces, discs, and partners, confidence and colors "
                 f"of sides 0 and 1; not {tail[:80]!r}."
             )
         found = self.require_map()

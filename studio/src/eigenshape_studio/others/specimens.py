@@ -35,6 +35,10 @@ class Specimens:
         self._shares = found.shares[: len(deviations)]
         self._scores = found.scores[:, : len(deviations)] / deviations
 
+    def is_mean(self, mesh: es.TriangleMesh) -> bool:
+        """Say whether a shape is the mean, which a session that continues has read from its file."""
+        return mesh is self.mean or np.array_equal(mesh.vertices, self.mean.vertices)
+
     def facts(self) -> dict[str, Any]:
         """Return what the page shows of it; scores are in standard deviations."""
         rows = zip(self.collection.names, self._scores.tolist(), strict=True)

@@ -1,14 +1,13 @@
 """Arrays of the shape of a tab, by their names."""
 
-import threading
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 import eigenshape as es
 from eigenshape_studio.calls import Families, Meta, RequestError, whole
 from eigenshape_studio.shape.analysis import cut_rows, diagram_rows, vertex_labels
+from eigenshape_studio.shape.brush import Brush
 from eigenshape_studio.shape.samples import sample_picture
 from eigenshape_studio.tab.scene import Scene
 
@@ -32,9 +31,7 @@ class ShapeArrays:
 
     def __init__(self, scene: Scene) -> None:
         self._of = scene
-        self._painting = threading.Lock()
-        # The pose that the brush last painted on, and the function that computes distances on it.
-        self._waves: tuple[Any, Any] = (None, None)
+        brush = Brush()
         self.makers: dict[str, Callable[[Meta], np.ndarray]] = {
             "vertices": lambda _: scene.mesh.vertices.astype("<f4"),
             "faces": lambda _: scene.analysis.mesh.faces.astype("<u4"),
@@ -51,7 +48,7 @@ class ShapeArrays:
         self.families: Families = {
             "parts": self._parts,
             "values": self._values,
-            "disc": self._disc,
+            "disc": lambda tail: brush.disc(scene.mesh, tail),
             "sample": sample_picture,
         }
 
@@ -121,28 +118,3 @@ class ShapeArrays:
 
     def _crossings(self, _meta: Meta) -> np.ndarray:
         return es.geometry.self_intersections(self._of.mesh).astype("<u4").reshape(-1, 2)
-
-    def _disc(self, tail: str) -> np.ndarray:
-        """Return the vertices within a geodesic radius of a vertex; `tail` is "vertex/radius".
-
-        A stroke of the brush asks for many discs, so what they have in common is kept.
-        """
-        vertex, _, radius = tail.partition("/")
-        try:
-            source, reach = int(vertex), float(radius)
-        except ValueError as err:
-            raise RequestError(
-                f"A disc must be named by its vertex and its radius, as 'disc/7/0.5'; not {tail[:80]!r}."
-            ) from err
-        if not (0 <= source < self._of.mesh.n_vertices and 0 < reach < np.inf):
-            raise RequestError(
-                f"A disc must have one of the {self._of.mesh.n_vertices} vertices and a positive, finite "
-                f"radius; it has vertex {source} and radius {reach:g}."
-            )
-        with self._painting:
-            mesh, wave = self._waves
-            if mesh is not self._of.mesh:
-                mesh = self._of.mesh
-                wave = es.geometry.geodesic_waves(mesh)
-                self._waves = mesh, wave
-        return np.flatnonzero(wave(source, reach) <= reach).astype("<u4")

@@ -1,13 +1,16 @@
 """Changes of a tab beside bending: steps through its history, and other shapes."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 import eigenshape as es
 from eigenshape.geometry.resolution.thinning import thin_out
 from eigenshape_studio.calls import Arrays, Meta, RequestError, Works, file_bytes, whole
+from eigenshape_studio.others.folders import look_in
 from eigenshape_studio.others.poses import carry_pose
+from eigenshape_studio.others.specimens import Specimens
 from eigenshape_studio.shape.analysis import LIGHT
 from eigenshape_studio.shape.loading import Loaded
 from eigenshape_studio.shape.parse import display_name
@@ -41,6 +44,7 @@ class Changes:
             "reset": self._reset,
             "repair": self._repair,
             "open": self._open,
+            "folder": self._open_folder,
             "solve": self._solve,
             "examine": lambda *_: scene.analysis.health.start(),
             "prepare": lambda *_: scene.analysis.prepare(),
@@ -118,6 +122,26 @@ class Changes:
         found = self._of.parse(name, file_bytes(arrays, "file"))
         loaded = Loaded(found.mesh, points=found.points)
         self._history.show(loaded, name, f"Open {name}")
+
+    def _open_folder(self, meta: Meta, _arrays: Arrays) -> None:
+        """Show what a folder holds: a collection, or the first shape of an index or of files."""
+        folder = self._of.require_folders().path(str(meta.get("folder")))
+        found, before = look_in(folder), self._history.now
+        if found.files:
+            self._of.warnings += self._history.open_files(found.files)
+        self.use(found.index, found.collection)
+        if found.collection and self._of.specimens is not None:
+            self._of.show(self._of.specimens.mean, self._of.specimens.title)
+        if self._history.now is before:  # no file is there, or its shape is shown already
+            self._history.did(f"Open {folder.name}")
+
+    def use(self, index: str | Path | None, collection: str | Path | None) -> None:
+        """Search in another index, and show another collection; what is not given stays."""
+        if index:
+            self._searching.search_in(index)
+        if collection:
+            self._of.specimens = Specimens(collection)
+            self._history.collection = str(collection)
 
     def _face(self, meta: Meta, _arrays: Arrays) -> None:
         """Let another direction be up and another side the front, now and later on."""

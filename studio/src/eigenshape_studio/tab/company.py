@@ -69,7 +69,8 @@ class Company:
         beside, specimens = self.beside, self._of.specimens
         shown = None
         if specimens is not None:
-            shown = {**specimens.facts(), "is_mean": self._of.analysis.mesh is specimens.mean}
+            is_mean = specimens.is_mean(self._of.analysis.mesh)
+            shown = {**specimens.facts(), "is_mean": is_mean}
         return {
             "beside": None if beside is None else beside.facts(),
             "landmarks": self.landmarks.facts(self._of.mesh),
@@ -107,7 +108,7 @@ class Company:
     def _known_map(self, mesh: es.TriangleMesh, second: Shape) -> DenseMap | None:
         """Return the map from the mean of the collection to one of its specimens."""
         specimens = self._of.specimens
-        if specimens is None or mesh is not specimens.mean:
+        if specimens is None or not specimens.is_mean(mesh):
             return None
         is_specimen = second.name in specimens.collection.names
         return specimens.map_to(second.name, second.mesh) if is_specimen else None

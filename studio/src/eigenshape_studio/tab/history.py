@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 import eigenshape as es
 from eigenshape.deformation.edits import mesh_fingerprint
 from eigenshape_studio.calls import RequestError
+from eigenshape_studio.others.folders import MOST_LISTED
 from eigenshape_studio.shape.analysis import Analysis
 from eigenshape_studio.shape.loading import Field, Loaded, load_file
 from eigenshape_studio.tab.sessions import Row, SessionFile, edits_text
@@ -204,6 +206,7 @@ class History:
         self.file = file
         self.moments: list[Moment] = []
         self.place = 0
+        self.index = self.collection = ""  # folders that the page has opened
         self.last = ""  # the page's own name for its last change, which it may send again
         self._n_poses = 0
         self._n_written = 0  # of the moments; later ones are new to the file
@@ -281,6 +284,35 @@ class History:
         self.shapes[shape.number] = shape
         return shape
 
+    def open_files(self, files: list[tuple[str, Path]]) -> list[str]:
+        """Add files to the list, unless they are in it, and show the first that can be read.
+
+        Returns
+        -------
+        list of str
+            Why those before it cannot.
+
+        Raises
+        ------
+        RequestError
+            If none can be read.
+        """
+        listed = {shape.path: shape for shape in self.shapes.values() if shape.path}
+        for name, path in files[: max(0, MOST_LISTED - len(self.shapes))]:
+            if str(path) not in listed:
+                number = max(self.shapes) + 1
+                shape = Shape(number, name, partial(load_file, path), path=str(path))
+                self.shapes[number] = listed[str(path)] = shape
+        notes: list[str] = []
+        for name, path in files:
+            try:
+                if str(path) in listed:
+                    self.choose(listed[str(path)])
+                    return notes
+            except (es.EigenshapeError, OSError) as error:
+                notes.append(f"{name} cannot be opened: {error}")
+        raise RequestError(" ".join(["No shape of the folder can be opened.", *notes[:1]]))
+
     def bend(
         self, edits: tuple[es.deformation.Edit, ...], mesh: es.TriangleMesh, text: str
     ) -> None:
@@ -349,7 +381,13 @@ class History:
         shapes = [shape for shape in self.shapes.values() if not shape.stored]
         poses = {moment.pose for moment in new if moment.pose.number and not moment.pose.stored}
         self.file.write(
-            {"place": self.now.number, "last": self.last, "n_poses": self._n_poses},
+            {
+                "place": self.now.number,
+                "last": self.last,
+                "n_poses": self._n_poses,
+                "index": self.index,
+                "collection": self.collection,
+            },
             map(_shape_row, shapes),
             [_pose_row(pose) for pose in poses],
             [_moment_row(moment) for moment in new],
@@ -373,6 +411,7 @@ class History:
             return False
         facts: dict[str, str] = dict(tables["fact"])
         self.last, self._n_poses = facts["last"], int(facts["n_poses"])
+        self.index, self.collection = facts.get("index", ""), facts.get("collection", "")
         for number, name, path, digest in tables["shape"]:
             # What the server shows to all tabs is analyzed once.
             shared = self.shapes.get(number)

@@ -5,6 +5,7 @@ from typing import Any
 
 import eigenshape as es
 from eigenshape_studio.calls import RequestError
+from eigenshape_studio.others.folders import Folders
 from eigenshape_studio.others.specimens import Specimens
 from eigenshape_studio.shape.analysis import Analysis
 from eigenshape_studio.shape.loading import Field, Loaded
@@ -19,7 +20,9 @@ class Scene:
     ----------
     history : History
     specimens : Specimens, optional
-        Of the collection that the studio was opened with.
+        Of the collection that is shown.
+    folders : Folders, optional
+        Those that the page may open.
 
     Attributes
     ----------
@@ -29,8 +32,13 @@ class Scene:
         Whoever changes something holds it.
     """
 
-    def __init__(self, history: History, specimens: Specimens | None = None) -> None:
-        self.history, self.specimens = history, specimens
+    def __init__(
+        self,
+        history: History,
+        specimens: Specimens | None = None,
+        folders: Folders | None = None,
+    ) -> None:
+        self.history, self.specimens, self.folders = history, specimens, folders
         self.warnings: list[str] = []
         self.changing = threading.RLock()
 
@@ -67,6 +75,12 @@ class Scene:
         if not isinstance(number, int) or number not in shapes:
             raise RequestError(f"shape must be one of {[*shapes]}; it is {number!r:.80}.")
         return shapes[number]
+
+    def require_folders(self) -> Folders:
+        """Return the folders that the page may open."""
+        if self.folders is None:
+            raise RequestError("Folders of this machine are opened from the command line here.")
+        return self.folders
 
     def parse(self, name: str, data: bytes) -> Upload:
         """Read a file from outside; what had to be made of points is told with the answer."""

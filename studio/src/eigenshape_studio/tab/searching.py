@@ -1,5 +1,6 @@
 """Searching the index of the studio for shapes like that of a tab."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,17 +19,27 @@ class Searching:
     ----------
     scene : Scene
     shelf : Shelf, optional
+
+    Attributes
+    ----------
+    shelf : Shelf, optional
+        The index to search in.
     """
 
     def __init__(self, scene: Scene, shelf: Shelf | None) -> None:
-        self._of, self._shelf = scene, shelf
+        self._of, self.shelf = scene, shelf
         self._matches: list[str] = []  # names, of the last query
         self._searched: tuple[Any, Reply] | None = None  # for what, and what was found
 
+    def search_in(self, index: str | Path) -> None:
+        """Search in another index from now on."""
+        self.shelf, self._matches, self._searched = Shelf(index), [], None
+        self._of.history.index = str(index)
+
     def _require_shelf(self) -> Shelf:
-        if self._shelf is None:
+        if self.shelf is None:
             raise RequestError("There must be an index to search in; open the studio with --index.")
-        return self._shelf
+        return self.shelf
 
     def query(self, meta: Meta, arrays: Arrays) -> Reply:
         """Search an index for shapes like the present one, a part of it, or that of a file."""

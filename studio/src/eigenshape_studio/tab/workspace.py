@@ -1,6 +1,7 @@
 """The shapes of one tab, and the five calls of the page: the same for all hosts."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -89,18 +90,18 @@ class Workspace(Scene):
             shapes = [Shape(0, display_name(name), lambda: loaded, make)]
         super().__init__(History(shapes))
         self.analysis  # noqa: B018  it begins before a page asks
-        self.shelf = None if index is None else Shelf(index)
         self.most_bytes = 256 << 20  # of a file; the server has a limit of its own
         self.notes: list[str] = []  # what the page says when it is opened
         self.welcome = False  # whether the page offers samples first
-        self._begin()
+        self._begin(None if index is None else Shelf(index))
 
-    def _begin(self) -> None:
+    def _begin(self, shelf: Shelf | None) -> None:
         """Set up what works on the shapes of this tab."""
-        self.searching = Searching(self, self.shelf)
+        self.searching = Searching(self, shelf)
         self.bending = Bending(self)
         self.company = Company(self, self.searching)
-        shown, changes = ShapeArrays(self), Changes(self, self.searching)
+        self.changes = Changes(self, self.searching)
+        shown = ShapeArrays(self)
         self._calls: dict[str, Callable[[Meta, Arrays], Reply]] = {
             "meta": lambda *_: (self.state(), {}),
             "array": self._call_array,
@@ -110,7 +111,7 @@ class Workspace(Scene):
         }
         self._works: Works = {
             **self.bending.works,
-            **changes.works,
+            **self.changes.works,
             **self.company.works,
         }
         self._makers = shown.makers
@@ -120,6 +121,7 @@ class Workspace(Scene):
             **self.company.families,
             "match": self.searching.match_array,
             "file": self._file,
+            "folder": lambda tail: self.require_folders().list(tail),
         }
 
     def fork(self, file: SessionFile | None = None) -> "Workspace":
@@ -127,8 +129,11 @@ class Workspace(Scene):
         twin = object.__new__(Workspace)
         twin.__dict__.update(self.__dict__)
         shapes = self.history.shapes.values()
-        Scene.__init__(twin, History([shape.fork() for shape in shapes], file), self.specimens)
-        twin._begin()
+        history = History([shape.fork() for shape in shapes], file)
+        Scene.__init__(twin, history, self.specimens, self.folders)
+        twin._begin(self.searching.shelf)
+        with suppress(es.EigenshapeError, OSError):  # they may have gone
+            twin.changes.use(history.index, history.collection)
         return twin
 
     def close(self) -> None:
@@ -165,8 +170,10 @@ class Workspace(Scene):
         """Return what the page shows beside the arrays."""
         analysis, history = self.analysis, self.history
         now = history.now
-        capabilities = [name for name in CAPABILITIES if name != "query" or self.shelf is not None]
+        shelf = self.searching.shelf
+        capabilities = [name for name in CAPABILITIES if name != "query" or shelf is not None]
         capabilities += [] if self.specimens is None else ["collection"]
+        capabilities += [] if self.folders is None else ["folders"]
         return {
             "name": analysis.name,
             "n_vertices": analysis.mesh.n_vertices,
@@ -182,7 +189,7 @@ class Workspace(Scene):
             "spectrum": analysis.spectrum_facts(),
             "parts": analysis.parts_facts(),
             "deformation": self.bending.facts(),
-            "index": None if self.shelf is None else self.shelf.facts(),
+            "index": None if shelf is None else shelf.facts(),
             **self.company.facts(),
             "n_points": 0 if now.shape.points is None else len(now.shape.points),
             "shapes": [[shape.number, shape.name] for shape in history.shapes.values()],

@@ -12,6 +12,14 @@ import { Selection, type Selector } from "./selection";
 
 const SELECTORS = ["box", "brush", "part"]; // the other tools move
 
+// Keys by which limbs turn about an axis of the view
+const SWINGS = [
+  ["Left", "above", -1],
+  ["Right", "above", 1],
+  ["Up", "right", -1],
+  ["Down", "right", 1],
+] as const;
+
 type Tool = "limb" | Selector | MotionKind;
 
 export class DeformPanel implements Panel {
@@ -61,12 +69,17 @@ export class DeformPanel implements Panel {
       crossings: () => this.showCrossings(),
       transfer: () => transferToFile(app),
     });
-    app.addExports(form);
+    app.addExports(form, "export");
     for (const [tool, { dataset, textContent }] of form.choice("tool"))
       app.shortcut(dataset.key!, `Bend: ${textContent!.toLowerCase()}`, () => {
         app.open(this.id);
         this.chooseTool(tool as Tool);
       });
+    app.shortcut("N", "Bend: light the next limb", () => this.useLimbs(() => this.limbs.next()));
+    for (const [key, axis, sign] of SWINGS)
+      app.shortcut(`Shift+Arrow${key}`, `Bend: turn the limb that is lit, ${key.toLowerCase()}`, () =>
+        this.useLimbs(() => this.limbs.swing(axis, sign)),
+      );
     app.shortcut("Enter", "Apply the motions", () => this.motion.commit());
     app.shortcut("Escape", "Drop the motion", () => this.motion.drop());
     return form.root;
@@ -110,6 +123,7 @@ export class DeformPanel implements Panel {
   hidden(): void {
     this.active = false;
     this.app.viewer.setPointer();
+    this.app.second?.viewer.setPointer();
     this.motion.drop();
     this.selection.paint();
   }
@@ -117,6 +131,14 @@ export class DeformPanel implements Panel {
   /** The vertices of the chosen region. */
   get painted(): Uint32Array {
     return this.selection.regions.vertices(this.selection.region);
+  }
+
+  /** Do something with limbs by the keyboard. */
+  private async useLimbs(act: () => Promise<void>): Promise<void> {
+    this.app.open(this.id);
+    if (this.tool !== "limb") this.chooseTool("limb");
+    await this.limbs.load();
+    await act();
   }
 
   private chooseRegion(region: number): void {

@@ -12,6 +12,8 @@ import type { Selection } from "./selection";
 
 const HINT =
   "Point at a limb: it lights up. Drag it, and it bends. Drag anywhere else to turn the view.";
+const KEYS = "Shift with the arrow keys turns it, Enter bends it, Escape lets it go. N: the next one.";
+const STEP = Math.PI / 36; // by which a key turns a limb
 const NO_LIMBS = "No limb stands out on this shape. Choose a region by hand, under “More”.";
 
 export class Limbs implements PointerTool {
@@ -19,6 +21,7 @@ export class Limbs implements PointerTool {
   private body = -1; // the largest part, which stays
   private lit = -1;
   private bound = -1; // the limb that can be moved
+  private chosen = -1; // by the keyboard
   private binding: Promise<void> = Promise.resolve();
   private last: PointerEvent | null = null; // of the drag that is going on
   private readonly drag: PlainDrag;
@@ -34,7 +37,7 @@ export class Limbs implements PointerTool {
   /** The parts of another shape are others. */
   startShape(): void {
     this.labels = this.selection.lit = null;
-    this.lit = -1;
+    this.lit = this.chosen = -1;
     this.startPose();
   }
 
@@ -111,13 +114,47 @@ export class Limbs implements PointerTool {
     this.light(limb);
     this.drag.begin(point);
     this.last = null;
+    return this.bind(limb).then(() => this.follow());
+  }
+
+  /** Let a limb be moved, unless it can be already. */
+  private bind(limb: number): Promise<void> {
     if (limb !== this.bound) {
       this.bound = limb;
       this.binding = this.motion.bind(this.verticesOf(limb)).then(() => {
         if (!this.motion.ready) this.bound = -1; // the next drag asks again
       });
     }
-    return this.binding.then(() => this.follow());
+    return this.binding;
+  }
+
+  /** Light the next limb, which keys can turn. */
+  async next(): Promise<void> {
+    const limbs = [...new Set(this.labels)].filter((limb) => limb !== this.body).sort((a, b) => a - b);
+    if (!limbs.length) return this.app.say(this.hint);
+    this.motion.drop();
+    this.chosen = limbs.find((limb) => limb > this.chosen) ?? limbs[0]!;
+    this.light(this.chosen);
+    this.app.say(KEYS);
+  }
+
+  /** Turn the limb that the keyboard has chosen by a step more about an axis of the view. */
+  async swing(axis: "above" | "right", sign: 1 | -1): Promise<void> {
+    if (this.chosen < 0) await this.next();
+    if (this.chosen < 0) return;
+    await this.bind(this.chosen);
+    if (!this.motion.ready) return;
+    const handle = this.motion.rowHandles()[0];
+    const turn = new three.Quaternion().setFromAxisAngle(this.app.viewer.axes[axis], sign * STEP);
+    if (handle?.type === "rotation")
+      turn.multiply(
+        new three.Quaternion().setFromAxisAngle(new three.Vector3(...handle.axis), handle.angle),
+      );
+    const half = new three.Vector3(turn.x, turn.y, turn.z);
+    if (!half.length()) return this.motion.drop(); // it has been turned back
+    const angle = 2 * Math.atan2(half.length(), turn.w);
+    const pivot = this.pivot.toArray();
+    await this.motion.moved({ type: "rotation", pivot, axis: half.normalize().toArray(), angle });
   }
 
   move(event: PointerEvent): void {

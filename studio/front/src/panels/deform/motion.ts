@@ -2,14 +2,13 @@
 
 import type { Studio } from "../../app";
 import type { Change, Handle, Vec3 } from "../../core/backend";
-import type { Form } from "../../core/dom";
+import { h, nextFrame, type Form } from "../../core/dom";
 import { FIXED } from "../../core/regions";
 import { MotionTool, type MotionKind } from "../../core/tools";
 import type { Selection } from "./selection";
 
 const REST = 80; // ms without motion, beside two frames, after which the exact result is requested
 const AXES = [0, 1, 2];
-const nextFrame = () => new Promise(requestAnimationFrame);
 
 export class Motion {
   readonly mover: MotionTool;
@@ -33,6 +32,9 @@ export class Motion {
       released: () => this.several || this.commit(),
       pivoted: (pivot) => (this.pivots[this.selection.region] = pivot),
     });
+    const kinds = ["x", "y", "z"].map((axis) => `Rotate about ${axis}, °`);
+    kinds.push(...["x", "y", "z"].map((axis) => `Move along ${axis}`));
+    form.get("exact-kind").append(...kinds.map((kind) => h("option", {}, kind)));
     form.on({
       "exact-go": () => this.moveExactly(),
       "n-modes": () => this.bind(),

@@ -2,18 +2,20 @@
 
 import type { Studio } from "../../app";
 import type { State, Vec3 } from "../../core/backend";
+import type { Beside } from "../../core/beside";
 import { partColors, rgbOf } from "../../core/colors";
 import { h, type Form } from "../../core/dom";
 import { cutParts } from "../../core/parts";
 import { FIXED, Regions } from "../../core/regions";
 import { BoxTool } from "../../core/tools";
-import type { Hit, PointerTool } from "../../core/viewer";
+import type { Hit, PointerTool, Viewer } from "../../core/viewer";
 
 const COLORS = ["#e08a2e", "#3b8fd4", "#46a564", "#b468c8", "#4f6072"]; // of the regions, and fixed
 const CROSSING = "#d8301f";
 const TINT = 190; // of 255: how strongly a region covers the colors below
 const GLOW = 0.6; // the same, as a share, of a limb under the pointer
 const AXES = [0, 1, 2];
+const UNMAPPED = "Nothing on the first shape corresponds to this point. Find the map in Compare.";
 
 const NOTHING = { status: "none", progress: 0, message: "" } as const; // that is awaited
 
@@ -50,11 +52,19 @@ export class Selection {
       () => this.boxMoved(),
       () => this.selected("Box"),
     );
-    viewer.stage.append(this.ring);
-    viewer.canvas.addEventListener("pointermove", (event) => this.moveRing(event));
-    COLORS.forEach((color, region) => {
-      form.get(`region-${region}`).style.setProperty("--swatch", color);
+    viewer.canvas.addEventListener("pointermove", (event) => this.moveRing(event, viewer));
+    app.secondShown.push((second) => {
+      const { viewer } = second;
+      viewer.canvas.addEventListener("pointermove", (event) => this.moveRing(event, viewer));
+      this.takePointerOf(second);
     });
+    const swatches = COLORS.map((color, region) => {
+      const swatch = { type: "button", class: "swatch", "data-test": `region-${region}` };
+      const button = h("button", swatch, region === FIXED ? "Fixed" : String(region + 1));
+      button.style.setProperty("--swatch", color);
+      return button;
+    });
+    form.get("regions").append(...swatches);
     for (const name of ["low", "high"])
       form.get("corners").append(name, ...AXES.map((axis) => this.buildCorner(name, axis)));
     form.get("brush-radius").valueAsNumber = settings.get("radius", 0.1);
@@ -138,12 +148,26 @@ export class Selection {
     this.showFinding();
     this.ring.hidden = true;
     this.box.show(this.tool === "box");
+    if (this.app.second) this.takePointerOf(this.app.second);
     if (this.tool === "box") viewer.setPointer("grab", null, this.box);
-    else if (this.tool === "brush") viewer.setPointer("crosshair", null, this.brush);
+    else if (this.tool === "brush") viewer.setPointer("crosshair", null, this.brushOn(null));
     else if (this.tool === "part")
       viewer.setPointer("crosshair", (hit, event) => this.pickPart(hit, event));
     if (this.tool === "part") this.loadParts();
     else if (labels && viewer.labels === labels) viewer.setLabels(null);
+  }
+
+  /** What is painted or clicked on the second shape is chosen where it corresponds to this one. */
+  private takePointerOf(second: Beside): void {
+    const { viewer } = second;
+    if (this.tool === "brush") viewer.setPointer("crosshair", null, this.brushOn(second));
+    else if (this.tool === "part")
+      viewer.setPointer("crosshair", (hit, event) => {
+        const vertex = second.partnerOf(hit.vertex);
+        if (vertex < 0) this.app.say(UNMAPPED);
+        else this.pickPart({ ...hit, vertex }, event);
+      });
+    else if (this.visible) viewer.setPointer();
   }
 
   /** Tint the regions and the faces that cross, and say how many vertices the region has. */
@@ -221,38 +245,50 @@ export class Selection {
     this.app.settings.set("radius", share);
   }
 
-  /** Return the radius of the brush, in length. */
-  private get radius(): number {
-    return this.form.number("brush-radius") * this.app.viewer.extent;
+  /** Return the radius of the brush on a shape, in its length. */
+  private radiusOn({ extent }: Viewer): number {
+    return this.form.number("brush-radius") * extent;
   }
 
-  private moveRing(event: PointerEvent): void {
-    const reach = this.app.viewer.pixelsOf(this.radius);
+  private moveRing(event: PointerEvent, viewer: Viewer): void {
+    const reach = viewer.pixelsOf(this.radiusOn(viewer));
     const { style } = this.ring;
+    viewer.stage.append(this.ring);
     this.ring.hidden = this.tool !== "brush";
     style.width = style.height = `${2 * reach}px`;
     style.left = `${event.offsetX - reach}px`;
     style.top = `${event.offsetY - reach}px`;
   }
 
-  /** A stroke adds the disc along the surface around each vertex that it meets. */
-  private readonly brush: PointerTool = {
-    down: (event) => this.stroke(event),
-    move: (event) => void this.stroke(event),
-    up: () => this.painting.then(() => this.selected("Brush")),
-  };
+  /**
+   * Return the brush of this shape, or that of the second one. A stroke adds the disc along the
+   * surface around each vertex that it meets.
+   */
+  private brushOn(second: Beside | null): PointerTool {
+    return {
+      down: (event) => this.stroke(event, second),
+      move: (event) => void this.stroke(event, second),
+      up: () => this.painting.then(() => this.selected("Brush")),
+    };
+  }
 
-  private stroke(event: PointerEvent): boolean {
+  private stroke(event: PointerEvent, second: Beside | null): boolean {
     const { app, region, regions } = this;
-    const hit = app.viewer.pick(event.offsetX, event.offsetY);
+    const viewer = second?.viewer ?? app.viewer;
+    const hit = viewer.pick(event.offsetX, event.offsetY);
     if (!hit) return false;
+    if (second && second.partnerOf(hit.vertex) < 0) {
+      app.say(UNMAPPED);
+      return false;
+    }
     this.events.changing();
-    const name = `disc/${hit.vertex}/${this.radius}`;
+    const name = `disc/${hit.vertex}/${this.radiusOn(viewer)}`;
     // One request at a time: a quick stroke sends more than the server takes at once.
     const add = async () => {
-      const disc = await app.backend.array<Uint32Array>(name);
-      if (event.shiftKey) regions.remove(region, disc);
-      else regions.add(region, disc);
+      const disc = await app.backend.array<Uint32Array>(second ? `beside/${name}` : name);
+      const ours = second ? second.bringBack(disc) : disc;
+      if (event.shiftKey) regions.remove(region, ours);
+      else regions.add(region, ours);
       this.paint();
     };
     this.painting = this.painting.then(add).catch((error) => app.fail(error));
