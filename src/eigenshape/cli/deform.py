@@ -11,7 +11,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import err, print_json, print_table, print_written, progress_bar
-from eigenshape.cli.inputs import parse_numbers
+from eigenshape.cli.inputs import numbers_of
 from eigenshape.deformation.modes import Mode
 
 REGIONS = (
@@ -190,7 +190,10 @@ def parse_rotation(text: str, mesh: es.TriangleMesh, region: Any) -> es.Rotation
 
 
 def _three(text: str, name: str) -> list[float]:
-    return parse_numbers(text, f"{name} is three numbers separated by commas", 3)
+    numbers = numbers_of(text)
+    if len(numbers) != 3:
+        raise InvalidParameterError(f"{name} is three numbers separated by commas; it is {text!r}.")
+    return numbers
 
 
 def _require_at_most(number: int, last: int, name: str) -> None:
