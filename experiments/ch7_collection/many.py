@@ -4,14 +4,15 @@
 
 Specimens are hands of many individuals, each subdivided to 100,000 vertices and turned in its own way.
 `eigenshape collection` is killed (SIGKILL, all of its processes) when a sixth, two sixths, ... of all
-fits are in the folder, and run to its end then. Files that were there at a kill must be there untouched
-at the end.
+fits are in the folder (with five kills), and run to its end then. Files that were there at a kill must
+be there untouched at the end.
 """
 
 import json
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -37,10 +38,9 @@ SECONDS_BETWEEN_LOOKS = 0.25
 def make_specimens(folder: Path, number: int, n_vertices: int) -> None:
     """Write hands of different individuals, and landmarks of the first one."""
     for i in track(range(number), "specimens"):
-        # Each subdivision has four times the vertices.
-        mesh = es.geometry.subdivide(
-            es.make_creature("hand", individual=i, n_vertices=n_vertices // 4)
-        )
+        mesh = es.make_creature("hand", individual=i, n_vertices=n_vertices // 16)
+        for _ in range(2):  # each time four times the vertices
+            mesh = es.geometry.subdivide(mesh)
         turn = Rotation.random(rng=np.random.default_rng(i)).as_matrix()
         mesh = es.TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
         es.write_mesh(mesh, folder / f"hand {i:03}.ply")
@@ -70,10 +70,16 @@ class Run:
         self.seconds: dict[int, float] = {}
         self.peak = self.peak_of_one = 0.0
 
+    def processes(self) -> list[psutil.Process]:
+        """Return the command and its workers, as far as they are there."""
+        with suppress(psutil.Error):
+            return [self.process, *self.process.children(recursive=True)]
+        return []
+
     def look(self) -> None:
         """Measure all processes that are there."""
         sizes = []
-        for each in [self.process, *self.process.children(recursive=True)]:
+        for each in self.processes():
             try:
                 times = each.cpu_times()
                 self.seconds[each.pid] = times.user + times.system
@@ -88,7 +94,9 @@ class Run:
         while self.process.poll() is None:
             self.look()
             if n_fits is not None and len(fits_in(output)) >= n_fits:
-                self.process.kill()
+                for each in self.processes():
+                    with suppress(psutil.Error):  # it has just ended
+                        each.kill()
                 self.process.wait()
                 return True
             time.sleep(SECONDS_BETWEEN_LOOKS)
@@ -99,8 +107,9 @@ def main() -> None:
     """Make specimens, run the command with kills, and check what came out."""
     parser = options_of(__doc__, quick="three small specimens, killed once")
     parser.add_argument("--number", type=int, default=MANY, help="specimens")
+    parser.add_argument("--kills", type=int, default=N_KILLS, help="how often it is killed")
     arguments = parser.parse_args()
-    number, n_vertices, n_kills = arguments.number, 100_000, N_KILLS
+    number, n_vertices, n_kills = arguments.number, 100_000, arguments.kills
     if arguments.quick:
         number, n_vertices, n_kills = 3, 2_400, 1
     with TemporaryDirectory() as place:

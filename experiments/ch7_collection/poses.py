@@ -51,11 +51,19 @@ def judge(kind: str, n_poses: int) -> dict[str, object]:
 
 
 def main() -> None:
-    """Judge all creatures."""
-    arguments = options_of(__doc__, quick="two poses of a hand").parse_args()
-    kinds, n_poses = (KINDS[:1], 2) if arguments.quick else (KINDS, N_POSES)
-    found = {kind: judge(kind, n_poses) for kind in kinds}
-    give_out({"quick" if arguments.quick else "full": rounded(found)}, arguments.out)
+    """Judge creatures."""
+    parser = options_of(__doc__, quick="two poses of a hand")
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS, help="creatures")
+    parser.add_argument("--poses", type=int, default=N_POSES, help="of each, with the rest pose")
+    arguments = parser.parse_args()
+    kinds, n_poses = arguments.kinds, arguments.poses
+    if arguments.quick:
+        kinds, n_poses = KINDS[:1], 2
+    found = {}
+    for kind in kinds:
+        found[kind] = judge(kind, n_poses)
+        # Each takes minutes, and an interruption loses only the last one.
+        give_out({"quick" if arguments.quick else "full": rounded(found)}, arguments.out)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import err, print_json, print_table, print_written, progress_bar
-from eigenshape.cli.inputs import parse_numbers
+from eigenshape.cli.inputs import numbers_of
 from eigenshape.deformation.modes import Mode
 
 REGIONS = (
@@ -180,16 +180,20 @@ def parse_rotation(text: str, mesh: es.TriangleMesh, region: Any) -> es.Rotation
             f"A rotation is 'x by 90', '0,1,1 by -30', or 'z by 45 @ 0,0.1,0' (degrees, and a point of the axis); "
             f"it is {text!r}."
         )
-    axis = AXES.get(found[1]) or parse_numbers(
-        found[1], "An axis other than x, y and z is three numbers separated by commas", 3
-    )
+    axis = AXES.get(found[1]) or _three(found[1], "An axis other than x, y and z")
     angle = math.radians(float(found[2]))
     if found[3]:
-        pivot = parse_numbers(found[3], "A pivot is three numbers separated by commas", 3)
-        return es.Rotation(pivot, axis, angle)
+        return es.Rotation(_three(found[3], "A pivot"), axis, angle)
     rim = es.deformation.region_boundary(mesh, es.deformation.region_mask(mesh, region))
     middle = mesh.vertices[rim].mean(axis=0) if len(rim) else [0.0, 0.0, 0.0]
     return es.Rotation(middle, axis, angle)
+
+
+def _three(text: str, name: str) -> list[float]:
+    numbers = numbers_of(text)
+    if len(numbers) != 3:
+        raise InvalidParameterError(f"{name} is three numbers separated by commas; it is {text!r}.")
+    return numbers
 
 
 def _require_at_most(number: int, last: int, name: str) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
+from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
@@ -22,7 +23,7 @@ from eigenshape.cli.console import (
     print_written,
     progress_bar,
 )
-from eigenshape.cli.inputs import HeatMethod, parse_numbers, repair_names, require_one_rule
+from eigenshape.cli.inputs import HeatMethod, numbers_of, repair_names, require_one_rule
 from eigenshape.retrieval.heat.recipe import PRESETS
 
 COLUMNS = {
@@ -154,7 +155,11 @@ def condense(
     tolerance
         Largest share of the variance of a shape that the means may lose. More regions keep more.
     """
-    clock = parse_numbers(times, "--times takes numbers separated by commas, such as 1e6,1e7")
+    clock = numbers_of(times)
+    if not clock:
+        raise InvalidParameterError(
+            f"--times takes numbers separated by commas, such as 1e6,1e7; it is {times!r}."
+        )
     steps.require_output(output, steps.TABLES, "A table")
     work = partial(steps.condense_file, clock, n_modes, tolerance, repair_names(repair))
     items = es.io.find_items(sources)

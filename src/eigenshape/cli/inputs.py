@@ -98,15 +98,12 @@ def repair_names(text: str) -> tuple[str, ...]:
     return require_repairs(names, KNOWN_REPAIRS, "Names of --repair")
 
 
-def parse_numbers(text: str, rule: str, count: int | None = None) -> list[float]:
-    """Return numbers separated by commas; raise an error that gives the rule if the text is not so."""
+def numbers_of(text: str) -> list[float]:
+    """Return numbers that are separated by commas; none if the text holds anything else."""
     try:
-        numbers = [float(piece) for piece in text.split(",")]
-    except ValueError as err:
-        raise InvalidParameterError(f"{rule}; it is {text!r}.") from err
-    if count is not None and len(numbers) != count:
-        raise InvalidParameterError(f"{rule}; it is {text!r}.")
-    return numbers
+        return [float(piece) for piece in text.split(",")]
+    except ValueError:
+        return []
 
 
 def drops_missing(names: Sequence[str]) -> bool:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import replace_file
 from eigenshape.cli.console import err, escape_text, print_written
-from eigenshape.cli.inputs import parse_numbers
+from eigenshape.cli.inputs import numbers_of
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.formats.registry import HEMISPHERES, WITH_COLORS, WITH_MORE, WRITTEN
@@ -51,14 +51,13 @@ def picture_side(view: str, up: str, *pictures: Path | None) -> Side:
 def _name_or_direction(text: str, option: str, names: tuple[str, ...]) -> str | list[float]:
     if text in names:
         return text
-    rule = (
-        f"{option} takes {', '.join(names)}, or a direction as three numbers separated by commas, "
-        "such as 1,0,2"
-    )
-    direction = parse_numbers(text, rule, 3)
-    if not any(direction):
-        raise InvalidParameterError(f"{rule}; it is {text!r}.")
-    return direction
+    numbers = numbers_of(text)
+    if len(numbers) != 3 or not any(numbers):
+        raise InvalidParameterError(
+            f"{option} takes {', '.join(names)}, or a direction as three numbers separated by "
+            f"commas, such as 1,0,2; it is {text!r}."
+        )
+    return numbers
 
 
 def require_mesh_path(path: Path | None, *, colors: bool = False, labels: bool = False) -> None:
