@@ -12,7 +12,8 @@ import eigenshape as es
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
-from command_line import command_line_page  # noqa: E402  a module of this folder
+from command_line import command_line_page  # noqa: E402  modules of this folder
+from turning import FOLDER, Turning, write_pages  # noqa: E402
 
 project = "eigenshape"
 author = "The eigenshape founders"
@@ -191,8 +192,16 @@ def name_short_door(app: object, env: object) -> list[str]:
     return []
 
 
+def write_turning_pages(app: object, error: Exception | None) -> None:
+    """Put the shapes that can be turned beside the pages that show them."""
+    if error is None and app.builder.format == "html":  # type: ignore[attr-defined]
+        write_pages(Path(app.outdir, FOLDER))  # type: ignore[attr-defined]
+
+
 def setup(app: object) -> None:
     """Connect what is done to sources and docstrings."""
+    app.add_directive("turning", Turning)  # type: ignore[attr-defined]
+    app.connect("build-finished", write_turning_pages)  # type: ignore[attr-defined]
     app.connect("source-read", link_experiment_pages)  # type: ignore[attr-defined]
     app.connect("autodoc-process-docstring", escape_bars)  # type: ignore[attr-defined]
     app.connect("env-updated", name_short_door)  # type: ignore[attr-defined]
