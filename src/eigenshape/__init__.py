@@ -35,8 +35,6 @@ from types import ModuleType
 
 import lazy_loader
 
-from eigenshape import _text
-
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 _load = __getattr__
 
@@ -52,7 +50,3 @@ def __getattr__(name):
         homes = [f"es.{room}.{name}" for room in rooms if name in _load(room).__all__]
         remedy = f"; use {homes[0]}" if homes else ""
         raise AttributeError(f"eigenshape has no attribute {name!r}{remedy}") from err
-
-
-# A mesh in a notebook shows a picture, which is drawn in a room above its own.
-_text.draw_thumbnail = lambda mesh: _load("retrieval").draw_thumbnail(mesh)

@@ -1,14 +1,10 @@
 """Text for people: names from outside made safe to print, and values in one line."""
 
-from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from html import escape
 from typing import Any
 
 LONGEST = 60  # characters of an entry that stands in full in the text of a value
-# How a notebook shows a mesh. Pictures are drawn in rooms above those of meshes, so the short door,
-# which stands above all rooms, puts its function here.
-draw_thumbnail: Callable[[Any], bytes] | None = None
 
 
 def printable(text: str) -> str:

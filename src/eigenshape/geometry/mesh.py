@@ -1,12 +1,12 @@
 """Triangle meshes: arrays that are checked once and then read-only."""
 
 import base64
+import sys
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape import _text
 from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows, record
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
@@ -112,7 +112,9 @@ class TriangleMesh(ReadOnly):
     def _portrait(self) -> str:
         """Return the counts, and a small picture, as HTML."""
         counts = f"<p>{self.n_vertices:,} vertices, {self.n_faces:,} faces</p>"
-        if _text.draw_thumbnail is None or self.n_faces > MOST_DRAWN:
+        if self.n_faces > MOST_DRAWN:
             return counts
-        picture = base64.b64encode(_text.draw_thumbnail(self)).decode()
+        # Pictures are drawn in a room above this one. The short door, which is always loaded, knows it.
+        draw_thumbnail = sys.modules["eigenshape"].retrieval.draw_thumbnail
+        picture = base64.b64encode(draw_thumbnail(self)).decode()
         return f'<img alt="The mesh" src="data:image/png;base64,{picture}">{counts}'
