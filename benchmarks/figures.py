@@ -81,6 +81,7 @@ FIGURES = {
     "cortex": Figure("bench_cortex.py --repeats 1", ("modes", "compat", *SOLVER)),
     "calls": Figure("bench_calls.py", ("operators", "matching", "spectral")),
     "start": Figure("bench_start.py", ("__init__.py", "cli")),
+    "size": Figure("bench_size.py --repeats 1", ("../../pyproject.toml",)),
     "threads": Figure("bench_threads.py", ("_threads.py", "sparse", "spectral/solver")),
     "search": Figure("bench_search.py --queries 20 --qdrant 0", STORE),
     "retrieval": Figure("bench_retrieval.py --repeats 1", DESCRIBING),

@@ -12,7 +12,9 @@ import eigenshape as es
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
-from command_line import command_line_page  # noqa: E402  a module of this folder
+from command_line import command_line_page  # noqa: E402  modules of this folder
+from linking import link_returned_types, write_inventories  # noqa: E402
+from turning import FOLDER, Turning, write_pages  # noqa: E402
 
 project = "eigenshape"
 author = "The eigenshape founders"
@@ -22,6 +24,7 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.intersphinx",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx_gallery.gen_gallery",
@@ -32,6 +35,8 @@ templates_path = ["_templates"]
 
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 4
+
+intersphinx_mapping = write_inventories(HERE / "api" / "inventories")
 
 autosummary_generate = True
 autodoc_member_order = "bysource"
@@ -191,10 +196,19 @@ def name_short_door(app: object, env: object) -> list[str]:
     return []
 
 
+def write_turning_pages(app: object, error: Exception | None) -> None:
+    """Put the shapes that can be turned beside the pages that show them."""
+    if error is None and app.builder.format == "html":  # type: ignore[attr-defined]
+        write_pages(Path(app.outdir, FOLDER))  # type: ignore[attr-defined]
+
+
 def setup(app: object) -> None:
     """Connect what is done to sources and docstrings."""
+    app.add_directive("turning", Turning)  # type: ignore[attr-defined]
+    app.connect("build-finished", write_turning_pages)  # type: ignore[attr-defined]
     app.connect("source-read", link_experiment_pages)  # type: ignore[attr-defined]
     app.connect("autodoc-process-docstring", escape_bars)  # type: ignore[attr-defined]
+    app.connect("autodoc-process-docstring", link_returned_types)  # type: ignore[attr-defined]
     app.connect("env-updated", name_short_door)  # type: ignore[attr-defined]
 
 

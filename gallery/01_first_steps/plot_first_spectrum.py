@@ -24,3 +24,10 @@ es.plot.figure_eigenfunctions(hand, spectrum, [1, 4, 9])
 # none is missing.
 
 print(spectrum.certificate.explain())
+
+# %%
+# The same in the window of the studio, without a server: choose an eigenfunction, let it swing, turn
+# the hand.
+#
+# .. turning:: hand
+#    :panel: spectrum

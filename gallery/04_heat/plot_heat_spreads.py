@@ -28,3 +28,9 @@ fields = {
     for i, share in enumerate(shares)
 }
 es.plot.figure_fields(fields, "heat over its mean, log10", color_map="inferno", view="front")
+
+# %%
+# In the window of the studio heat can be followed through time.
+#
+# .. turning:: hand
+#    :panel: heat

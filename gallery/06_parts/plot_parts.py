@@ -22,3 +22,9 @@ for n_parts in (3, 6, 12):
     parts = es.segment(found.tree, n_regions=n_parts)
     panels.append(es.plot.Panel(giraffe, f"{n_parts} parts", parts.labels, np.empty(0, dtype=int)))
 es.plot.figure_contact_sheet(panels[0], panels[1:])
+
+# %%
+# In the window of the studio the number of parts follows a slider; here on another shape.
+#
+# .. turning:: biped
+#    :panel: parts

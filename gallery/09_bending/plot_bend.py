@@ -30,3 +30,8 @@ for degrees in (40, 80):
 
 moved = np.linalg.norm(poses["80 degrees"].vertices - giraffe.vertices, axis=1)
 es.plot.figure_poses(poses, moved / moved.max())
+
+# %%
+# The giraffe after a turn of 60 degrees, from all sides.
+#
+# .. turning:: giraffe

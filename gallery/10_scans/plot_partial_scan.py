@@ -29,3 +29,8 @@ es.plot.figure_poses(
     view=[-0.6, 0.3, -0.6],
     up="y",
 )
+
+# %%
+# What one side has seen: turn it, and its back is missing.
+#
+# .. turning:: scan

@@ -30,3 +30,8 @@ for side, letter in (("left", "L"), ("right", "R")):
 # The fourth mode that is not constant, from outside and from inside.
 
 es.plot.figure_cortex(surfaces, modes, "mode 4", color_map="RdBu_r", limits=(-1, 1))
+
+# %%
+# The left half in the window of the studio. The hole is the medial wall.
+#
+# .. turning:: cortex

@@ -57,7 +57,8 @@ def short_repr(value: Any) -> str:
 def html_repr(value: Any) -> str:
     """Return a value as a small table, which notebooks show: one row for each field.
 
-    All public values take it as their `_repr_html_`. A value without fields stands as its `repr`.
+    All public values take it as their `_repr_html_`. A value without fields stands as its `repr`. If
+    a class has a method `_portrait`, its HTML follows: a picture, a plot or a list.
 
     Examples
     --------
@@ -72,14 +73,15 @@ def html_repr(value: Any) -> str:
     <tr><th>side</th><td><code>&#x27;&lt;left&gt;&#x27;</code></td></tr>
     </table>
     """
+    portrait = value._portrait() if hasattr(value, "_portrait") else ""
     if not is_dataclass(value):
-        return f"<code>{escape(repr(value))}</code>"
+        return f"<code>{escape(repr(value))}</code>{portrait}"
     rows = []
     for field in fields(value):
         text = escape(_shorten(getattr(value, field.name)))
         rows.append(f"<tr><th>{field.name}</th><td><code>{text}</code></td></tr>")
     title = f"<caption>{type(value).__name__}</caption>"
-    return "\n".join(["<table>", title, *rows, "</table>"])
+    return "\n".join(["<table>", title, *rows, f"</table>{portrait}"])
 
 
 def repr_of_changes(value: Any) -> str:

@@ -454,3 +454,6 @@ def test_report_opens_from_a_file_without_a_server(browser, folder, mesh):
         cut = es.segment(found.tree, n_regions=4)
         assert_parts(page, cut, found)
         assert picture(page)[..., 3].any()
+    with open_page(browser, f"{path.as_uri()}#parts") as page:
+        find(page, "diagram").wait_for()
+        assert find(page, "tab-parts").get_attribute("aria-selected") == "true"

@@ -46,6 +46,9 @@ def test_a_report_holds_the_state_and_all_arrays(tmp_path):
     assert {"areas", "diagram", "parts/labels", "parts/cuts"} <= arrays.keys()
     assert f"values/{state['values'][0]['name']}" in arrays
     assert list(tmp_path.iterdir()) == [path]
+    beside = tmp_path / "usual"
+    beside.touch()
+    assert path.stat().st_mode == beside.stat().st_mode  # a web server may read it as any file
 
 
 def test_a_report_loads_nothing_from_elsewhere(tmp_path):

@@ -1,6 +1,11 @@
 """The benchmarks of starting, of single calls and of kernels run from end to end."""
 
+import tomllib
+from pathlib import Path
+
 import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.long
@@ -12,6 +17,16 @@ def test_the_script_runs(run_quick):
         assert 0 < row["cpu"] < 60
         assert row["start"] in printed
     assert "| import eigenshape |" in page
+
+
+@pytest.mark.long
+def test_the_size_of_an_installation_is_measured(run_quick):
+    ((row,), printed, page) = run_quick("bench_size.py")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert row["packages"] > len(project["dependencies"])
+    assert 0.1 < row["packed"] < 5 < row["whole"]
+    assert "eigenshape" in printed
+    assert "| eigenshape |" in page
 
 
 @pytest.mark.long

@@ -1,7 +1,9 @@
 """Values print themselves in one line that names what they hold."""
 
+import base64
 import dataclasses
 import inspect
+import re
 from pathlib import Path
 
 import numpy as np
@@ -71,10 +73,59 @@ def is_long(annotation):
 def test_the_table_of_a_value_has_a_short_row_for_each_field(name):
     value = VALUES[name]()
     first, title, *rows, last = value._repr_html_().split("\n")
-    assert (first, last) == ("<table>", "</table>")
+    assert first == "<table>"
+    assert last.startswith("</table>")  # a picture may follow
     assert title == f"<caption>{name}</caption>"
     assert len(rows) == len(dataclasses.fields(value))
     assert max(map(len, rows)) < 2 * LONGEST + 60
+
+
+def test_a_mesh_shows_its_counts_and_a_small_picture():
+    text = BALL._repr_html_()
+    assert "162 vertices, 320 faces" in text
+    picture = base64.b64decode(re.search(r'src="data:image/png;base64,([^"]+)"', text)[1])
+    assert picture == es.retrieval.draw_thumbnail(BALL)
+
+
+def test_a_mesh_that_takes_long_to_draw_shows_its_counts_alone(monkeypatch):
+    monkeypatch.setattr("eigenshape.geometry.mesh.MOST_DRAWN", 319)
+    text = BALL._repr_html_()
+    assert "162 vertices, 320 faces" in text
+    assert "<img" not in text
+
+
+def test_a_spectrum_shows_a_dot_for_each_eigenvalue_and_what_is_proved():
+    text = SPECTRUM._repr_html_()
+    heights = [float(y) for y in re.findall(r'<circle cx="[\d.]+" cy="([\d.]+)"', text)]
+    assert heights[0] == 110
+    assert heights[-1] == 10
+    expected = 110 - 100 * SPECTRUM.eigenvalues / SPECTRUM.eigenvalues[-1]
+    np.testing.assert_allclose(heights, expected, atol=0.051)
+    assert SPECTRUM.certificate.explain() in text
+
+
+def test_a_spectrum_of_zeros_alone_has_a_plot():
+    only = es.solve_spectrum(es.cotangent_laplacian(BALL), 1)
+    assert '<circle cx="10.0"' in only._repr_html_()
+
+
+def test_an_index_shows_its_first_shapes_and_how_many_there_are():
+    index = es.ShapeIndex.create(None)
+    described = es.describe(BALL, es.retrieval.SCALE_FREE)
+    names = [f"<ball {number}>" for number in range(12)]
+    index.add_many([es.retrieval.DescribedShape(name, [described]) for name in names])
+    text = index._repr_html_()
+    assert "<caption>12 shapes</caption>" in text
+    assert [f"&lt;ball {number}&gt;" in text for number in range(12)] == [True] * 10 + [False] * 2
+    assert "and 2 more" in text
+
+
+def test_an_index_that_is_gone_shows_its_folder_alone(tmp_path):
+    index = es.ShapeIndex.create(tmp_path / "index")
+    (tmp_path / "index" / "index.sqlite").unlink()
+    text = index._repr_html_()
+    assert text.endswith("</table>")
+    assert str(index.folder) in text or "PosixPath" in text
 
 
 def test_text_in_a_table_is_escaped():

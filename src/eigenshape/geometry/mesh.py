@@ -1,5 +1,7 @@
 """Triangle meshes: arrays that are checked once and then read-only."""
 
+import base64
+import sys
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +11,8 @@ from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows, record
 from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_without_facets
+
+MOST_DRAWN = 200_000  # faces of a mesh that a notebook shows as a picture
 
 
 @record
@@ -104,3 +108,13 @@ class TriangleMesh(ReadOnly):
 
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"
+
+    def _portrait(self) -> str:
+        """Return the counts, and a small picture, as HTML."""
+        counts = f"<p>{self.n_vertices:,} vertices, {self.n_faces:,} faces</p>"
+        if self.n_faces > MOST_DRAWN:
+            return counts
+        # Pictures are drawn in a room above this one. The short door, which is always loaded, knows it.
+        draw_thumbnail = sys.modules["eigenshape"].retrieval.draw_thumbnail
+        picture = base64.b64encode(draw_thumbnail(self)).decode()
+        return f'<img alt="The mesh" src="data:image/png;base64,{picture}">{counts}'

@@ -4,6 +4,7 @@ import tempfile
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from shutil import rmtree
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import StoreError
 from eigenshape._files import as_path
-from eigenshape._text import html_repr
+from eigenshape._text import html_repr, printable
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_store
@@ -40,6 +41,8 @@ from eigenshape.retrieval.store.writing import (
 from eigenshape.retrieval.thumbnails import draw_thumbnail
 
 IN_MEMORY = Path("/dev/shm")  # where Linux keeps files in memory
+
+MOST_LISTED = 10  # shapes that a notebook shows of an index
 
 
 @dataclass(frozen=True)
@@ -161,6 +164,23 @@ class ShapeIndex:
 
     def __len__(self) -> int:
         return len(read_state(self.folder))
+
+    def _portrait(self) -> str:
+        """Return the first shapes as an HTML table; nothing if they cannot be read."""
+        try:
+            state = read_state(self.folder)
+            shapes = state.facts(state.shape_ids[:MOST_LISTED]).values()
+        except (StoreError, OSError):
+            return ""
+        rows = [
+            f"<tr><td>{escape(printable(each.name))}</td><td>{escape(printable(each.label or ''))}</td></tr>"
+            for each in shapes
+        ]
+        n_more = len(state) - len(rows)
+        more = f"<p>and {n_more:,} more</p>" if n_more else ""
+        head = "<tr><th>name</th><th>label</th></tr>"
+        caption = f"<caption>{len(state):,} shapes</caption>"
+        return f"<table>{caption}{head}{''.join(rows)}</table>{more}"
 
     def _read(self) -> IndexState:
         state = read_state(self.folder)

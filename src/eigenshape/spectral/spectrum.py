@@ -1,5 +1,6 @@
 """A spectrum, the proof that nothing is missing from it, and how fast its modes lose heat."""
 
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ ZERO_RESIDUALS = 4
 # Approximate pairs have residuals near the root of the error of their values, above eigenvalues
 # that are not 0. There the residual counts only up to this share of the largest eigenvalue.
 APPROXIMATE_NULL = 1e-6
+MOST_DOTS = 200  # eigenvalues that the plot of a notebook shows
 
 
 @record
@@ -103,6 +105,25 @@ class Spectrum(ReadOnly):
             are not finite, its eigenvalues are negative or not ascending, or its key differs.
         """
         return cls(**read_spectrum(path, key))
+
+    def _portrait(self) -> str:
+        """Return a plot of the eigenvalues, and what is proved of them, as HTML."""
+        values = self.eigenvalues
+        first = self.certificate.first
+        shown = np.unique(np.linspace(0, len(values) - 1, MOST_DOTS).round().astype(np.int64))
+        # In a box of 300 x 100 pixels, with a margin of 10: number to the right, eigenvalue up
+        right = 10 + 300 * shown / max(len(values) - 1, 1)
+        height = 110 - 100 * (values[shown] / (values[-1] or 1.0))
+        dots = "".join(
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2"/>' for x, y in zip(right, height, strict=True)
+        )
+        plot = (
+            '<svg width="320" height="120" fill="currentColor" role="img" '
+            f'aria-label="Eigenvalues by their numbers">{dots}</svg>'
+        )
+        last = first + len(values) - 1
+        ends = f"eigenvalues {first} to {last}: {values[0]:.4g} to {values[-1]:.4g} (1/length²)"
+        return f"{plot}<p>{ends}</p><p>{escape(self.certificate.explain())}</p>"
 
 
 def count_zero_modes(spectrum: Spectrum) -> int:

@@ -55,6 +55,8 @@ const data = document.getElementById("eigenshape-data");
 if (data) {
   // All files share one storage, so each report has a key of its own.
   const settings = new Settings(sessionStorage, `eigenshape ${location.pathname}`);
+  // A link such as report.html#parts opens a panel.
+  if (location.hash) settings.set("panel", location.hash.slice(1));
   inlineBackend(data).then((backend) => fillWindow(backend, settings));
 } else if (document.getElementById("eigenshape-studio")) {
   const settings = new Settings(sessionStorage);

@@ -1,8 +1,8 @@
 """A report: one HTML file with a shape, its spectrum, heat and parts, which opens without a server."""
 
+import secrets
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 import eigenshape as es
@@ -57,6 +57,10 @@ def write_report(  # noqa: PLR0913  one for each option of the command
     workspace.analysis.look_from(view, up)
     page = workspace.report(progress)
     path = Path(path)
-    with NamedTemporaryFile(dir=path.parent, suffix=".html", delete=False) as file:
-        file.write(page)
-    Path(file.name).replace(path)
+    # A temporary file of `tempfile` may be read by nobody else, and a web server would refuse it.
+    beside = path.with_name(f".{secrets.token_hex(8)}.tmp")
+    try:
+        beside.write_bytes(page)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)

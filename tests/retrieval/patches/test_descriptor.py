@@ -43,6 +43,23 @@ def test_a_scan_of_another_pose_finds_its_kind(index, recipe, kind):
 
 
 @pytest.mark.long
+def test_a_noisy_scan_finds_both_poses_of_its_kind_first():
+    index = es.ShapeIndex.create(None)
+    for kind in ("biped", "octopus", "fish"):
+        for pose in range(2):
+            mesh = es.make_creature(kind, pose, n_vertices=1000)
+            index.add(f"{kind} {pose}", mesh, label=kind)
+    rng = np.random.default_rng(1)
+    seen = es.partial_scan(es.make_creature("octopus", 7, n_vertices=1000), rng).mesh
+    noise = 0.2 * es.geometry.edge_lengths(seen).mean() * rng.standard_normal(seen.vertices.shape)
+    scan = es.TriangleMesh(seen.vertices + noise, seen.faces)
+    best, second, other = index.query(scan, n_matches=3)
+    assert [best.label, second.label] == ["octopus"] * 2
+    assert best.score < second.score < other.score
+    assert len(best.correspondences) > 10
+
+
+@pytest.mark.long
 def test_a_shape_finds_itself_nearly_at_zero(index, recipe, meshes):
     best, other = index.query(es.describe(meshes["hand"], recipe), n_matches=2)
     assert (best.name, best.view) == ("hand", 0)
