@@ -296,8 +296,9 @@ def learn_maps(*, small: bool):
         "largest after": max(after),
         "error of true maps": float(np.mean([error_of_true_map(*pair) for pair in pairs])),
     }
-    # Drawn by the distance from one paw, which tells left from right and front from back.
-    one, other = pairs[0]
+    # The pair that signatures map worst, drawn by the distance from one paw, which tells left from
+    # right and front from back.
+    one, other = pairs[int(np.argmax(errors(waves_of)))]
     paw = [rest[one][:, 0].max(), rest[one][:, 1].min(), rest[one][:, 2].max()]
     field = distances[one][KDTree(rest[one]).query(paw)[1]]
     target = tests[other][0]
