@@ -41,6 +41,8 @@ DATA = Path(
 )
 PACKAGES = ["eigenshape", "torch", "torch_geometric", "numpy", "scipy", "numba"]
 COLUMNS = ("what", "case", "ours", "beside it", "")
+# Graphs that are encoded, in so many turns with the peer.
+N_GRAPHS, TURNS = 100_000, 10
 HARMS = (loose_vertices, slivers, collapsed_faces, duplicate_faces, flipped_faces, soup)
 
 
@@ -347,7 +349,7 @@ def encodings(quick: bool, _repeats: int) -> Iterator[Row]:
     from torch_geometric.data import Batch, Data  # noqa: PLC0415 - takes seconds
     from torch_geometric.transforms import AddLaplacianEigenvectorPE  # noqa: PLC0415
 
-    n_graphs, generator = (300 if quick else 100_000), np.random.default_rng(0)
+    n_graphs, generator = (300 if quick else N_GRAPHS), np.random.default_rng(0)
     sizes = generator.integers(30, 61, n_graphs)
     edges = [random_edges(n, generator) for n in sizes.tolist()]
     graphs = [
@@ -360,8 +362,8 @@ def encodings(quick: bool, _repeats: int) -> Iterator[Row]:
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         pool.map(solve_one, [(edges[0], int(sizes[0]))] * 2)  # imports
         # In turn, so that what else the machine does slows both alike.
-        for first in range(0, n_graphs, 10_000):
-            part = slice(first, first + 10_000)
+        for first in range(0, n_graphs, n_graphs // TURNS):
+            part = slice(first, first + n_graphs // TURNS)
             start = time.perf_counter()
             encode(Batch.from_data_list(graphs[part]))
             between = time.perf_counter()
