@@ -197,9 +197,8 @@ def _solve_outside(
             is_open = _dots(rest, rest) > goal
             if not is_open.all():
                 found[:, numbers[~is_open]] = solution[:, ~is_open]
-                numbers, values, goal, slope = (
-                    each[is_open] for each in (numbers, values, goal, slope)
-                )
+                numbers = numbers[is_open]
+                values, goal, slope = values[is_open], goal[is_open], slope[is_open]
                 rest, solution, direction = (
                     np.ascontiguousarray(each[:, is_open]) for each in (rest, solution, direction)
                 )

@@ -43,12 +43,14 @@ def point_frames(shape: Shape3, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarr
     a sheet that is there twice, its neighbors give the tangent plane, as on a cloud.
     """
     points, _ = size_one(shape.points)
-    is_mesh = isinstance(shape, TriangleMesh)
-    normals = mean_normals(shape).copy() if is_mesh else np.zeros_like(points)
-    without = ~normals.any(axis=1)
+    normals = np.zeros_like(points)
+    if isinstance(shape, TriangleMesh):
+        normals = mean_normals(shape).copy()
+    without = np.equal(normals, 0.0).all(axis=1)
     if without.any():
         # The direction in which the neighbors of a point spread least; its sign is free.
-        tails, heads = edges[:, without[edges[0]]]
+        has_none = np.take(without, edges[0])
+        tails, heads = edges[0][has_none], edges[1][has_none]
         near = points[heads] - points[tails]
         starts = np.unique(tails, return_index=True)[1]
         covariances = np.add.reduceat(near[:, :, None] * near[:, None], starts)
