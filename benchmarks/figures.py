@@ -108,7 +108,12 @@ FIGURES = {
     "service": Figure("bench_service.py --minutes 1", ("retrieval/store", "../../studio/src")),
     "build": Figure("bench_build.py", STORE),
     "studio": Figure("bench_studio.py", ("../../studio", "deformation")),
-    "torch": Figure("bench_torch.py", ("torch", "spectral/tools/bundle.py", *SOLVER)),
+    "encodings": Figure("bench_torch.py --only encodings", ("torch",)),
+    "bundles": Figure("bench_torch.py --only operators", ("spectral/tools/bundle.py", *SOLVER)),
+    "torch": Figure(
+        "bench_torch.py --only gradients --only memory --only awkward --only damaged",
+        ("torch", "spectral/tools", *SOLVER),
+    ),
     "million": Figure("bench_search.py --sizes 1000000 --queries 10 --qdrant 0 --faiss 0", STORE),
 }
 LARGE = {"million"}  # measured only if it is named: an hour and 65 GB of disk

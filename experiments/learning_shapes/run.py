@@ -1,4 +1,4 @@
-"""Three things that are found or learned by gradients of spectra, on shapes that the library makes.
+"""Four things that are found or learned by gradients of spectra, on shapes that the library makes.
 
     python experiments/learning_shapes/run.py --out figures.json --pictures FOLDER   minutes
     python experiments/learning_shapes/run.py --quick                                seconds
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from scipy.spatial import KDTree
 
 import eigenshape as es
 import eigenshape.torch as et
@@ -24,7 +25,7 @@ PARTS = ("front legs", "hind legs", "head and neck", "tail", "trunk")
 
 
 def main() -> None:
-    """Run all three, print their figures, and draw."""
+    """Run all four, print their figures, and draw."""
     parser = options_of(__doc__)
     parser.add_argument("--pictures", type=output_folder, help="draw into this folder")
     options = parser.parse_args()
@@ -32,7 +33,7 @@ def main() -> None:
     torch.set_num_threads(1)
     small = options.quick
     results, drawn = {}, {}
-    for work in (isospectralize, denoise, segment):
+    for work in (isospectralize, denoise, segment, learn_maps):
         results[work.__name__], drawn[work.__name__] = work(small=small)
     give_out(results, options.out)
     if options.pictures:
@@ -176,6 +177,137 @@ def segment(*, small: bool):
     mesh, _ = tests[0]
     of_faces = guesses[0][torch.tensor(mesh.faces)].mode(dim=1).values.numpy()
     return figures, lambda: es.figure_segments(mesh, of_faces)
+
+
+def posed_shape(pose: int, n: int, k: int) -> tuple[es.TriangleMesh, et.ShapeTensors]:
+    """Return one individual of area 1 in a pose, and its operators."""
+    mesh = make_unit(pose, n, 0)
+    return mesh, et.shape_tensors(mesh, es.spectral.operator_bundle(mesh, k))
+
+
+def wave_features(shape: et.ShapeTensors, energies: torch.Tensor) -> torch.Tensor:
+    """Return wave kernel signatures, each less its mean and divided by its spread over the shape."""
+    sigma = 3.5 * (energies[1] - energies[0])
+    distances = energies[:, None] - torch.log(shape.eigenvalues[1:])
+    bands = torch.softmax(-(distances**2) / (2 * sigma**2), dim=1)
+    waves = shape.eigenvectors[:, 1:] ** 2 @ bands.T
+    return (waves - waves.mean(dim=0)) / waves.std(dim=0)
+
+
+def between_vertices(mesh: es.TriangleMesh) -> np.ndarray:
+    """Return the distances along the surface between all vertices."""
+    return es.geometry.geodesic_distances(mesh, np.arange(mesh.n_vertices))
+
+
+def points_of_map(
+    mapping: torch.Tensor, source: et.ShapeTensors, target: et.ShapeTensors
+) -> np.ndarray:
+    """Return the vertex of the source that a functional map gives to each vertex of the target."""
+    images = target.eigenvectors @ mapping
+    return KDTree(source.eigenvectors.numpy()).query(images.numpy())[1]
+
+
+def learn_features(train: list[et.ShapeTensors], waves_of, *, coupling: float, steps: int):
+    """Train a network on pairs of poses, and return its features as a function of a shape.
+
+    No step knows which points correspond. The losses are the penalties of Roufosse, Sharma and
+    Ovsjanikov 2019 and, with some weight, the difference from the map of the soft correspondence,
+    as Cao and Bernard 2022 couple the two.
+    """
+    torch.manual_seed(0)
+    network = et.DiffusionNet(24, 32, width=32, n_blocks=2)
+
+    def describe(shape: et.ShapeTensors) -> torch.Tensor:
+        return network(waves_of(shape), shape)
+
+    optimizer = torch.optim.Adam(network.parameters(), lr=2e-3)
+    for _ in range(steps):
+        source, target = (train[number] for number in torch.randperm(len(train))[:2])
+        ours, theirs = describe(source), describe(target)
+        there = et.functional_map(source, target, ours, theirs)
+        back = et.functional_map(target, source, theirs, ours)
+        loss = sum(et.map_penalties(there, back, source, target))
+        if coupling:
+            soft = et.map_from_features(source, target, ours, theirs)
+            soft_back = et.map_from_features(target, source, theirs, ours)
+            apart = (there - soft).square().mean() + (back - soft_back).square().mean()
+            loss = loss + coupling * apart
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    return describe
+
+
+def learn_maps(*, small: bool):
+    """Learn functional maps of poses without labels, and test them on poses that were not seen.
+
+    Two trainings: by penalties alone, and with the soft correspondence beside them.
+    """
+    k, steps = (24, 150) if small else (30, 400)
+    # Poses take turns between two triangulations, so that none is learned.
+    sizes = (500, 600) if small else (800, 1000)
+    train = [posed_shape(pose, sizes[pose % 2], k)[1] for pose in range(1, 9)]
+    tests = {pose: posed_shape(pose, sizes[pose % 2], k) for pose in range(101, 107)}
+    pairs = [(101, 102), (103, 104), (105, 106), (102, 103)]
+    ends = torch.log(train[0].eigenvalues[[1, -1]]).tolist()
+    energies = torch.linspace(*ends, 24)
+    # The vertices of a pose, where they lie at rest: nearest ones belong together.
+    rest = {pose: make_unit(0, sizes[pose % 2], 0).vertices for pose in tests}
+    belongs = {pair: KDTree(rest[pair[0]]).query(rest[pair[1]])[1] for pair in pairs}
+    distances = {one: between_vertices(tests[one][0]) for one, _ in pairs}
+
+    def waves_of(shape: et.ShapeTensors) -> torch.Tensor:
+        return wave_features(shape, energies)
+
+    def matches(one: int, other: int, describe) -> np.ndarray:
+        """Return the vertex of a pose that the map gives to each vertex of another."""
+        source, target = tests[one][1], tests[other][1]
+        with torch.no_grad():
+            mapping = et.functional_map(source, target, describe(source), describe(target))
+        return points_of_map(mapping, source, target)
+
+    def errors(describe) -> list[float]:
+        """Return for each pair the mean distance from where points belong, along the surface."""
+        found = []
+        for one, other in pairs:
+            off = distances[one][belongs[one, other], matches(one, other, describe)]
+            found.append(float(off.mean()))
+        return found
+
+    def error_of_true_map(one: int, other: int) -> float:
+        """Return the error of the map of the right points: no map in this basis is much better."""
+        source, target = tests[one][1], tests[other][1]
+        mapping = et.coefficients(target, source.eigenvectors[belongs[one, other]])
+        found = points_of_map(mapping, source, target)
+        return float(distances[one][belongs[one, other], found].mean())
+
+    untrained, by_penalties, learned = (
+        learn_features(train, waves_of, coupling=coupling, steps=n)
+        for coupling, n in ((0.0, 0), (0.0, steps), (1.0, steps))
+    )
+    after = errors(learned)
+    figures = {
+        "poses to learn from": len(train),
+        "pairs not seen": len(pairs),
+        "error by wave kernel signatures": float(np.mean(errors(waves_of))),
+        "error before": float(np.mean(errors(untrained))),
+        "error after penalties alone": float(np.mean(errors(by_penalties))),
+        "error after": float(np.mean(after)),
+        "largest after": max(after),
+        "error of true maps": float(np.mean([error_of_true_map(*pair) for pair in pairs])),
+    }
+    # The pair that signatures map worst, drawn by the distance from one paw, which tells left from
+    # right and front from back.
+    one, other = pairs[int(np.argmax(errors(waves_of)))]
+    paw = [rest[one][:, 0].max(), rest[one][:, 1].min(), rest[one][:, 2].max()]
+    field = distances[one][KDTree(rest[one]).query(paw)[1]]
+    target = tests[other][0]
+    drawings = {
+        "a pose": (tests[one][0], field),
+        "carried by wave kernel signatures": (target, field[matches(one, other, waves_of)]),
+        "carried by learned features": (target, field[matches(one, other, learned)]),
+    }
+    return figures, lambda: es.plot.figure_fields(drawings, "distance from a paw")
 
 
 if __name__ == "__main__":

@@ -157,15 +157,18 @@ def pull_back(
     inside = numbers[:, None] == numbers[:k]
     gaps = solved.values[:k] - solved.values[:, None]
     mixed = np.where(inside, 0.0, products / np.where(inside, 1.0, gaps))
-    by_stiffness = solved.vectors @ mixed + _solve_outside(solved, by_vector, products)
+    outside, known = _solve_outside(solved, by_vector, products)
+    by_stiffness = outside + solved.vectors @ (mixed - known)
     turned = solved.vectors @ np.where(inside, products, 0.0)
     return by_stiffness, -by_stiffness * solved.values[:k] - turned / 2
 
 
 def _solve_outside(
     solved: SolvedPencil, by_vector: Float[np.ndarray, "n k"], products: Float[np.ndarray, "K k"]
-) -> Float[np.ndarray, "n k"]:
+) -> tuple[Float[np.ndarray, "n k"], Float[np.ndarray, "K k"]]:
     """Solve (W - λ_i B) z_i = BΦΦᵀg_i - g_i for z_i orthogonal to all known pairs.
+
+    Return y and the coefficients of the little that rounding left of the known pairs: z = y - Φ ΦᵀBy.
 
     Conjugate gradients: beyond the known pairs W - λ_i B is positive definite, and so is the factor
     of W - σB with σ below the last known eigenvalue, which serves as preconditioner.
@@ -174,14 +177,15 @@ def _solve_outside(
     n, n_known = bases.shape
     found = np.zeros_like(by_vector)
     if n_known == n:
-        return found
+        return found, np.zeros_like(products)
     weighed = B @ bases
     right = weighed @ products - by_vector
     lumped = solved.pencil.mass_floor == 1.0
     masses = B.diagonal()[:, None] if lumped else B
     for start in range(0, solved.n_shown, COLUMNS_AT_ONCE):
         columns = slice(start, min(start + COLUMNS_AT_ONCE, solved.n_shown))
-        values, rest = solved.values[columns], right[:, columns].copy()
+        numbers, values = np.arange(columns.start, columns.stop), solved.values[columns]
+        rest = right[:, columns].copy()
         if not rest.any():
             continue
         factor = factorize_near(solved.pencil, _shift_near(solved, columns))
@@ -189,32 +193,42 @@ def _solve_outside(
         solution, direction, slope = np.zeros_like(rest), np.zeros_like(rest), np.ones(len(values))
         beside = slice(max(start - NEIGHBORS, 0), columns.stop + NEIGHBORS)
         for iteration in range(MOST_ITERATIONS):
-            # A column that is solved, or was 0, stays as it is.
+            # Columns near the shift are solved first, and no more is computed of them; some were 0.
             is_open = _dots(rest, rest) > goal
-            if not is_open.any():
+            if not is_open.all():
+                found[:, numbers[~is_open]] = solution[:, ~is_open]
+                numbers = numbers[is_open]
+                values, goal, slope = values[is_open], goal[is_open], slope[is_open]
+                rest, solution, direction = (
+                    np.ascontiguousarray(each[:, is_open]) for each in (rest, solution, direction)
+                )
+            if not numbers.size:
                 break
             near = factor.solve(rest)
             last, slope = slope, _dots(near, rest)
-            direction *= np.where(is_open, slope / np.where(last == 0, 1.0, last), 0.0)
+            direction *= slope / last
             direction += near
-            known = slice(0, n_known) if iteration % CLEANED_EVERY == 0 else beside
+            is_due = (iteration + 1) % CLEANED_EVERY == 0
+            known = slice(0, n_known) if is_due else beside
             direction -= bases[:, known] @ (weighed[:, known].T @ direction)
             scaled = direction * values
             image = W @ direction
-            image -= masses * scaled if lumped else masses @ scaled
-            curve = _dots(direction, image)
-            step = np.where(is_open, slope / np.where(curve == 0, 1.0, curve), 0.0)
-            solution += step * direction
+            if lumped:
+                scaled *= masses
+                image -= scaled
+            else:
+                image -= masses @ scaled
+            step = slope / _dots(direction, image)
+            solution += np.multiply(direction, step, out=scaled)
             image *= step
             rest -= image
         else:
             raise ConvergenceError(
                 "The equations of a gradient must converge; those of eigenvalues "
-                f"{columns.start} to {columns.stop - 1} have {is_open.sum()} residuals above "
+                f"{columns.start} to {columns.stop - 1} have {len(numbers)} residuals above "
                 f"{SOLVED:.0e} after {MOST_ITERATIONS} iterations."
             )
-        found[:, columns] = solution
-    return found - bases @ (weighed.T @ found)
+    return found, weighed.T @ found
 
 
 def _dots(one: Float[np.ndarray, "n b"], two: Float[np.ndarray, "n b"]) -> Float[np.ndarray, " b"]:

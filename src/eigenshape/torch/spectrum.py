@@ -271,9 +271,13 @@ def _at_places(left: Tensor, right: Tensor, places: Tensor) -> Tensor:
     rows, columns = places
     if rows.equal(columns):
         return (left * right)[rows].sum(dim=1)
+    # An entry and its mirror image are one number.
+    ends = torch.stack([torch.minimum(rows, columns), torch.maximum(rows, columns)])
+    keys, number = torch.unique(ends[0] * len(left) + ends[1], return_inverse=True)
+    low, high = keys // len(left), keys % len(left)
     halves = [
         # Parts that fit into the cache: the rows of all entries are many times the vectors.
         (left[i] * right[j]).sum(dim=1) + (left[j] * right[i]).sum(dim=1)
-        for i, j in zip(rows.split(4096), columns.split(4096), strict=True)
+        for i, j in zip(low.split(4096), high.split(4096), strict=True)
     ]
-    return torch.cat(halves) / 2
+    return torch.cat(halves)[number] / 2

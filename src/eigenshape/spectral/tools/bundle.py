@@ -144,8 +144,8 @@ def operator_bundle(
     Raises
     ------
     InvalidShapeError
-        If the shape is not a surface in R³, the operator cannot be built on it, a cloud has less
-        than three points, or the normals of the faces at a vertex cancel.
+        If the shape is not a surface in R³, the operator cannot be built on it, or a cloud has less
+        than three points.
     InvalidParameterError
         If `k` is not in 1..n, there is no such operator, it has unknowns other than the points or a
         mass that is not diagonal, or the folder `cache` cannot be written to.

@@ -4,7 +4,6 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -40,22 +39,22 @@ def neighbor_edges(shape: Shape3) -> Int[np.ndarray, "2 e"]:
 def point_frames(shape: Shape3, edges: Int[np.ndarray, "2 e"]) -> Float[np.ndarray, "n 3 3"]:
     """Return two tangents and the normal of each point, an orthonormal right-handed frame.
 
-    Raise InvalidShapeError if the normals of the faces at a vertex cancel.
+    Where the normals of the faces at a vertex cancel, as at the waist of an hourglass or on the rim of
+    a sheet that is there twice, its neighbors give the tangent plane, as on a cloud.
     """
+    points, _ = size_one(shape.points)
+    normals = np.zeros_like(points)
     if isinstance(shape, TriangleMesh):
-        normals = mean_normals(shape)
-    else:
+        normals = mean_normals(shape).copy()
+    without = np.equal(normals, 0.0).all(axis=1)
+    if without.any():
         # The direction in which the neighbors of a point spread least; its sign is free.
-        points, _ = size_one(shape.points)
-        near = points[edges[1].reshape(len(points), -1)] - points[:, None]
-        covariances = np.einsum("nki,nkj->nij", near, near)
-        normals = np.linalg.eigh(covariances)[1][:, :, 0]
-    flat = np.flatnonzero(~normals.any(axis=1))
-    if flat.size:
-        raise InvalidShapeError(
-            f"A vertex must have a tangent plane; the normals of the faces at vertex {flat[0]} at "
-            f"{shape.points[flat[0]].tolist()} cancel ({flat.size} such). {try_auto()}"
-        )
+        has_none = np.take(without, edges[0])
+        tails, heads = edges[0][has_none], edges[1][has_none]
+        near = points[heads] - points[tails]
+        starts = np.unique(tails, return_index=True)[1]
+        covariances = np.add.reduceat(near[:, :, None] * near[:, None], starts)
+        normals[without] = np.linalg.eigh(covariances)[1][:, :, 0]
     steep = np.abs(normals[:, :1]) >= STEEP
     axis = np.where(steep, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
     first = axis - (axis * normals).sum(axis=1, keepdims=True) * normals
