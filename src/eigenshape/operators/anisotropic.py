@@ -11,8 +11,8 @@ from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, triangular_sides
 from eigenshape.operators import elements
 from eigenshape.operators.choices import Mass
-from eigenshape.operators.cotangent import linear_mass
-from eigenshape.operators.laplacian import Laplacian, with_mass_floor
+from eigenshape.operators.cotangent import linear_laplacian
+from eigenshape.operators.laplacian import Laplacian
 
 # Asymmetry and negative eigenvalues up to this share of the largest entry count as rounding.
 TENSOR_ROUNDING = 1e-12
@@ -80,9 +80,7 @@ def anisotropic_laplacian(
             f"({bad.size} such)."
         )
     require_sound(mesh)
-    products = elements.gradient_products(mesh, tensors)
-    laplacian = Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
-    return with_mass_floor(laplacian, elements.mass_floor(mesh.dim, 1))
+    return linear_laplacian(mesh, elements.gradient_products(mesh, tensors), mass)
 
 
 def curvature_tensors(

@@ -89,6 +89,13 @@ def cotangent_laplacian(
             )
         # Gradients are constant on a simplex, so the integral takes the mean.
         products = products * values[mesh.simplices].mean(axis=1)[:, None, None]
+    return linear_laplacian(mesh, products, mass)
+
+
+def linear_laplacian(
+    mesh: Mesh, products: Float[np.ndarray, "s corners corners"], mass: Mass
+) -> Laplacian:
+    """Return the Laplacian of linear elements, by the products of the gradients on each simplex."""
     laplacian = Laplacian(elements.stiffness(mesh.simplices, products, 1), linear_mass(mesh, mass))
     return with_mass_floor(laplacian, elements.mass_floor(mesh.dim, 1))
 

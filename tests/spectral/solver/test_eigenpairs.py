@@ -54,3 +54,11 @@ def test_numbers_near_the_quotients_leave_values_and_residuals_as_they_are():
     again, bounds = rayleigh_residuals(PENCIL, blurred, near)
     np.testing.assert_array_equal(again, values)
     np.testing.assert_allclose(bounds, residuals, rtol=1e-6)
+
+
+def test_lengths_of_vectors_change_neither_quotients_nor_residuals():
+    vectors = np.random.default_rng(0).standard_normal((PENCIL.n, 5))
+    values, residuals = rayleigh_residuals(PENCIL, vectors)
+    long, bounds = rayleigh_residuals(PENCIL, vectors * 10.0 ** np.arange(-2, 3))
+    np.testing.assert_allclose(long, values, rtol=1e-12)
+    np.testing.assert_allclose(bounds, residuals, rtol=1e-12)
