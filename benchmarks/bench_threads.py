@@ -78,6 +78,30 @@ def heat(quick: bool) -> Work:
     return lambda: [es.spectral.approximate_heat_signature(laplacian, 50, [0.01, 0.1]).values]
 
 
+def target(quick: bool) -> Work:
+    """Return the preparation of a whole that parts are matched to."""
+    whole = es.make_creature("quadruped", 1, n_vertices=600 if quick else 5_000)
+
+    def work() -> Sequence[np.ndarray]:
+        surface = es.matching.prepare_target(whole).pieces[0].surface
+        return surface.distances, surface.ways, surface.numbers
+
+    return work
+
+
+def match(quick: bool) -> Work:
+    """Return the match of what a scanner sees to a prepared whole in another pose."""
+    n = 200 if quick else 5_000
+    whole = es.matching.prepare_target(es.make_creature("quadruped", 1, n_vertices=n))
+    scan = es.partial_scan(es.make_creature("quadruped", 2, n_vertices=n), [0.9, 0.25, 0.45])
+
+    def work() -> Sequence[np.ndarray]:
+        found = es.match_shapes(scan.mesh, whole)
+        return found.faces, found.weights, found.confidence
+
+    return work
+
+
 def products(quick: bool) -> Work:
     """Return two large products of matrices: what the cores allow."""
     square = np.ones((200, 200) if quick else (2_000, 2_000))
@@ -99,6 +123,8 @@ CASES: dict[str, Callable[[bool], Work]] = {
     "patches": patches,
     "waves": waves,
     "heat": heat,
+    "target": target,
+    "match": match,
 }
 
 

@@ -8,7 +8,7 @@ from matched_poses import N_POINTS, N_VERTICES, describe_poses
 
 import eigenshape as es
 from eigenshape.matching.fitting import fit_part, plan_fit, plan_rough_fit, slide_part
-from eigenshape.matching.growth import find_maps, fitted_maps, grow_maps
+from eigenshape.matching.growth import N_FIRST_GROWN, find_maps, fitted_maps, grow_maps
 from eigenshape.matching.pairs import patch_differences
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, smooth_places
 from eigenshape.matching.surface import describe_surface
@@ -125,6 +125,15 @@ def test_more_starts_fit_no_worse_and_are_sorted(grown):
     assert len(more) > len(maps)
     assert misfits == sorted(misfits)
     assert misfits[0] <= maps[0].fit.misfit
+
+
+def test_a_search_ends_early_if_no_first_map_fits_well(grown):
+    plan, differences, every = grown
+    few = grow_maps(plan, differences, wanted=0.0)
+    assert 0 < len(few) <= N_FIRST_GROWN < len(every)
+    misfits = [one.fit.misfit for one in few]
+    assert misfits == sorted(misfits)
+    assert set(misfits) <= {one.fit.misfit for one in every}
 
 
 def test_the_best_map_is_smoothed_and_slides(grown):

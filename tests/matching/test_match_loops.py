@@ -25,15 +25,28 @@ def test_pairs_support_each_other_by_distance_and_turn():
     lengths = np.array([[0.0, 1.0], [1.0, 0.0]], dtype=np.float32)
     longer = np.array([[0.0, 1.1], [1.1, 0.0]], dtype=np.float32)
     ways = np.array([[0, 1], [1, 0]], dtype=np.complex64)
-    turned = 1j * ways
+    part, whole = (lengths, lengths, ways), (longer, longer, 1j * ways)
     numbers = np.arange(2)
     found = np.empty((2, 2), dtype=np.complex64)
-    couple_pairs(numbers, numbers, (lengths, ways), (longer, turned), 0.2, 0.05, 0.5, found)
+    couple_pairs(numbers, numbers, part, whole, 0.2, 0.05, 0.5, found)
     error = (0.1 / 1.1) / 0.2
     assert np.allclose(found, (1 - error**2) * np.array([[0, 1j], [1j, 0]]), atol=1e-6)
     # A longer distance on the part counts half.
-    couple_pairs(numbers, numbers, (longer, ways), (lengths, turned), 0.2, 0.05, 0.5, found)
+    couple_pairs(numbers, numbers, whole, part, 0.2, 0.05, 0.5, found)
     assert np.isclose(abs(found[0, 1]), 1 - (error / 2) ** 2)
+
+
+def test_the_distance_of_two_pairs_is_that_from_the_later_one():
+    """Distances along a mesh differ a little between the two directions."""
+    lengths = np.array([[0.0, 9.0], [1.0, 0.0]], dtype=np.float32)
+    back = np.ascontiguousarray(lengths.T)
+    ways = np.ones((2, 2), dtype=np.complex64)
+    numbers = np.arange(2)
+    found = np.empty((2, 2), dtype=np.complex64)
+    same = np.array([[0.0, 1.0], [1.0, 0.0]], dtype=np.float32)
+    whole = same, same, ways
+    couple_pairs(numbers, numbers, (lengths, back, ways), whole, 0.2, 0.05, 0.5, found)
+    assert np.allclose(found, 1 - np.eye(2))
 
 
 def test_far_distances_do_not_support():
@@ -41,9 +54,10 @@ def test_far_distances_do_not_support():
     infinite = np.array([[0.0, np.inf], [np.inf, 0.0]], dtype=np.float32)
     ways = np.ones((2, 2), dtype=np.complex64)
     numbers = np.arange(2)
+    part = lengths, lengths, ways
     found = np.empty((2, 2), dtype=np.complex64)
     for other in (infinite, 2 * lengths):
-        couple_pairs(numbers, numbers, (lengths, ways), (other, ways), 0.2, 0.05, 0.5, found)
+        couple_pairs(numbers, numbers, part, (other, other, ways), 0.2, 0.05, 0.5, found)
         assert not found.any()
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape.matching.match_loops import nearest_rows
 from eigenshape.matching.pairs import Pairs, couplings
 from eigenshape.matching.surface import Surface
 
@@ -50,6 +51,9 @@ def assign_far_points(
     count = len(firsts)
     points = np.repeat(far, count)
     coupling = couplings(part, whole, points, partners.ravel(), FAR_SLACK)
+    # Rows of the candidates of one point: how one candidate supports them, and they support it
+    for_others = coupling.reshape(-1, len(far), count)
+    by_others = np.ascontiguousarray(coupling.T).reshape(-1, len(far), count)
     unlike = UNLIKE * np.log(np.maximum(costs[points, partners.ravel()], LEAST_COST))
     region = whole.between[partners.ravel(), :N_REGIONS].argmin(axis=1)
 
@@ -60,8 +64,8 @@ def assign_far_points(
     cost, kind = unlike[:count], np.zeros(count, dtype=np.int64)
     for step in range(1, len(far)):
         new = np.arange(step * count, (step + 1) * count)
-        for_old = coupling[chosen[:, :, None], new]
-        for_new = coupling[new, chosen[:, :, None]].sum(axis=1)
+        for_old = for_others[chosen, step]
+        for_new = by_others[chosen, step].sum(axis=1)
         support = np.abs(sums[:, :, None] + for_old).sum(axis=1) + np.abs(for_new)
         costs_now = cost[:, None] + unlike[new]
         worth = support / step - costs_now
@@ -70,7 +74,8 @@ def assign_far_points(
             kinds = region[old] * N_REGIONS + region[new[one]]
         else:
             # No assignment has more than N_ALIKE extensions among the best N_ALIKE of its kind.
-            one = np.argsort(-worth, axis=1, kind="stable")[:, :N_ALIKE].ravel()
+            best = nearest_rows(np.ascontiguousarray(-worth.T), min(N_ALIKE, count))
+            one = best.ravel()
             old = np.repeat(np.arange(len(worth)), len(one) // len(worth))
             kept = _best_of_kinds(worth[old, one], kind[old])[:BEAM_WIDTH]
             old, one = old[kept], one[kept]
@@ -79,13 +84,16 @@ def assign_far_points(
         chosen = np.hstack([chosen[old], new[one][:, None]])
         cost, kind = costs_now[old, one], kinds
     # The first assignments that differ from all that were taken before
-    different: list[Int[np.ndarray, " f"]] = []
+    different = np.empty((N_ASSIGNMENTS, len(far)), dtype=np.int64)
+    n_different = 0
     for ends in partners.ravel()[chosen]:
-        if all((whole.between[ends, other] > APART).mean() > DIFFERENT for other in different):
-            different.append(ends)
-            if len(different) == N_ASSIGNMENTS:
+        apart = whole.between[ends, different[:n_different]] > APART
+        if (apart.mean(axis=1) > DIFFERENT).all():
+            different[n_different] = ends
+            n_different += 1
+            if n_different == N_ASSIGNMENTS:
                 break
-    return [Pairs(far, ends, np.ones(len(far))) for ends in different]
+    return [Pairs(far, ends, np.ones(len(far))) for ends in different[:n_different]]
 
 
 def _best_of_kinds(

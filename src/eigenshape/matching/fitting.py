@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor
+from scipy.linalg.lapack import dpotrs
 from scipy.spatial import cKDTree
 
 from eigenshape._arrays import record
@@ -198,13 +199,14 @@ def _fit(
         pulled = np.bincount(places_in_matrix, weights=entries.ravel(), minlength=m * m)
         matrix = pulled.reshape(m, m) + stiffness * plan.graph
         matrix[np.diag_indices_from(matrix)] += 1e-9 / m  # of frames that nothing pulls
-        factor = cho_factor(matrix, check_finite=False)
+        factor, _ = cho_factor(matrix, check_finite=False)
         weight = stiffness * 2 / len(plan.one)  # as in `graph`
         for _ in range(N_FIRST if step == 0 else N_NEXT):
             right = np.zeros_like(places)
             add_pulls(turns, carriers, portions, plan.arms, pull, targets, right)
             add_tensions(turns, plan.one, plan.two, plan.links, weight, right)
-            places = cho_solve(factor, right, check_finite=False)
+            # LAPACK itself: the checks of `cho_solve` take as long as the solve.
+            places, _ = dpotrs(factor, right)
             turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
 
     points, normals = _carry(plan, turns, places, plan.compared)

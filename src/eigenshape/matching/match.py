@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from eigenshape._arrays import record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
-from eigenshape._threads import one_blas_thread
+from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -247,12 +247,15 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
     # Step 1: describe the part, and turn it over if it supports the whole better inside out.
     whole = target.surface
     part = describe_surface(copy.mesh, target.unit / factor, N_PART)
-    upright, turned = (first_support(part, whole, turned=side) for side in (False, True))
+    sides = part, turn_over(part)
+    both = map_in_threads(lambda side: patch_differences(side, whole), sides)
+    upright, turned = map_in_threads(
+        lambda number: first_support(sides[number], whole, both[number]), (0, 1)
+    )
     handed = min(upright, turned) < AS_HANDED * max(upright, turned)
-    if handed and turned > upright and outward_vote(part.mesh) < CLEAR_VOTE:
-        part = turn_over(part)
+    is_inside_out = handed and turned > upright and outward_vote(part.mesh) < CLEAR_VOTE
+    part, differences = sides[is_inside_out], both[is_inside_out]
     # Steps 2 to 5: pairs that support each other, starts, bends
-    differences = patch_differences(part, whole)
     modes = modes_of_part(part.mesh, target.modes)
     plan = plan_fit(part, whole)
     maps = find_maps(plan, differences, modes, target.modes)

@@ -9,22 +9,26 @@ from eigenshape._compile import njit
 def couple_pairs(points, images, part, whole, slack, least, longer, couplings):
     """Write how two pairs support each other: a complex number for each pair of pairs.
 
-    `part` and `whole` hold distances and directions (unit complex numbers in the frame of the first
-    point). The modulus is 1 if the two distances agree, and 0 from a share `slack` on; the argument
-    is the turn from the direction on the part to that on the whole, in the frames of the first
-    pair. A longer distance on the part counts `longer` times.
+    `part` and `whole` hold distances, the same transposed, and directions (unit complex numbers in
+    the frame of the first point). The modulus is 1 if the two distances agree, and 0 from a share
+    `slack` on; the argument is the turn from the direction on the part to that on the whole, in the
+    frames of the first pair. A longer distance on the part counts `longer` times. The distance of
+    two pairs is that from the later one. Each row is written from left to right: to write both
+    entries of two pairs at once, a column apart, takes three times as long.
     """
-    ours, our_ways = part
-    theirs, their_ways = whole
+    ours, ours_back, our_ways = part
+    theirs, theirs_back, their_ways = whole
     for i in range(len(points)):
         p, q = points[i], images[i]
-        couplings[i, i] = 0
-        for j in range(i):
-            couplings[i, j] = couplings[j, i] = 0
+        for j in range(len(points)):
+            couplings[i, j] = 0
             r, s = points[j], images[j]
             if p == r:
                 continue
-            one, two = ours[p, r], theirs[q, s]
+            if j < i:
+                one, two = ours[p, r], theirs[q, s]
+            else:
+                one, two = ours_back[p, r], theirs_back[q, s]
             if not (np.isfinite(one) and np.isfinite(two)):
                 continue
             error = abs(one - two) / max(one, two, least)
@@ -34,7 +38,6 @@ def couple_pairs(points, images, part, whole, slack, least, longer, couplings):
                 share = error / slack
                 value = 1 - share * share
                 couplings[i, j] = value * their_ways[q, s] * np.conj(our_ways[p, r])
-                couplings[j, i] = value * their_ways[s, q] * np.conj(our_ways[r, p])
 
 
 @njit

@@ -95,7 +95,7 @@ def descriptor_costs(differences: Float[np.ndarray, "m k"]) -> Float[np.ndarray,
 
 def first_candidates(costs: Float[np.ndarray, "m k"]) -> tuple[np.ndarray, np.ndarray]:
     """Return the best partners of each point by descriptors alone: points and partners."""
-    partners = np.argsort(costs, axis=1, kind="stable")[:, :N_CANDIDATES]
+    partners = nearest_rows(np.ascontiguousarray(costs.T), min(N_CANDIDATES, costs.shape[1]))
     return np.repeat(np.arange(len(costs)), partners.shape[1]), partners.ravel()
 
 
@@ -108,7 +108,10 @@ def couplings(
 ) -> Complex64[np.ndarray, "c c"]:
     """Return how candidate pairs support each other; see `couple_pairs`."""
     found = np.empty((len(points),) * 2, dtype=np.complex64)
-    one, two = (part.between, part.ways), (whole.between, whole.ways)
+    one, two = (
+        (shape.between, np.ascontiguousarray(shape.between.T), shape.ways)
+        for shape in (part, whole)
+    )
     couple_pairs(points, partners, one, two, slack, SHORTEST, LONGER, found)
     return found
 
@@ -202,8 +205,10 @@ def _without_conflicts(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
     theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
     conflicts = (theirs < CROWDED) & (ours > BLOCKED * CROWDED)
     kept = np.zeros(len(pairs.points), dtype=bool)
+    conflicting = conflicts.any(axis=1)
     for number in np.argsort(-pairs.support, kind="stable"):
-        kept[number] = not (conflicts[number] & kept).any()
+        # Most pairs have no conflict at all.
+        kept[number] = not (conflicting[number] and (conflicts[number] & kept).any())
     return pairs.select(kept)
 
 
@@ -212,7 +217,7 @@ def _continuous(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
     n = len(pairs.points)
     ours = part.between[np.ix_(pairs.points, pairs.points)]
     theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
-    near = np.argsort(ours, axis=1, kind="stable")[:, 1 : N_NEIGHBORS + 1]
+    near = nearest_rows(np.ascontiguousarray(ours.T), min(N_NEIGHBORS + 1, n))[:, 1:]
     one, two = np.repeat(np.arange(n), near.shape[1]), near.ravel()
     longest = np.maximum(ours[one, two], theirs[one, two])
     with np.errstate(invalid="ignore"):  # infinite on both sides: other components

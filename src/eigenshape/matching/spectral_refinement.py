@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import record
+from eigenshape._threads import map_in_threads
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.matching.match_loops import nearest_face_points
@@ -16,7 +17,7 @@ MODES_PER_VERTEX = 1 / 5  # at most: higher ones of a coarse mesh are no longer 
 SPECTRAL_MARGIN = 1.2
 # Modes of a part are more than its share of the area says, since its boundary is free.
 EXTRA = 1.25, 15
-ROWS_AT_ONCE = 1000  # vertices whose distances to all others are in memory at a time
+ROWS_AT_ONCE = 1000  # vertices of which a thread has distances to all others in memory
 
 
 @record
@@ -99,8 +100,9 @@ def smooth_places(
     points = smooth.astype(np.float32)
     columns = np.ascontiguousarray(theirs.T, dtype=np.float32)
     halves = (columns**2).sum(axis=0) / 2
-    found = [
-        (halves - points[first : first + ROWS_AT_ONCE] @ columns).argmin(axis=1)
-        for first in range(0, len(points), ROWS_AT_ONCE)
-    ]
+
+    def nearest_from(first: int) -> Int[np.ndarray, " r"]:
+        return (halves - points[first : first + ROWS_AT_ONCE] @ columns).argmin(axis=1)
+
+    found = map_in_threads(nearest_from, range(0, len(points), ROWS_AT_ONCE))
     return np.concatenate(found), smooth

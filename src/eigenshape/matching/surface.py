@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Complex64, Float, Float32, Int
 
 from eigenshape._arrays import record
+from eigenshape._threads import map_in_threads
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
@@ -137,24 +138,29 @@ def _directions(
     """
     links = neighbor_links(mesh)
     rings = (links + links @ links)[points].tocsr()
+    columns = np.ascontiguousarray(rows.T)
+    # At each point, two unit vectors that with the normal form a right-handed frame
+    upward = normals[points]
+    firsts = np.cross(np.eye(3)[np.abs(upward).argmin(axis=1)], upward)
+    firsts /= np.linalg.norm(firsts, axis=1, keepdims=True)
+    frames = np.stack([firsts, np.cross(upward, firsts)], axis=1)
     found = np.empty((len(points),) * 2, dtype=np.complex64)
-    for number, point in enumerate(points):
+
+    def write_directions(number: int) -> None:
+        point = points[number]
         around = rings.indices[rings.indptr[number] : rings.indptr[number + 1]]
         around = around[around != point]
         arms = mesh.vertices[around] - mesh.vertices[point]
-        # Two unit vectors that with the normal form a right-handed frame
-        normal = normals[point]
-        first = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
-        first /= np.linalg.norm(first)
-        frame = np.stack([first, np.cross(normal, first)])
         # Unfold the arms into the tangent plane, with their lengths.
-        flat = arms @ frame.T
+        flat = arms @ frames[number].T
         lengths = np.linalg.norm(flat, axis=1)
         stretch = np.linalg.norm(arms, axis=1) / np.maximum(lengths, np.finfo(float).tiny)
         flat *= stretch[:, None]
         with np.errstate(invalid="ignore"):
-            rises = rows[:, around] - rows[:, [point]]
+            rises = columns[around] - columns[point]
         rises[~np.isfinite(rises)] = 0.0
-        slopes = np.linalg.lstsq(flat, rises.T, rcond=None)[0]
+        slopes = np.linalg.lstsq(flat, rises, rcond=None)[0]
         found[number] = -(slopes[0] + 1j * slopes[1])
+
+    map_in_threads(write_directions, range(len(points)))
     return found / np.maximum(np.abs(found), 1)

@@ -7,8 +7,10 @@ from scipy.spatial import Delaunay
 
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.distances.geodesic import (
+    farthest_points,
     geodesic_balls,
     geodesic_distances,
+    geodesic_waves,
 )
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
@@ -178,3 +180,27 @@ def test_edges_without_length_change_no_distance():
     straight = np.linalg.norm(vertices - vertices[0], axis=1)
     assert found[ends[0]] == pytest.approx(found[ends[1]], rel=1e-12)
     np.testing.assert_allclose(found, straight, rtol=0.05)
+
+
+def test_farthest_points_are_chosen_one_after_the_other_with_all_distances():
+    mesh = grid(14, 9)
+    chosen, rows, nearest = farthest_points(mesh, 9)
+    np.testing.assert_array_equal(rows, geodesic_distances(mesh, chosen))
+    np.testing.assert_array_equal(nearest, rows.argmin(axis=0))
+    for number in range(1, 9):
+        assert chosen[number] == rows[:number].min(axis=0).argmax()
+    # Distances that end at a reach change no choice.
+    near = farthest_points(mesh, 9, reach=0.3)
+    np.testing.assert_array_equal(near[0], chosen)
+    np.testing.assert_array_equal(near[2], nearest)
+    within = rows <= 0.3
+    np.testing.assert_array_equal(near[1][within], rows[within])
+
+
+def test_waves_that_follow_each_other_are_as_if_alone():
+    mesh = grid(14, 9)
+    wave = geodesic_waves(mesh)
+    wave([0, 30, 31], 0.4)
+    wave(5)
+    np.testing.assert_array_equal(wave(77, 0.5), geodesic_waves(mesh)(77, 0.5))
+    np.testing.assert_array_equal(wave([8, 70]), geodesic_waves(mesh)([8, 70]))
