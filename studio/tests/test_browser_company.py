@@ -242,7 +242,7 @@ def test_a_collection_is_opened_from_the_window_and_has_sliders_and_specimens(
         find(page, "tab-shape").click()
         find(page, "open-folder").click()
         find(page, f"folder-{collection.name}").wait_for()
-        assert find(page, "folder-open").inner_text() == "Open the 1 shapes here"
+        assert find(page, "folder-open").inner_text() == "Open 1 shape of this folder"
         assert find_faults(page) == []
         find(page, f"folder-{collection.name}").click()
         find(page, "tab-collection").click()

@@ -51,7 +51,8 @@ export class FolderDialog {
     });
     form.get("folder-list").replaceChildren(...rows);
     form.get("folder-empty").hidden = rows.length > 0;
-    form.text("folder-open", `Open the ${n_files.toLocaleString("en")} shapes here`);
+    const shapes = n_files === 1 ? "1 shape" : `${n_files.toLocaleString("en")} shapes`;
+    form.text("folder-open", `Open ${shapes} of this folder`);
     form.get("folder-open").hidden = !n_files;
     form.get("folder-up").disabled = !place.length;
     return true;
