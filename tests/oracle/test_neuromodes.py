@@ -71,4 +71,5 @@ def test_the_blood_signal_is_the_limit_of_theirs_for_small_activity():
     np.testing.assert_allclose(found, expected, atol=1e-2 * abs(expected).max())
     theirs = waves._model_balloon_ode(activity, 0.1)
     nonlinear = es.modes.blood_response(activity, 0.1, linear=False)
-    np.testing.assert_allclose(nonlinear, theirs, atol=1e-5 * abs(theirs).max())
+    # Their solver allows 1e-6 a step; what adds up, 1.2e-5 here, moves with the last digits of a CPU.
+    np.testing.assert_allclose(nonlinear, theirs, atol=3e-5 * abs(theirs).max())

@@ -54,11 +54,7 @@ def expected_values(pencil: Pencil, numbers: Float[np.ndarray, " j"]) -> Float[n
     """Return λ_k of a surface for some k by Weyl's law, as its operator would have it."""
     shares = UNIFORM_MESH * numbers / pencil.n
     if pencil.kernel is None:
-        # Weyl's law is of the area, the sum of all entries of B. Its trace is the same where B is
-        # lumped, and half as much in the consistent mass. It is more where entries are negative, as
-        # in nonconforming tetrahedra, for which the trace predicts better (measured).
-        lumped = min(float(pencil.mass_diagonal.sum() / pencil.mass.sum()), 1.0)
-        return lumped * pencil.level * shares
+        return pencil.level * shares
     return -pencil.level * np.expm1(
         -shares * pencil.kernel.edge_factor**2
     )  # (1 - e^{-tλ})/t, where level is 1/t
