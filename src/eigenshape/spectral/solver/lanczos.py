@@ -413,12 +413,16 @@ def _one_by_one(
 ) -> Float[np.ndarray, "b b"]:
     """Orthonormalize a block column by column, each twice; return the triangle R.
 
-    A negligible column is replaced by a random one that R leaves out.
+    A negligible column is replaced by a random one that R leaves out, or by zeros if the others span all there is.
     """
 
     def weigh(column: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         weighed = inner.weigh(pack_columns(column[:, None]))  # in a slot of eight
         return np.ascontiguousarray(weighed[0, :, 0])
+
+    def size_of(column: Float[np.ndarray, " n"]) -> float:
+        # Rounding makes the square of what is nearly nothing negative.
+        return float(np.sqrt(max(column @ weigh(column), 0.0)))
 
     columns, width = np.concatenate(list(block), axis=1), len(lengths)
     upper = np.zeros((width, width))
@@ -428,14 +432,16 @@ def _one_by_one(
             part = known.T @ weigh(columns[:, i])
             columns[:, i] -= known @ part
             upper[:i, i] += part
-        length = float(np.sqrt(columns[:, i] @ weigh(columns[:, i])))
+        length = size_of(columns[:, i])
         if length > NEGLIGIBLE * lengths[i]:
             columns[:, i] /= length
             upper[i, i] = length
             continue
         other = rng.standard_normal(len(columns))
+        whole = size_of(other)
         for _ in range(2):
             other -= known @ (known.T @ weigh(other))
-        columns[:, i] = other / np.sqrt(other @ weigh(other))
+        length = size_of(other)
+        columns[:, i] = other / length if length > NEGLIGIBLE * whole else 0.0
     fresh[:] = pack_columns(columns)
     return upper
