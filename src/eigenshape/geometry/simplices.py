@@ -107,9 +107,22 @@ def barycentric_gradients(
     would have the squared condition number.
     """
     basis, triangles = triangular_sides(corners)
-    inner = np.linalg.inv(triangles)
+    inner = _inverse_triangles(triangles)
     gradients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
     return basis, triangles, gradients
+
+
+def _inverse_triangles(triangles: Float[np.ndarray, "s m m"]) -> Float[np.ndarray, "s m m"]:
+    """Invert upper triangular matrices by back substitution, all at once."""
+    inverses = np.zeros_like(triangles)
+    for column in range(triangles.shape[1]):
+        inverses[:, column, column] = 1 / triangles[:, column, column]
+        for row in range(column - 1, -1, -1):
+            rest = sum(
+                triangles[:, row, i] * inverses[:, i, column] for i in range(row + 1, column + 1)
+            )
+            inverses[:, row, column] = -rest * inverses[:, row, row]
+    return inverses
 
 
 def volumes(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:

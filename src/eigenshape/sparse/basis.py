@@ -1,18 +1,30 @@
 """Tall columns in slots of eight, (s, n, 8): eight numbers of a row are adjacent in memory."""
 
+from typing import TypeAlias
+
 import numpy as np
-from jaxtyping import Float
+import scipy.sparse as sp
+from jaxtyping import Float, Int
 
 from eigenshape._threads import free_threads, map_in_threads, share_units
-from eigenshape.sparse.basis_loops import CHUNK, add_products, subtract_combination
+from eigenshape.sparse.basis_loops import (
+    CHUNK,
+    add_products,
+    multiply_lanes,
+    subtract_combination,
+)
 from eigenshape.sparse.lane_loops import LANES
 
 COMBINED_ROWS = 512  # rows of a combination that are computed at once
 # Multiplications that are worth a thread: below, starting it costs more than it saves.
 FEWEST_MULTIPLICATIONS = 1_000_000
+# Rows of a sparse matrix that a thread multiplies at least.
+ROWS_A_THREAD = 1024
 
 Slots = Float[np.ndarray, "s n 8"]
 Block = Float[np.ndarray, "g n 8"]
+# Pointers, indices and entries of a sparse matrix, row by row.
+SparseRows: TypeAlias = tuple[Int[np.ndarray, " p"], Int[np.ndarray, " e"], Float[np.ndarray, " e"]]
 
 
 def pack_columns(columns: Float[np.ndarray, "n k"]) -> Slots:
@@ -57,6 +69,28 @@ def combine_columns(space: Slots, weights: Float[np.ndarray, "m k"]) -> Float[np
 
     map_in_threads(fill_rows, _shares(n, COMBINED_ROWS, space.size * weights.shape[1]))
     return result
+
+
+def sparse_rows(symmetric: sp.csr_array | sp.csc_array) -> SparseRows:
+    """Return the rows of a symmetric matrix, which are its columns, for `multiply`."""
+    pointers, indices = symmetric.indptr.astype(np.int64), symmetric.indices.astype(np.int32)
+    return pointers, indices, symmetric.data
+
+
+def multiply(
+    matrix: SparseRows,
+    given: Float[np.ndarray, "n 8"],
+    out: Float[np.ndarray, "n 8"],
+    *,
+    factor: float = 1.0,
+    before: Float[np.ndarray, "n 8"] | None = None,
+) -> None:
+    """Fill `out` with factor A given, less what was `before`, which `out` may be."""
+    share, subtracted = (0.0, given) if before is None else (1.0, before)
+    rows = _shares(len(given), ROWS_A_THREAD, len(matrix[1]) * LANES)
+    map_in_threads(
+        lambda part: multiply_lanes(matrix, given, subtracted, factor, share, *part, out), rows
+    )
 
 
 def _shares(size: int, unit: int, multiplications: int) -> list[tuple[int, int]]:

@@ -170,8 +170,9 @@ class _Dissection:
         side = np.empty(size, dtype=np.int8)
         lowest = np.inf
         # A search from any point ends far away, one from there farther, and so on. The distances
-        # from two of these ends make a key.
-        breadth_first(*graph, points[0], owner, name, one, queue)
+        # from two of these ends make a key. The first search has found this piece, and left its
+        # points in the order in which it came to them.
+        queue[-1] = points[-1]
         distances: list[Indices] = []
         for n_before in range(SOLID_ENDS):
             end = points[np.min(distances, axis=0).argmax()] if n_before > 1 else queue[-1]

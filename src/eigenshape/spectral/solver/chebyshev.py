@@ -12,9 +12,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import record
 from eigenshape._errors import ConvergenceError
-from eigenshape._threads import free_threads, map_in_threads, share_units
-from eigenshape.sparse.basis import Block
-from eigenshape.sparse.basis_loops import multiply_lanes
+from eigenshape.sparse.basis import Block, SparseRows, multiply, sparse_rows
 from eigenshape.spectral.solver.pencil import Pencil
 
 Column = Float[np.ndarray, " n"]
@@ -55,8 +53,6 @@ REACH = 2.2
 LOWEST_DEGREE, HIGHEST_DEGREE = 2, 60
 # What the estimate of the largest eigenvalue is raised by.
 RAISED = 1.01
-# Rows that a thread multiplies at least.
-ROWS_A_THREAD = 1024
 
 
 @record
@@ -74,8 +70,8 @@ class ChebyshevFilter:
         The point of each row: points that are near each other in it share what is in the cache.
     roots : (n, 1) float
         B^½, by points.
-    matrix : tuple
-        Pointers, indices and entries of 2 z(A).
+    matrix : SparseRows
+        2 z(A).
     degree : int
         m.
     damped : (float, float)
@@ -85,7 +81,7 @@ class ChebyshevFilter:
     pencil: Pencil
     order: Int[np.ndarray, " n"]
     roots: Float[np.ndarray, "n 1"]
-    matrix: tuple[Int[np.ndarray, " p"], Int[np.ndarray, " e"], Float[np.ndarray, " e"]]
+    matrix: SparseRows
     degree: int
     damped: tuple[float, float]
 
@@ -101,15 +97,15 @@ class ChebyshevFilter:
         for slot, image in zip(block, images, strict=True):
             # Of T_1, T_2, ... each takes the place of the one two before; the last is the image.
             odd, even = (image, scratch) if self.degree % 2 else (scratch, image)
-            self._multiply(slot, slot, 0.5, 0.0, odd)
-            self._multiply(odd, slot, 1.0, 1.0, even)
+            multiply(self.matrix, slot, odd, factor=0.5)
+            multiply(self.matrix, odd, even, before=slot)
             before, latest = odd, even
             for _ in range(self.degree - 2):
-                self._multiply(latest, before, 1.0, 1.0, before)
+                multiply(self.matrix, latest, before, before=before)
                 before, latest = latest, before
         return images
 
-    def weigh(self, block: Float[np.ndarray, "g n b"]) -> Float[np.ndarray, "g n b"]:
+    def weigh(self, block: Block) -> Block:
         """Return the block: the inner product is the plain one."""
         return block
 
@@ -137,19 +133,6 @@ class ChebyshevFilter:
         slopes[beyond] = half * np.sinh(angles) / (self.degree * np.sinh(self.degree * angles))
         return values, slopes
 
-    def _multiply(
-        self,
-        given: Float[np.ndarray, "n 8"],
-        before: Float[np.ndarray, "n 8"],
-        factor: float,
-        share: float,
-        out: Float[np.ndarray, "n 8"],
-    ) -> None:
-        rows = share_units(len(given), ROWS_A_THREAD, free_threads())
-        map_in_threads(
-            lambda part: multiply_lanes(self.matrix, given, before, factor, share, *part, out), rows
-        )
-
 
 def chebyshev_filter(pencil: Pencil, order: Int[np.ndarray, " n"], low: float) -> ChebyshevFilter:
     """Return a filter that damps the eigenvalues from `low` on; B is diagonal.
@@ -171,12 +154,11 @@ def chebyshev_filter(pencil: Pencil, order: Int[np.ndarray, " n"], low: float) -
     degree = round(REACH / np.sqrt(low / high))
     scaled.data *= -4 / (high - low)
     scaled.setdiag(scaled.diagonal() + 2 * (high + low) / (high - low))
-    pointers, indices = scaled.indptr.astype(np.int64), scaled.indices.astype(np.int32)
     return ChebyshevFilter(
         pencil=pencil,
         order=order,
         roots=roots[:, None],
-        matrix=(pointers, indices, scaled.data),
+        matrix=sparse_rows(scaled),
         degree=min(max(degree, LOWEST_DEGREE), HIGHEST_DEGREE),
         damped=(low, high),
     )

@@ -12,6 +12,9 @@ from eigenshape.spectral.solver.pencil import Pencil
 
 # Factor by which σ moves away from the eigenvalue if rounding could move it across.
 WIDENING = 3.7
+# Slack of every row at least, relative to the step: rounding wanders from factor to factor, most in
+# rows where there was little, and another factor costs far more than a sixteenth of that distance.
+SPARE = 1 / 16
 # Factors for one count before giving up.
 COUNT_TRIALS = 12
 
@@ -49,11 +52,14 @@ def count_beside(
     def too_much(loss: float, shift: float) -> bool:
         return not 2 * loss < np.abs(pairs.values - shift).min()
 
+    def padded(loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        return 3 * loss + SPARE * abs(step) * pencil.mass_diagonal
+
     factor, none, sigma = beside, np.zeros(pencil.n), value + step
     slack = none
     if beside:
         # What was enough for this factor, or would have been.
-        slack = beside.slack if beside.slack.any() else _pad(pencil, rounding(beside))
+        slack = beside.slack if beside.slack.any() else padded(rounding(beside))
     if too_much(uncertainty(slack), sigma):
         slack = none
     for _ in range(COUNT_TRIALS):
@@ -65,7 +71,7 @@ def count_beside(
         moved = sigma - side * over
         if factor and not too_much(uncertainty(slack) + over, moved):
             return replace(factor, shift=moved)
-        slack = wanted = np.maximum(slack, _pad(pencil, loss))
+        slack = wanted = np.maximum(slack, padded(loss))
         if too_much(uncertainty(slack), sigma):
             step, slack = WIDENING * step, none
             sigma = value + step
@@ -74,8 +80,3 @@ def count_beside(
         f"{np.ldexp(value, pencil.value_exponent):.6g} (1/length²) it is "
         f"{np.ldexp(uncertainty(wanted), pencil.value_exponent):.1e}. Repair nearly degenerate elements."
     )
-
-
-def _pad(pencil: Pencil, loss: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    # Rounding wanders from factor to factor, most in rows where there was little.
-    return 3 * loss + 0.1 * float(np.median(loss / pencil.mass_diagonal)) * pencil.mass_diagonal

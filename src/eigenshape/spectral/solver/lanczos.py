@@ -10,7 +10,17 @@ from jaxtyping import Float, Int
 
 from eigenshape._arrays import record
 from eigenshape._errors import ConvergenceError
-from eigenshape.sparse.basis import Block, Slots, combine_columns, pack_columns, products, subtract
+from eigenshape.sparse.basis import (
+    Block,
+    Slots,
+    SparseRows,
+    combine_columns,
+    multiply,
+    pack_columns,
+    products,
+    sparse_rows,
+    subtract,
+)
 from eigenshape.sparse.lane_loops import LANES
 from eigenshape.sparse.symmetric_factor import Scratch
 from eigenshape.spectral.solver.chebyshev import ChebyshevFilter
@@ -54,6 +64,7 @@ class ShiftedInverse:
     pencil: Pencil
     factor: Factor
     roots: Float[np.ndarray, "n 1"] | None
+    mass: SparseRows
     scratch: Scratch
 
     @property
@@ -66,20 +77,22 @@ class ShiftedInverse:
         images = np.empty_like(block)
         for slot, image in zip(block, images, strict=True):
             if self.roots is None:
-                self.factor.lower.solve_lanes(self.pencil.weigh(slot), image, self.scratch)
+                multiply(self.mass, slot, image)
+                self.factor.lower.solve_lanes(image, image, self.scratch)
             else:
                 np.multiply(slot, self.roots, out=image)
                 self.factor.lower.solve_lanes(image, image, self.scratch)
                 np.multiply(image, self.roots, out=image)
         return images
 
-    def weigh(self, block: Float[np.ndarray, "g n b"]) -> Float[np.ndarray, "g n b"]:
+    def weigh(self, block: Block) -> Block:
         """Return what the plain product with columns is the inner product with."""
-        return (
-            block
-            if self.roots is not None
-            else np.stack([self.pencil.weigh(slot) for slot in block])
-        )
+        if self.roots is not None:
+            return block
+        weighed = np.empty_like(block)
+        for slot, product in zip(block, weighed, strict=True):
+            multiply(self.mass, slot, product)
+        return weighed
 
     def enter(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
         """Return u for φ."""
@@ -197,7 +210,7 @@ def block_lanczos(
     Raises a ConvergenceError as `grow_space` does.
     """
     roots = np.sqrt(pencil.mass_diagonal)[:, None] if pencil.mass_floor == 1.0 else None
-    inner = ShiftedInverse(pencil, factor, roots, factor.lower.scratch())
+    inner = ShiftedInverse(pencil, factor, roots, sparse_rows(pencil.mass), factor.lower.scratch())
     found = grow_space(inner, wanted, locked=locked, groups=groups, report=report)
     return found.values[found.chosen], found.vectors(found.chosen)
 
@@ -323,7 +336,8 @@ def _orthonormalize(
     groups, block = len(columns), len(columns) * LANES
     known, fresh = space[:-groups], space[-groups:]
     along, upper = np.zeros((len(known) * LANES, block)), np.eye(block)
-    lengths = np.sqrt(np.einsum("gij,gij->gj", columns, inner.weigh(columns))).ravel()
+    weighed = inner.weigh(columns)
+    lengths = np.sqrt(np.einsum("gij,gij->gj", columns, weighed)).ravel()
 
     # The recent blocks take most of a Lanczos image away. Then all are projected out, or the recent
     # ones again where the others are to be skipped.
@@ -331,15 +345,17 @@ def _orthonormalize(
     passes: tuple[Slots, ...] = (recent, recent if skip else known)
     for _ in range(1 + REPEATS):
         for near in passes:
-            part = products(near, inner.weigh(columns))
+            part = products(near, weighed)
             subtract(near, part, columns)
             along[len(along) - len(part) :] += part @ upper
-        triangle, short = _gram_schmidt(inner, columns, fresh, lengths, rng)
+            weighed = inner.weigh(columns)
+        triangle, short = _gram_schmidt(inner, columns, weighed, fresh, lengths, rng)
         upper = triangle @ upper
         if not short:
             break
         # A column that became short has lost digits: once more, against all.
         columns[:] = fresh
+        weighed = inner.weigh(columns)
         lengths, passes = np.ones(block), (known,)
     return along, upper
 
@@ -347,6 +363,7 @@ def _orthonormalize(
 def _gram_schmidt(
     inner: Operator,
     columns: Block,
+    weighed: Block,
     fresh: Block,
     lengths: Float[np.ndarray, " b"],
     rng: np.random.Generator,
@@ -354,12 +371,13 @@ def _gram_schmidt(
     """Orthonormalize a block into `fresh`; return the triangle, and whether a column became short against what it was.
 
     By the Cholesky factor of the Gram matrix, twice where the first leaves digits to be gained
-    (Yamamoto and others 2015), and column by column where it fails. The columns are used up.
+    (Yamamoto and others 2015), and column by column where it fails. The columns are used up;
+    `weighed` is B times them, or what stands for it in the inner product.
     """
     width = len(lengths)
     upper, before = np.eye(width), lengths
     for _ in range(2):
-        triangle = _cholesky(products(columns, inner.weigh(columns)))
+        triangle = _cholesky(products(columns, weighed))
         if triangle is None:
             upper = _one_by_one(inner, columns, fresh, before, rng) @ upper
             break
@@ -369,6 +387,7 @@ def _gram_schmidt(
         if np.diag(upper).min() > INDEPENDENT_PIVOT * np.linalg.norm(upper, axis=0).max():
             break
         columns[:] = fresh
+        weighed = inner.weigh(columns)
         before = np.ones(width)
     return upper, bool((np.diag(upper) < SHRUNK * lengths).any())
 
@@ -394,11 +413,16 @@ def _one_by_one(
 ) -> Float[np.ndarray, "b b"]:
     """Orthonormalize a block column by column, each twice; return the triangle R.
 
-    A negligible column is replaced by a random one that R leaves out.
+    A negligible column is replaced by a random one that R leaves out, or by zeros if the others span all there is.
     """
 
     def weigh(column: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        return inner.weigh(column[None, :, None])[0, :, 0]
+        weighed = inner.weigh(pack_columns(column[:, None]))  # in a slot of eight
+        return np.ascontiguousarray(weighed[0, :, 0])
+
+    def size_of(column: Float[np.ndarray, " n"]) -> float:
+        # Rounding makes the square of what is nearly nothing negative.
+        return float(np.sqrt(max(column @ weigh(column), 0.0)))
 
     columns, width = np.concatenate(list(block), axis=1), len(lengths)
     upper = np.zeros((width, width))
@@ -408,14 +432,16 @@ def _one_by_one(
             part = known.T @ weigh(columns[:, i])
             columns[:, i] -= known @ part
             upper[:i, i] += part
-        length = float(np.sqrt(columns[:, i] @ weigh(columns[:, i])))
+        length = size_of(columns[:, i])
         if length > NEGLIGIBLE * lengths[i]:
             columns[:, i] /= length
             upper[i, i] = length
             continue
         other = rng.standard_normal(len(columns))
+        whole = size_of(other)
         for _ in range(2):
             other -= known @ (known.T @ weigh(other))
-        columns[:, i] = other / np.sqrt(other @ weigh(other))
+        length = size_of(other)
+        columns[:, i] = other / length if length > NEGLIGIBLE * whole else 0.0
     fresh[:] = pack_columns(columns)
     return upper
