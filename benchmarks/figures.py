@@ -108,6 +108,9 @@ FIGURES = {
     "service": Figure("bench_service.py --minutes 1", ("retrieval/store", "../../studio/src")),
     "build": Figure("bench_build.py", STORE),
     "studio": Figure("bench_studio.py", ("../../studio", "deformation")),
+    "ugly": Figure(
+        "bench_ugly.py --only nasty --limit 600", ("geometry/repairs", "io", "operators")
+    ),
     "encodings": Figure("bench_torch.py --only encodings", ("torch",)),
     "bundles": Figure("bench_torch.py --only operators", ("spectral/tools/bundle.py", *SOLVER)),
     "torch": Figure(

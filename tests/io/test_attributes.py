@@ -526,6 +526,34 @@ def test_parts_are_materials(tmp_path):
     assert es.read_mesh(tmp_path / "c.glb").n_vertices == mesh.n_vertices  # borders are not torn
 
 
+@pytest.mark.parametrize("suffix", [".glb", ".obj", ".ply"])
+def test_vertex_colors_that_parts_replace_are_named(tmp_path, suffix):
+    ball = es.icosphere(1)
+    own = np.arange(3 * ball.n_vertices, dtype=np.uint8).reshape(-1, 3)
+    es.write_mesh(ball, tmp_path / "a.ply", colors=own)
+    mesh, attributes = es.read_mesh(tmp_path / "a.ply", attributes=True)
+    labels = np.arange(mesh.n_faces) % 2
+    lost = save_mesh(
+        mesh,
+        tmp_path / f"b{suffix}",
+        colors=np.zeros_like(own),
+        face_labels=labels,
+        attributes=attributes,
+    )
+    assert lost == (
+        f"b{suffix} does not keep: vertex colors, since each part has a color of its own."
+    )
+
+
+def test_further_values_of_vertices_are_named(tmp_path):
+    gltf = Gltf()
+    gltf.primitive(TEXCOORD_1=gltf.add(UV), _WARMTH=gltf.add(UV[:, :1].copy()))
+    mesh, attributes = es.read_mesh(gltf.save(tmp_path), attributes=True)
+    assert not save_mesh(mesh, tmp_path / "b.glb", attributes=attributes)
+    lost = save_mesh(mesh, tmp_path / "b.obj", attributes=attributes)
+    assert "the values TEXCOORD_1 of vertices, the values _WARMTH of vertices" in lost
+
+
 def test_attributes_of_other_faces_are_refused(tmp_path):
     mesh, attributes = es.read_mesh(obj_file(tmp_path), attributes=True)
     with pytest.raises(

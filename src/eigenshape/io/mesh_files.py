@@ -365,7 +365,11 @@ def save_mesh(
     if face_labels is not None:
         _require_labels(face_labels, mesh, suffix)
     lost: list[str] = []
-    if face_labels is not None and "labels" not in known.traits:
+    has_part_materials = face_labels is not None and "labels" not in known.traits
+    is_tinted = has_part_materials or (face_labels is not None and colors is not None)
+    if is_tinted and held.contents["vertex colors"]:
+        lost.append("vertex colors, since each part has a color of its own")
+    if has_part_materials:
         if held.contents["materials"]:
             lost.append("materials and images, since each part has a material of its own")
         gray = np.full((mesh.n_vertices, 3), 200, np.uint8)

@@ -46,6 +46,8 @@ COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 # What a document may hold besides a scene with materials.
 EXTRAS = ("skins", "animations", "cameras", "extensions")
+# Attributes of vertices that go to other formats, that viewers compute, or that are named as skins.
+CARRIED = {"POSITION", "NORMAL", "TANGENT", "COLOR_0", "JOINTS_0", "WEIGHTS_0"}
 TANGENTS = "tangents, which viewers compute anew"
 MADE_ANEW = ("POSITION", "NORMAL", "TANGENT")
 DRACO = "KHR_draco_mesh_compression"
@@ -66,9 +68,8 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         number = primitive.get("material", -1)
         face_materials[chosen], face_groups[chosen] = number, nodes.index(node)
         face_parts[chosen] = part
-        pbr = {} if number < 0 else _base_color(gltf.entry("materials", number))
-        coordinate = f"TEXCOORD_{pbr.get('baseColorTexture', {}).get('texCoord', 0)}"
-        columns = {"normals": ("NORMAL", (3,)), "texture_coordinates": (coordinate, (2,)),
+        coordinates = _base_coordinates(gltf, primitive)
+        columns = {"normals": ("NORMAL", (3,)), "texture_coordinates": (coordinates, (2,)),
                    "colors": ("COLOR_0", (3, 4))}  # fmt: skip
         for key, (name, widths) in columns.items():
             if name not in named:
@@ -138,6 +139,13 @@ def _base_color(material: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
+def _base_coordinates(gltf: Gltf, primitive: dict[str, Any]) -> str:
+    """Name the texture coordinates of the base color of a primitive."""
+    number = primitive.get("material", -1)
+    pbr = {} if number < 0 else _base_color(gltf.entry("materials", number))
+    return f"TEXCOORD_{pbr.get('baseColorTexture', {}).get('texCoord', 0)}"
+
+
 def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material:
     pbr = _base_color(entry)
     *light, alpha = pbr.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])
@@ -177,6 +185,10 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
     tree = gltf.tree
     names = [kind for kind in EXTRAS if tree.get(kind)]
     primitives = [part for mesh in tree.get("meshes", []) for part in mesh.get("primitives", [])]
+    further: set[str] = set()
+    for part in primitives:
+        further |= {*part["attributes"]} - CARRIED - {_base_coordinates(gltf, part)}
+    names.extend(f"the values {name} of vertices" for name in sorted(further))
     if any("targets" in part for part in primitives):
         names.append("morph targets")
     if any(part.get("mode", 4) not in SURFACES for part in primitives):
