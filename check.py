@@ -49,6 +49,10 @@ def main() -> int:
     nightly = sorted(options & {"--nightly"})  # an option of pytest, too
     # Tests start hundreds of processes, each of which would compile the whole package anew.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    # Threads of BLAS burn a core while they wait for each other. Tests, docs and studio share two
+    # cores, where eigenvalues of a matrix of 300 rows took 130 times as long with two threads.
+    if not nightly:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with tempfile.TemporaryDirectory() as site:
         beside, tests = dict(TYPES_AND_LAYERS), {}
         if everything:

@@ -18,12 +18,15 @@ def folder(tmp_path_factory):
     meshes = [es.make_creature("fish", pose, n_vertices=500) for pose in (0, 1)]
     es.write_mesh(meshes[0], path / "rest.ply")
     es.write_mesh(meshes[1], path / "posed.ply")
-    es.write_mesh(es.partial_scan(meshes[0], [0, 0, 1]).mesh, path / "scan.ply")
+    # Coarser ones take a third of the time, and what is printed and written does not depend on it.
+    rest, posed = (es.geometry.decimate(mesh, n_faces=400).mesh for mesh in meshes)
+    es.write_mesh(es.partial_scan(rest, [0, 0, 1]).mesh, path / "scan.ply")
+    es.write_mesh(posed, path / "whole.ply")
     return path
 
 
 def test_a_scan_is_matched_and_the_map_is_written(folder):
-    scan, whole = folder / "scan.ply", folder / "posed.ply"
+    scan, whole = folder / "scan.ply", folder / "whole.ply"
     n = es.read_mesh(scan).n_vertices
     files = [folder / f"map.{suffix}" for suffix in ("csv", "npz", "txt")]
     picture = folder / "map.png"
@@ -45,12 +48,12 @@ def test_a_scan_is_matched_and_the_map_is_written(folder):
 
 
 def test_a_map_says_how_sure_it_is(folder):
-    text = run("match", folder / "scan.ply", folder / "posed.ply").stdout
+    text = run("match", folder / "scan.ply", folder / "whole.ply").stdout
     assert "have a confidence of at least 0.5, the mean is 0." in text
 
 
 def test_a_scale_is_a_word_or_a_number(folder):
-    arguments = "match", folder / "scan.ply", folder / "posed.ply", "--scale"
+    arguments = "match", folder / "scan.ply", folder / "whole.ply", "--scale"
     assert json.loads(run(*arguments, "0.9", "--json").stdout)["scale"] == 0.9
     assert "--scale takes auto, known, unknown or a number; it is 'big'" in run(
         *arguments, "big", code=2
@@ -66,18 +69,18 @@ def test_a_raw_file_is_repaired_and_loose_pieces_are_named(folder):
         np.vstack([mesh.faces, mesh.faces[:1], [[n, n + 1, n + 2]]]),
     )
     es.write_mesh(raw, folder / "raw.ply")
-    done = run("match", folder / "raw.ply", folder / "posed.ply")
+    done = run("match", folder / "raw.ply", folder / "whole.ply")
     assert "drop_duplicate_faces removed 1 face" in done.stderr
     assert "1 loose piece of" in done.stdout
     assert "of the area of the part was left out." in done.stdout
     refused = run(
-        "match", folder / "raw.ply", folder / "posed.ply", "--repair", "none", code=1
+        "match", folder / "raw.ply", folder / "whole.ply", "--repair", "none", code=1
     ).output.replace("\n", " ")
     assert "--repair auto" in refused
 
 
 def test_a_shape_that_turns_into_itself_says_so(folder):
-    es.write_mesh(es.shapes.torus(30, 12), folder / "ring.ply")
+    es.write_mesh(es.shapes.torus(20, 8), folder / "ring.ply")
     found = json.loads(run("match", folder / "ring.ply", folder / "ring.ply", "--json").stdout)
     assert found["n_equally_good"] > 3
     assert found["mean_confidence"] < 0.3
@@ -86,17 +89,17 @@ def test_a_shape_that_turns_into_itself_says_so(folder):
 
 
 def test_a_map_is_written_to_known_files_only(folder):
-    done = run("match", folder / "scan.ply", folder / "posed.ply", "-o", folder / "map.xls", code=2)
+    done = run("match", folder / "scan.ply", folder / "whole.ply", "-o", folder / "map.xls", code=2)
     assert "must be written to a file that ends in .csv, .npz, .txt" in done.output
 
 
 @pytest.mark.parametrize("rest", [False, True])
-def test_a_mesh_takes_a_pose(folder, rest):
-    bent = folder / "bent.ply"
-    more = ("--rest", folder / "rest.ply") if rest else ()
-    picture = folder / "poses.png"
+def test_a_mesh_takes_a_pose(folder, tmp_path, rest):
+    bent, picture = tmp_path / "bent.ply", tmp_path / "poses.png"
+    more = ("--rest", folder / "rest.ply", "--json") if rest else ()
     arguments = "pose", folder / "rest.ply", "--like", folder / "posed.ply", *more
-    run(*arguments, "-o", bent, "--picture", picture)
+    done = run(*arguments, "-o", bent, "--picture", picture)
     assert es.read_mesh(bent).n_vertices == es.read_mesh(folder / "rest.ply").n_vertices
     assert picture.exists()
-    assert json.loads(run(*arguments, "--json").stdout)["like"].endswith("posed.ply")
+    if rest:
+        assert json.loads(done.stdout)["like"].endswith("posed.ply")

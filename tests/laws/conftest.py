@@ -4,19 +4,23 @@ import numpy as np
 import pytest
 from thread_calls import Shared
 
-from eigenshape.collections import alignment
+from eigenshape.collections import alignment, surface_fit
+from eigenshape.matching import match, target
 
 
 @pytest.fixture(scope="session", autouse=True)
-def few_starts():
-    """Align surfaces from few starts in few steps: a fifth of the time, and laws hold for any number."""
+def few_points():
+    """Align, bend and match by few starts, steps and points: a fifth of the time, and laws hold for any number."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(alignment, "N_TURNS", 4)
         patch.setattr(alignment, "FINE_REACH", np.geomspace(0.2, 0.05, 8))
+        patch.setattr(surface_fit, "N_POINTS", 1000)
+        patch.setattr(match, "N_PART", 100)
+        patch.setattr(target, "N_WHOLE", 160)
         yield
 
 
 @pytest.fixture(scope="session")
-def shared(few_starts, tmp_path_factory):
+def shared(few_points, tmp_path_factory):
     """Return what all public functions are called with."""
     return Shared(tmp_path_factory.mktemp("shared"))

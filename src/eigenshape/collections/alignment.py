@@ -23,7 +23,8 @@ from eigenshape.geometry.mesh import TriangleMesh
 
 # Lengths are in units of the root mean square distance of a surface from its middle. All numbers
 # were chosen on the tuning half of experiments/ch7_collection: skulls, whole, and cut by planes.
-N_POINTS, N_ROUGH = 1200, 240  # of the surface that is placed, for its refined and rough places
+# Points of the surface that is placed: in the fine rounds, and in both halves of the rough ones
+N_POINTS, N_ROUGH = 1200, (120, 240)
 N_WHOLE = 6000, 1200  # of the whole; denser, since a gap ends at the nearest point
 NORMAL_WEIGHT = 0.15  # length of a normal beside a place
 N_TURNS = 32  # random ones, besides the four that align the principal axes
@@ -34,6 +35,10 @@ N_KEPT, N_REFINED = 126, 10  # of 504 starts: after half of the rough rounds, an
 # Distances at which a pair counts a quarter, from the first round to the last
 ROUGH_REACH = np.geomspace(0.6, 0.2, 10)
 FINE_REACH = np.geomspace(0.2, 0.05, 40)
+N_EARLY, N_LAST = 10, 3  # fine rounds of all places, and how many of these the later rounds refine
+# Share by which partners in the first rounds may be farther than the nearest point: half of the time
+SLACK = 0.5
+LEAF = 32  # points in a leaf of the tree: with six coordinates a sixth faster than 16
 ON_SURFACE = 0.1
 # The gap of a surface, as a share of that of its mirror image, below which it is no mirror image, or
 # the other way round. On the tuning half of experiments/ch7_collection, skulls of others, whole or
@@ -125,7 +130,8 @@ def align_surfaces(
     Points of the surface are paired with the nearest ones of the whole that face the same way, and
     the similarity of least weighted squares moves them there, again and again (iterated closest
     points: Besl and McKay 1992; here with sizes and with weights against what has no partner). It
-    starts from many turns, places and sizes; the ten with the smallest gaps are refined.
+    starts from many turns, places and sizes; the ten with the smallest gaps are refined, the best
+    three of them to the end.
 
     Parameters
     ----------
@@ -166,8 +172,7 @@ def align_surfaces(
     """
     ours, our_middle, our_size = _points_in_own_size(as_mesh(surface, "surface"), N_POINTS)
     theirs, middle, size = _points_in_own_size(as_mesh(whole, "whole"), N_WHOLE[0])
-    tree, rough_tree = cKDTree(theirs), cKDTree(theirs[:: N_WHOLE[0] // N_WHOLE[1]])
-    n = N_POINTS // N_ROUGH
+    tree, rough_tree = cKDTree(theirs, LEAF), cKDTree(theirs[:: N_WHOLE[0] // N_WHOLE[1]], LEAF)
 
     def search(points: Float[np.ndarray, "k 6"]) -> _Places:
         """Return the best place of points with normals."""
@@ -177,9 +182,15 @@ def align_surfaces(
         sizes = np.array(SIZES)[grid[2]]
         starts = _Places(sizes, turns[grid[0]], offsets[grid[1]], np.zeros(len(sizes)))
         half = len(ROUGH_REACH) // 2
-        starts = _refine(points[::n], rough_tree, starts, ROUGH_REACH[:half]).best(N_KEPT)
-        starts = _refine(points[::n], rough_tree, starts, ROUGH_REACH[half:]).best(N_REFINED)
-        return _refine(points, tree, starts, FINE_REACH).best(1)
+        few, some = (points[:: N_POINTS // number] for number in N_ROUGH)
+        starts = _refine(few, rough_tree, starts, ROUGH_REACH[:half], SLACK).best(N_KEPT)
+        starts = _refine(some, rough_tree, starts, ROUGH_REACH[half:]).best(N_REFINED)
+        return settle(points, starts)
+
+    def settle(points: Float[np.ndarray, "k 6"], places: _Places) -> _Places:
+        """Refine places, the best ones of them to the end, and return the best."""
+        places = _refine(points, tree, places, FINE_REACH[:N_EARLY]).best(N_LAST)
+        return _refine(points, tree, places, FINE_REACH[N_EARLY:]).best(1)
 
     image = ours @ np.kron(np.eye(2), MIRROR)  # places and normals
     if mirrored is not None:
@@ -191,7 +202,7 @@ def align_surfaces(
         axes = np.linalg.svd(theirs[:, :3], full_matrices=False)[2]
         planes = np.eye(3) - 2 * axes[:, :, None] * axes[:, None]
         upright, reflected = (
-            own.joined(_refine(points, tree, other.mirrored(planes), FINE_REACH)).best(1)
+            own.joined(settle(points, other.mirrored(planes))).best(1)
             for points, own, other in ((ours, upright, reflected), (image, reflected, upright))
         )
         gaps = float(upright.gaps[0]), float(reflected.gaps[0])
@@ -275,9 +286,16 @@ def _turns(
 
 
 def _refine(
-    points: Float[np.ndarray, "k 6"], tree: cKDTree, places: _Places, reaches: np.ndarray
+    points: Float[np.ndarray, "k 6"],
+    tree: cKDTree,
+    places: _Places,
+    reaches: np.ndarray,
+    slack: float = 0.0,
 ) -> _Places:
-    """Move points from each place to their nearest partners, with an ever shorter reach."""
+    """Move points from each place to their nearest partners, with an ever shorter reach.
+
+    A partner may be farther than the nearest point, by the share `slack`.
+    """
     ours, normals = points[:, :3], points[:, 3:]
     scales, rotations, translations = places.scales, places.rotations, places.translations
 
@@ -285,7 +303,7 @@ def _refine(
         turned = ours @ rotations.transpose(0, 2, 1)
         moved = scales[:, None, None] * turned + translations[:, None]
         facing = normals @ rotations.transpose(0, 2, 1)
-        distances, partners = tree.query(np.concatenate([moved, facing], axis=2))
+        distances, partners = tree.query(np.concatenate([moved, facing], axis=2), eps=slack)
         return distances, tree.data[partners, :3]
 
     for reach in reaches:
