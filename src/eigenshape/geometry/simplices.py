@@ -35,7 +35,7 @@ def scaled_corners(mesh: Mesh) -> tuple[Float[np.ndarray, "s corners d"], float]
     The corners are not translated. So measurements between them depend on these corners only, to
     the last digit, and not on the order of the vertices or on unreferenced ones.
     """
-    corners = mesh.points[mesh.simplices]
+    corners = np.take(mesh.points, mesh.simplices, axis=0)
     scale = _size(corners)
     corners /= scale
     return corners, scale
@@ -107,7 +107,13 @@ def barycentric_gradients(
     would have the squared condition number.
     """
     basis, triangles = triangular_sides(corners)
-    inner = np.linalg.inv(triangles)
+    # The inverse by back substitution: np.linalg.inv factors each of the many small matrices.
+    inner = np.zeros_like(triangles)
+    for j in range(triangles.shape[1]):
+        inner[:, j, j] = 1 / triangles[:, j, j]
+        for i in reversed(range(j)):
+            beyond = np.einsum("sk,sk->s", triangles[:, i, i + 1 :], inner[:, i + 1 :, j])
+            inner[:, i, j] = -beyond * inner[:, i, i]
     gradients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
     return basis, triangles, gradients
 
