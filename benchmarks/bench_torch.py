@@ -41,8 +41,8 @@ DATA = Path(
 )
 PACKAGES = ["eigenshape", "torch", "torch_geometric", "numpy", "scipy", "numba"]
 COLUMNS = ("what", "case", "ours", "beside it", "")
-# Graphs that are encoded, in so many turns with the peer.
-N_GRAPHS, TURNS = 100_000, 10
+# Turns in which graphs are encoded, by us and by the peer.
+TURNS = 10
 HARMS = (loose_vertices, slivers, collapsed_faces, duplicate_faces, flipped_faces, soup)
 
 
@@ -50,6 +50,7 @@ def main() -> None:
     """Measure all groups, or one."""
     parser = options_of(__doc__)
     parser.add_argument("--only", choices=GROUPS, action="append")
+    parser.add_argument("--graphs", type=int, default=100_000, help="that are encoded")
     options = parser.parse_args()
     report = Report(PACKAGES, options, COLUMNS, lambda row: row["cells"])
     os.environ |= dict.fromkeys(THREADS, "1")
@@ -59,16 +60,17 @@ def main() -> None:
             os.environ["MALLOC_MMAP_THRESHOLD_"] = "65536"
         # Encodings start processes themselves.
         run = measure if name == "encodings" else partial(in_process, measure)
-        for row in run(name, options.quick, options.repeats)["rows"]:
+        count = options.graphs if name == "encodings" else options.repeats
+        for row in run(name, options.quick, count)["rows"]:
             report.add(row)
         os.environ.pop("MALLOC_MMAP_THRESHOLD_", None)
 
 
-def measure(name: str, quick: bool, repeats: int) -> Row:
-    """Return the rows of a group."""
+def measure(name: str, quick: bool, count: int) -> Row:
+    """Return the rows of a group; the count is that of repeats, or of graphs."""
     torch.set_num_threads(1)
     warnings.simplefilter("ignore")
-    return {"rows": list(GROUPS[name](quick, repeats))}
+    return {"rows": list(GROUPS[name](quick, count))}
 
 
 def cpu_seconds(call: Callable[[], object], repeats: int) -> float:
@@ -344,12 +346,12 @@ def fit_gradients(vertices: np.ndarray, faces: np.ndarray, L: sp.coo_matrix) -> 
     return sp.csr_array((entries, (rows, columns)), shape=(len(vertices),) * 2)
 
 
-def encodings(quick: bool, _repeats: int) -> Iterator[Row]:
+def encodings(quick: bool, count: int) -> Iterator[Row]:
     """Yield the encodings of many small graphs, beside SciPy's dense solver in a pool."""
     from torch_geometric.data import Batch, Data  # noqa: PLC0415 - takes seconds
     from torch_geometric.transforms import AddLaplacianEigenvectorPE  # noqa: PLC0415
 
-    n_graphs, generator = (300 if quick else N_GRAPHS), np.random.default_rng(0)
+    n_graphs, generator = (300 if quick else count), np.random.default_rng(0)
     sizes = generator.integers(30, 61, n_graphs)
     edges = [random_edges(n, generator) for n in sizes.tolist()]
     graphs = [

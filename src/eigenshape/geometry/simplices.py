@@ -35,7 +35,7 @@ def scaled_corners(mesh: Mesh) -> tuple[Float[np.ndarray, "s corners d"], float]
     The corners are not translated. So measurements between them depend on these corners only, to
     the last digit, and not on the order of the vertices or on unreferenced ones.
     """
-    corners = mesh.points[mesh.simplices]
+    corners = np.take(mesh.points, mesh.simplices, axis=0)
     scale = _size(corners)
     corners /= scale
     return corners, scale

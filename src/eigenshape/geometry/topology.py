@@ -101,8 +101,10 @@ def unique_edges(
     one: Int[np.ndarray, "..."], two: Int[np.ndarray, "..."], n: int
 ) -> Int[np.ndarray, "e 2"]:
     """Return pairs of n points without duplicates, the lower first, in lexicographic order."""
-    keys = np.unique(np.minimum(one, two) * n + np.maximum(one, two))
-    return np.column_stack(np.divmod(keys, n))
+    # np.unique hashes integers, which takes several times as long as sorting them.
+    keys = np.sort((np.minimum(one, two) * n + np.maximum(one, two)).ravel())
+    is_new = np.append(True, keys[1:] != keys[:-1])[: len(keys)]
+    return np.column_stack(np.divmod(keys[is_new], n))
 
 
 def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:

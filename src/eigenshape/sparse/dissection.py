@@ -15,6 +15,7 @@ from eigenshape.sparse.dissection_loops import (
     LEAF,
     WORD,
     breadth_first,
+    cheapest_cut,
     count_cuts,
     order_leaf,
     smooth_keys,
@@ -180,20 +181,13 @@ class _Dissection:
             latest = one[points]
             for earlier in distances:
                 key[points] = FINE * (earlier - latest)
-                smooth_keys(*graph, points, owner, name, key, one)
-                low, high = key[points].min(), key[points].max()
+                low, high = smooth_keys(*graph, points, owner, name, key, one)
                 counts = np.zeros((3, high - low + 2), dtype=np.int64)
                 n_joined = count_cuts(*graph, points, owner, name, key, low, *counts)
-                # The cheapest cut: the points on it, over those on its smaller side
-                sums = counts.cumsum(axis=1)
-                smaller = np.minimum(sums[0], sums[0, -1] - sums[0])
-                costs = np.full((len(smaller), 2), np.inf)
-                np.divide(sums[1:].T + 1, smaller[:, None], out=costs, where=smaller[:, None] > 0)
-                cut_at, from_below = divmod(int(costs.argmin()), 2)
-                if n_before == 1 or costs.min() < lowest:
-                    lowest = costs.min()
-                    level = low + cut_at
-                    take_sides(*graph, points, owner, name, key, level, not from_below, side)
+                cut_at, from_above, cost = cheapest_cut(size, *counts)
+                if n_before == 1 or cost < lowest:
+                    lowest = cost
+                    take_sides(*graph, points, owner, name, key, low + cut_at, from_above, side)
             distances.append(latest)
             n_cut = np.count_nonzero(side == CUT)
             solid = solid or bool(n_cut**2 > self.solid_cut * size)

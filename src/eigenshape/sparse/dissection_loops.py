@@ -4,6 +4,8 @@ The points of a segment are those whose `owner` is its name. The caller allocate
 scratch: compiling an allocation takes longer than compiling a small loop.
 """
 
+import numpy as np
+
 from eigenshape._compile import njit
 
 LEAF = 160  # most points of a segment that is ordered by minimum degree
@@ -38,7 +40,10 @@ def breadth_first(indptr, indices, root, owner, name, distance, queue):
 
 @njit
 def smooth_keys(indptr, indices, segment, owner, name, key, smoothed):
-    """Smooth the keys within a segment, which shortens cuts. `smoothed` is scratch."""
+    """Smooth the keys within a segment, which shortens cuts; return the least and the largest.
+
+    `smoothed` is scratch.
+    """
     for _ in range(SMOOTHINGS):
         for i in range(len(segment)):
             node = segment[i]
@@ -50,6 +55,10 @@ def smooth_keys(indptr, indices, segment, owner, name, key, smoothed):
             smoothed[node] = (key[node] + total // degree) // 2
         for i in range(len(segment)):
             key[segment[i]] = smoothed[segment[i]]
+    low = high = key[segment[0]]
+    for i in range(len(segment)):
+        low, high = min(low, key[segment[i]]), max(high, key[segment[i]])
+    return low, high
 
 
 @njit
@@ -57,8 +66,9 @@ def count_cuts(indptr, indices, segment, owner, name, key, low, below, from_abov
     """Count the points below and on the cut at each value of the keys.
 
     `low` is the smallest key. The last three arrays come filled with 0 and have one entry for each
-    value from `low` to the largest key plus 1. Their cumulative sums are the number of points below
-    the value, and the number of points on the cut if it is taken from above or from below.
+    value from `low` to the largest key plus 1. Their cumulative sums, which `cheapest_cut` takes, are
+    the number of points below the value, and the number of points on the cut if it is taken from
+    above or from below.
 
     Returns the number of entries of the adjacency matrix within the segment.
     """
@@ -79,6 +89,26 @@ def count_cuts(indptr, indices, segment, owner, name, key, low, below, from_abov
         from_below[key[node] - low + 1] += 1
         from_below[most - low + 1] -= 1
     return joined
+
+
+@njit
+def cheapest_cut(size, below, from_above, from_below):
+    """Return the place of the value at which a cut costs least, whether from above, and its cost.
+
+    The cost is the points on the cut, and one more, over those on its smaller side, of `size` in
+    all. The arrays are those of `count_cuts`.
+    """
+    place, above, lowest = 0, True, np.inf
+    under = upper = lower = 0
+    for i in range(len(below)):
+        under += below[i]
+        upper += from_above[i]
+        lower += from_below[i]
+        smaller = min(under, size - under)
+        cost = (min(upper, lower) + 1) / max(smaller, 1)
+        if smaller > 0 and cost < lowest:
+            place, above, lowest = i, upper <= lower, cost
+    return place, above, lowest
 
 
 @njit

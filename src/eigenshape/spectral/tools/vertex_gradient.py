@@ -75,8 +75,10 @@ def fit_gradient(
     """
     scaled, scale = size_one(points)
     tails, heads = edges
-    vectors = scaled[heads] - scaled[tails]
-    x, y = (np.einsum("ei,ei->e", vectors, frames[tails, axis]) for axis in (0, 1))
+    vectors = np.take(scaled, heads, axis=0) - np.take(scaled, tails, axis=0)
+    x, y = (
+        np.einsum("ei,ei->e", vectors, np.take(frames[:, axis], tails, axis=0)) for axis in (0, 1)
+    )
 
     # The inverse of each 2 x 2 matrix of normal equations, or its pseudoinverse if its rank is 1.
     n = len(points)
@@ -89,11 +91,14 @@ def fit_gradient(
     b = np.where(regular, -xy, xy) / divisor
     c = np.where(regular, xx, yy) / divisor
 
+    # Both matrices have one pattern, which is sorted once.
+    rows = np.concatenate([tails, np.arange(n)])
+    columns = np.concatenate([heads, np.arange(n)])
+    numbers = sp.csr_array((np.arange(len(rows)), (rows, columns)), shape=(n, n))
     gradients = []
     for weights in (a[tails] * x + b[tails] * y, b[tails] * x + c[tails] * y):
         own = -np.bincount(tails, weights=weights, minlength=n)
-        rows = np.concatenate([tails, np.arange(n)])
-        columns = np.concatenate([heads, np.arange(n)])
         entries = np.concatenate([weights, own]) / scale
-        gradients.append(sp.csr_array((entries, (rows, columns)), shape=(n, n)))
+        pattern = entries[numbers.data], numbers.indices, numbers.indptr
+        gradients.append(sp.csr_array(pattern, shape=(n, n)))
     return gradients[0], gradients[1]
