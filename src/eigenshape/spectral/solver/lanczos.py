@@ -108,7 +108,9 @@ class ShiftedInverse:
         self, thetas: Float[np.ndarray, " m"]
     ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
         """Return λ = σ + 1/θ, and 1/θ²."""
-        distances = 1 / np.where(thetas == 0, np.finfo(np.float64).tiny, thetas)
+        # A column without direction has θ = 0; even the square of 1/θ stays finite.
+        sizes = np.maximum(np.abs(thetas), np.sqrt(np.finfo(np.float64).tiny))
+        distances = np.copysign(1 / sizes, thetas)
         return self.factor.shift + distances, distances**2
 
 
