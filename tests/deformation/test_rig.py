@@ -1,3 +1,5 @@
+import pickle
+
 import numpy as np
 import pytest
 from bent_shapes import bumpy, lump, lump_rig
@@ -80,6 +82,14 @@ def test_a_pose_keeps_all_but_the_vertices():
     np.testing.assert_array_equal(other.mesh.vertices, 2 * rig.mesh.vertices)
     with pytest.raises(InvalidShapeError, match="vertices must be finite; vertex 0"):
         pose_rig(rig, np.full_like(rig.mesh.vertices, np.nan))
+
+
+def test_the_weights_of_edges_cannot_be_changed():
+    rig = rig_shape(icosphere(1))
+    for edges in (rig.edges, pickle.loads(pickle.dumps(rig)).edges):
+        for array in (edges.weights, edges.starts, edges.others, edges.matrix.data):
+            with pytest.raises(ValueError, match="read-only"):
+                array[0] = 0
 
 
 def test_what_cannot_be_rigged_is_refused():

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import record
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
@@ -34,7 +34,7 @@ PARALLEL_CHANGES = 1e-12
 
 
 @record
-class EdgeWeights:
+class EdgeWeights(ReadOnly):
     """Weights w of the edges in the rigidity energy (Sorkine and Alexa 2007).
 
     The energy of a pose x' of the shape x is Σ_ij w_ij |R_i (x_i - x_j) - (x'_i - x'_j)|² / 2.

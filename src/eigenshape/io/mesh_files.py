@@ -366,12 +366,9 @@ def save_mesh(
         _require_labels(face_labels, mesh, suffix)
     lost: list[str] = []
     has_part_materials = face_labels is not None and "labels" not in known.traits
-    is_tinted = has_part_materials or (face_labels is not None and colors is not None)
-    if is_tinted and held.contents["vertex colors"]:
-        lost.append("vertex colors, since each part has a color of its own")
-    if has_part_materials:
-        if held.contents["materials"]:
-            lost.append("materials and images, since each part has a material of its own")
+    if has_part_materials or (face_labels is not None and colors is not None):
+        lost += _replaced_by_parts(held, has_part_materials)
+    if face_labels is not None and has_part_materials:
         gray = np.full((mesh.n_vertices, 3), 200, np.uint8)
         held = label_attributes(held, face_labels, gray if colors is None else colors)
     elif colors is not None:
@@ -394,6 +391,16 @@ def save_mesh(
     for place, data in files.items():
         replace_file(place, data)
     return f"{path.name} does not keep: {', '.join(dict.fromkeys(lost))}." if lost else ""
+
+
+def _replaced_by_parts(held: MeshAttributes, has_part_materials: bool) -> list[str]:
+    """Name the looks of a file that those of parts take the place of."""
+    replaced = []
+    if held.contents["vertex colors"]:
+        replaced.append("vertex colors, since each part has a color of its own")
+    if has_part_materials and held.contents["materials"]:
+        replaced.append("materials and images, since each part has a material of its own")
+    return replaced
 
 
 def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
