@@ -14,6 +14,7 @@ import eigenshape as es
 from eigenshape._arguments import CONVERSIONS, MAKERS, READERS
 
 TESTS = Path(__file__).resolve().parents[1]
+TORCH_NAMES = (Path(es.__file__).parent / "torch" / "__init__.pyi").read_text()
 
 
 def test_every_public_function_answers_or_names_what_it_was_given(in_turn):
@@ -44,4 +45,7 @@ def test_what_messages_tell_to_call_is_there(call):
         if name not in ("Path", "read_bytes", "csr_array", "numpy.random.default_rng")
     ]
     for name in ours:
+        if name.startswith("eigenshape.torch."):  # torch need not be installed
+            assert f" as {name.rpartition('.')[2]}\n" in TORCH_NAMES
+            continue
         assert attrgetter(name.removeprefix("es.").lstrip("."))(es) is not None

@@ -100,6 +100,8 @@ def test_graphs_that_have_no_laplacian_are_refused(geometric):
         es.InvalidParameterError, match=r"in both directions; \(2, 3\) is there without"
     ):
         encode(graph((0, 1), (1, 0), (2, 3)))
+    with pytest.raises(es.InvalidParameterError, match="must have an edge_index"):
+        encode(geometric.Data(x=torch.ones(3, 1)))
     with pytest.raises(es.InvalidParameterError, match="n_groups must be at least 1"):
         et.ProjectorEncoding(0)
 

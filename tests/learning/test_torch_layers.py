@@ -68,6 +68,19 @@ def test_a_fitted_map_is_the_minimum():
     torch.testing.assert_close(slope, torch.zeros(8, 8).double(), atol=1e-9, rtol=0)
 
 
+@pytest.mark.parametrize("kind", MAPS)
+def test_features_of_a_network_meet_spectra_of_double_precision(kind):
+    single, double = (
+        MAPS[kind](*bases, *(features(seed).to(dtype) for seed in (0, 1)))
+        for bases, dtype in ((SHAPES, torch.float64), (SPECTRA, torch.float32))
+    )
+    assert (single.dtype, double.dtype) == (torch.float32, torch.float64)
+    expected = MAPS[kind](*SPECTRA, features(0), features(1))
+    torch.testing.assert_close(double, expected, atol=1e-4, rtol=0)
+    mixed = MAPS[kind](SPECTRA[0], SHAPES[1], features(0).numpy(), features(1).float())
+    assert mixed.dtype in (torch.float32, torch.float64)
+
+
 def test_a_hard_correspondence_is_a_permutation():
     features = torch.eye(len(HORSE.vertices), dtype=torch.float64)
     order = np.random.default_rng(0).permutation(len(features))
@@ -101,6 +114,42 @@ def test_a_hard_correspondence_is_a_permutation():
                 [SHAPES[0], et.shape_tensors(BIPED, es.spectral.operator_bundle(BIPED, 3))]
             ),
             r"one number of eigenpairs; the numbers are \[3, 12\]",
+        ),
+        (
+            lambda: et.coefficients(SPECTRA[0], torch.ones(500)),
+            r"one row for each of the 500 points; the shape is \(500,\)",
+        ),
+        (
+            lambda: et.map_from_features(*SPECTRA, features(0)[:9], features(1)),
+            r"each of the 500 points; the shape is \(9, 12\)",
+        ),
+        (
+            lambda: et.coefficients.__wrapped__(BUNDLES[0], features(0)),
+            r"an OperatorBundle. Pass et.solve_spectrum\(vertices, faces, k\)",
+        ),
+        (
+            lambda: et.map_penalties(torch.eye(8), torch.eye(7), *SPECTRA),
+            r"inverse must have shape \(8, 8\).*the shape is \(7, 7\)",
+        ),
+        (
+            lambda: et.spectral_loss(SPECTRA[0], [0.0, torch.nan]),
+            "finite numbers in one row; .* 1 are not finite",
+        ),
+        (lambda: et.move_shape(SHAPES[0], torch.ones(3, 3)), "RᵀR = I and determinant 1"),
+        (lambda: et.move_shape(SHAPES[0], -torch.eye(3)), "RᵀR = I and determinant 1"),
+        (
+            lambda: et.DiffusionNetBlock(3)(torch.ones(9, 3), BUNDLES[0]),
+            "one row for each of the 500 points; there are 9 rows",
+        ),
+        (
+            lambda: et.DiffusionNetBlock.forward.__wrapped__(None, torch.ones(500, 3), HORSE),
+            "the value is a TriangleMesh. Pass eigenshape.torch.shape_tensors",
+        ),
+        (
+            lambda: et.heat_kernel_signature.__wrapped__(
+                es.solve_spectrum(es.cotangent_laplacian(HORSE), 3), 1
+            ),
+            r"the value is a Spectrum. Pass eigenshape.torch.solve_spectrum\(",
         ),
     ],
 )

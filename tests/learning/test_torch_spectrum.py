@@ -292,6 +292,21 @@ def test_bad_input_is_refused_as_in_the_library():
         et.solve_spectrum(es.icosphere(1).vertices, es.icosphere(1).faces, 43)
     with pytest.raises(es.InvalidParameterError, match="must be a sparse COO tensor"):
         et.solve_operator(torch.eye(3), torch.ones(3), 2)
+    ball = es.icosphere(1)
+    with pytest.raises(es.InvalidParameterError, match=r"a TriangleMesh. Pass mesh.vertices and"):
+        et.solve_spectrum(ball, ball.faces, 3)
+    for faces in (None, ball.faces + 0.5):
+        with pytest.raises(es.InvalidShapeError, match="faces must be whole numbers"):
+            et.solve_spectrum(ball.vertices, faces, 3)
+
+
+def test_values_print_in_one_line():
+    ball = es.icosphere(1)
+    spectrum = et.solve_spectrum(ball.vertices, ball.faces, 4)
+    assert repr(spectrum) == "TensorSpectrum(4 eigenpairs in 2 groups on 42 points)"
+    shape = et.shape_tensors(ball, es.spectral.operator_bundle(ball, 4))
+    assert repr(shape) == "ShapeTensors(42 points, 4 eigenpairs)"
+    assert repr(et.join_shapes([shape] * 2)) == "ShapeTensors(2 shapes, 84 points, 4 eigenpairs)"
 
 
 def test_arrays_come_in_by_dlpack_without_a_copy():

@@ -5,8 +5,9 @@ from typing import Any, Literal
 import torch
 from torch import Tensor, nn
 
-from eigenshape._arguments import require_choice
+from eigenshape._arguments import require_choice, require_type
 from eigenshape._arrays import whole_number
+from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape.spectral.tools.bundle import OperatorBundle
 from eigenshape.torch.shapes import ShapeTensors, bundle_tensors
@@ -139,8 +140,13 @@ class DiffusionNet(nn.Module):  # type: ignore[misc]
 
 def _as_tensors(shape: Any, values: Tensor) -> ShapeTensors:
     """Return the operators of a shape as tensors of the values' precision and device."""
-    if not isinstance(shape, OperatorBundle):
+    require_type(shape, ShapeTensors | OperatorBundle, "shape")
+    size = len(shape.mass)
+    if len(values) != size:
+        raise InvalidParameterError(
+            f"Values must have one row for each of the {size} points; there are {len(values)} rows."
+        )
+    if isinstance(shape, ShapeTensors):
         return shape
     operators = bundle_tensors(shape, values)
-    size = len(operators["mass"])
     return ShapeTensors(values.new_empty(size, 0), **operators, sizes=(size,))

@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
+from eigenshape._arguments import describe_value
 from eigenshape._arrays import whole_number
 from eigenshape._errors import ConvergenceError, InvalidParameterError, MissingExtraError
 from eigenshape._threads import map_in_threads
@@ -47,7 +48,7 @@ class ProjectorEncoding(BaseTransform):  # type: ignore[misc]
     Raises
     ------
     InvalidParameterError
-        If a graph is directed or a node has an edge to itself.
+        If a graph is directed, a node has an edge to itself, or there is no `edge_index`.
     ConvergenceError
         If a residual is too large.
 
@@ -70,6 +71,11 @@ class ProjectorEncoding(BaseTransform):  # type: ignore[misc]
 
     def forward(self, data: Any) -> Any:
         """Return the graph or batch with its encodings."""
+        if getattr(data, "edge_index", None) is None:
+            raise InvalidParameterError(
+                "A graph must have an edge_index, as torch_geometric.data.Data holds it; the value is "
+                f"{describe_value(data)}, which has none."
+            )
         n = int(data.num_nodes)
         ends = [0, n] if getattr(data, "ptr", None) is None else data.ptr.tolist()
         edges = data.edge_index.cpu().numpy()

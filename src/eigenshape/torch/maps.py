@@ -1,12 +1,15 @@
 """Functional maps as layers, and losses on maps and spectra."""
 
+from typing import Any
+
 import torch
 from torch import Tensor
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import positive_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.spectral.spectrum import NULL
+from eigenshape.torch.operators import as_tensor
 from eigenshape.torch.shapes import ShapeTensors
 from eigenshape.torch.spectrum import TensorSpectrum
 
@@ -15,17 +18,23 @@ COMMUTING = 1e-3
 Basis = TensorSpectrum | ShapeTensors
 
 
-def coefficients(basis: Basis, functions: Tensor) -> Tensor:
+def coefficients(basis: Basis, functions: Any) -> Tensor:
     """Return the coefficients ΦᵀB f of functions, (k, q), in the eigenvectors of a shape.
 
     Parameters
     ----------
     basis : TensorSpectrum or ShapeTensors
     functions : (n, q) tensor
+        Taken over to the precision of the basis, as features of networks have single precision.
 
     Returns
     -------
     (k, q) tensor
+
+    Raises
+    ------
+    InvalidParameterError
+        If the functions have another shape, or the basis is neither of the two.
 
     Examples
     --------
@@ -35,15 +44,37 @@ def coefficients(basis: Basis, functions: Tensor) -> Tensor:
     >>> et.coefficients(spectrum, torch.tensor(ball.vertices)).shape
     torch.Size([4, 3])
     """
-    weighted = basis.mass[:, None] * functions if basis.mass.ndim == 1 else basis.mass @ functions
+    values = _on_points(basis, functions, "functions")
+    weighted = basis.mass[:, None] * values if basis.mass.ndim == 1 else basis.mass @ values
     return basis.eigenvectors.T @ weighted
+
+
+def _on_points(basis: Any, functions: Any, name: str) -> Tensor:
+    """Return functions on the points of a shape in the precision of its basis.
+
+    Raise an InvalidParameterError if they are not one row for each point.
+    """
+    if not isinstance(basis, Basis):
+        raise InvalidParameterError(
+            "A basis must be a TensorSpectrum or ShapeTensors; the value is "
+            f"{describe_value(basis)}. Pass et.solve_spectrum(vertices, faces, k) or "
+            "et.shape_tensors(mesh, bundle)."
+        )
+    values = as_tensor(functions).to(basis.eigenvectors)
+    n = len(basis.eigenvectors)
+    if values.ndim != 2 or len(values) != n:
+        raise InvalidParameterError(
+            f"{name} must have shape (n, q), one row for each of the {n} points; the shape is "
+            f"{tuple(values.shape)}."
+        )
+    return values
 
 
 def functional_map(
     source: Basis,
     target: Basis,
-    features: Tensor,
-    target_features: Tensor,
+    features: Any,
+    target_features: Any,
     *,
     commuting: float = COMMUTING,
 ) -> Tensor:
@@ -71,7 +102,8 @@ def functional_map(
     Raises
     ------
     InvalidParameterError
-        If the numbers of features differ, or `commuting` is not positive.
+        If the numbers of features differ or are not of these points, or `commuting` is not
+        positive.
 
     Examples
     --------
@@ -86,29 +118,29 @@ def functional_map(
     True
     """
     weight = positive_number(commuting, "commuting")
-    if features.shape[1] != target_features.shape[1]:
-        raise InvalidParameterError(
-            "Both shapes must have as many features; there are "
-            f"{features.shape[1]} and {target_features.shape[1]}."
-        )
     ours, theirs = coefficients(source, features), coefficients(target, target_features)
+    theirs = theirs.to(ours)
+    q, columns = ours.shape[1], theirs.shape[1]
+    if q != columns:
+        raise InvalidParameterError(
+            f"Both shapes must have as many features; there are {q} and {columns}."
+        )
     penalties = weight * _commutators(source, target) ** 2
-    q = features.shape[1]
     systems = (ours @ ours.T) / q + torch.diag_embed(penalties)
     return torch.linalg.solve(systems, (theirs @ ours.T) / q)
 
 
 def _commutators(source: Basis, target: Basis) -> Tensor:
     """Return (λ'_i - λ_j) / λ_max."""
-    largest = torch.maximum(source.eigenvalues[-1], target.eigenvalues[-1]).detach()
-    return (target.eigenvalues[:, None] - source.eigenvalues) / largest
+    own, other = source.eigenvalues, target.eigenvalues.to(source.eigenvalues)
+    return (other[:, None] - own) / torch.maximum(own[-1], other[-1]).detach()
 
 
 def map_from_features(
     source: Basis,
     target: Basis,
-    features: Tensor,
-    target_features: Tensor,
+    features: Any,
+    target_features: Any,
     *,
     temperature: float = 0.07,
 ) -> Tensor:
@@ -132,7 +164,7 @@ def map_from_features(
     Raises
     ------
     InvalidParameterError
-        If the temperature is not positive.
+        If the temperature is not positive, or features are not of these points.
 
     Examples
     --------
@@ -145,9 +177,10 @@ def map_from_features(
     """
     softness = positive_number(temperature, "temperature")
     ours, theirs = (
-        torch.nn.functional.normalize(each, dim=1) for each in (features, target_features)
+        torch.nn.functional.normalize(_on_points(basis, each, "features"), dim=1)
+        for basis, each in ((source, features), (target, target_features))
     )
-    shares = torch.softmax(theirs @ ours.T / softness, dim=1)
+    shares = torch.softmax(theirs.to(ours) @ ours.T / softness, dim=1)
     return coefficients(target, shares @ source.eigenvectors)
 
 
@@ -171,6 +204,11 @@ def map_penalties(
     bijectivity, orthogonality, commutativity : tensor
         Three numbers.
 
+    Raises
+    ------
+    InvalidParameterError
+        If a map has not the sizes of the two bases.
+
     Examples
     --------
     >>> import torch, eigenshape as es, eigenshape.torch as et
@@ -185,6 +223,13 @@ def map_penalties(
         return (product - torch.eye(len(product), dtype=product.dtype)).square().mean()
 
     commutators = _commutators(source, target)
+    sizes = tuple(commutators.shape)
+    for name, each, size in (("mapping", mapping, sizes), ("inverse", inverse, sizes[::-1])):
+        if tuple(each.shape) != size:
+            raise InvalidParameterError(
+                f"{name} must have shape {size}, the numbers of eigenvectors of the two shapes; the "
+                f"shape is {tuple(each.shape)}."
+            )
     return (
         off_identity(mapping @ inverse) + off_identity(inverse @ mapping),
         off_identity(mapping.T @ mapping) + off_identity(inverse.T @ inverse),
@@ -192,7 +237,7 @@ def map_penalties(
     )
 
 
-def spectral_loss(spectrum: TensorSpectrum, targets: Tensor) -> Tensor:
+def spectral_loss(spectrum: TensorSpectrum, targets: Any) -> Tensor:
     """Compute the mean of ((λ_i - μ_i) / μ_i)² over the targets μ_i above 0.
 
     A group of eigenvalues that are not separated moves as one: its eigenvalues share the mean of
@@ -212,7 +257,7 @@ def spectral_loss(spectrum: TensorSpectrum, targets: Tensor) -> Tensor:
     Raises
     ------
     InvalidParameterError
-        If there are more targets than eigenvalues, or none above 0.
+        If there are more targets than eigenvalues, none above 0, or one is not finite.
 
     Examples
     --------
@@ -223,7 +268,13 @@ def spectral_loss(spectrum: TensorSpectrum, targets: Tensor) -> Tensor:
     0.0
     """
     require_type(spectrum, TensorSpectrum, "spectrum")
-    positive = targets > NULL * targets[-1]  # a computed 0 may be rounding
+    targets = as_tensor(targets).to(spectrum.eigenvalues)
+    if targets.ndim != 1 or not targets.isfinite().all():
+        raise InvalidParameterError(
+            "targets must be finite numbers in one row; the shape is "
+            f"{tuple(targets.shape)}, and {int((~targets.isfinite()).sum())} are not finite."
+        )
+    positive = targets > NULL * targets[-1:]  # a computed 0 may be rounding
     if len(targets) > len(spectrum.eigenvalues) or not positive.any():
         raise InvalidParameterError(
             "targets must hold eigenvalues above 0, and no more than the spectrum; there are "

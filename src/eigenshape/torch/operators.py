@@ -6,6 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from eigenshape._arguments import describe_value
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import size_one
@@ -18,11 +20,20 @@ def as_tensor(array: Any) -> Tensor:
     """
     if not isinstance(array, Tensor):
         writable = not isinstance(array, np.ndarray) or array.flags.writeable
-        array = (
-            torch.from_dlpack(array)
-            if hasattr(array, "__dlpack__") and writable
-            else torch.tensor(array)
-        )
+        try:
+            array = (
+                torch.from_dlpack(array)
+                if hasattr(array, "__dlpack__") and writable
+                else torch.tensor(array)
+            )
+        except (RuntimeError, TypeError, ValueError) as err:
+            remedy = (
+                " Pass mesh.vertices and mesh.faces." if isinstance(array, TriangleMesh) else ""
+            )
+            raise InvalidParameterError(
+                "Numbers must be in a tensor or an array; the value is "
+                f"{describe_value(array)}.{remedy}"
+            ) from err
     return array.to(torch.float64)
 
 
@@ -39,10 +50,14 @@ def checked_mesh(vertices: Tensor, faces: Tensor) -> TriangleMesh:
 
 
 def as_faces(faces: Any) -> Tensor:
-    """Return faces as a tensor of int64."""
-    if not isinstance(faces, Tensor):
-        faces = torch.tensor(np.asarray(faces))
-    return faces.to(torch.int64)
+    """Return faces as a tensor of int64; raise InvalidShapeError if they are not whole numbers."""
+    numbers = to_numpy(faces) if isinstance(faces, Tensor) else np.asarray(faces)
+    if numbers.dtype.kind not in "iuf" or not np.equal(numbers, np.trunc(numbers)).all():
+        raise InvalidShapeError(
+            f"faces must be whole numbers in a tensor or an array; the value is {describe_value(faces)} "
+            f"of {numbers.dtype}. Pass mesh.faces."
+        )
+    return (faces if isinstance(faces, Tensor) else torch.tensor(numbers)).to(torch.int64)
 
 
 def face_products(vertices: Tensor, faces: Tensor) -> tuple[Tensor, Tensor]:

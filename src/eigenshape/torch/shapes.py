@@ -15,6 +15,10 @@ from eigenshape._arrays import positive_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.spectral.tools.bundle import OperatorBundle, export_bundle
+from eigenshape.torch.operators import as_tensor
+
+# How far RᵀR of a rotation may be from I: some roundings of single precision.
+ROTATION = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +53,11 @@ class ShapeTensors:
     gradient_y: Tensor
     labels: Tensor | None = None
     sizes: tuple[int, ...] = ()
+
+    def __repr__(self) -> str:
+        pairs, count = self.eigenvectors.shape[1], len(self.sizes)
+        shapes = f"{count} shapes, " if count > 1 else ""
+        return f"ShapeTensors({shapes}{len(self.points)} points, {pairs} eigenpairs)"
 
     def to(self, place: Any) -> ShapeTensors:
         """Return the shape on another device, or with numbers of another precision."""
@@ -179,7 +188,7 @@ def move_shape(shape: ShapeTensors, rotation: Tensor, scale: float = 1.0) -> Sha
     ----------
     shape : ShapeTensors
     rotation : (3, 3) tensor
-        R.
+        R, with RᵀR = I and determinant 1.
     scale : float
         s > 0.
 
@@ -190,7 +199,8 @@ def move_shape(shape: ShapeTensors, rotation: Tensor, scale: float = 1.0) -> Sha
     Raises
     ------
     InvalidParameterError
-        If the scale is not positive.
+        If the scale is not positive, or the matrix is not a rotation: the operators would not be
+        those of the moved shape.
 
     Examples
     --------
@@ -202,7 +212,12 @@ def move_shape(shape: ShapeTensors, rotation: Tensor, scale: float = 1.0) -> Sha
     0.25
     """
     s = positive_number(scale, "scale")
-    R = rotation.to(shape.points)
+    R = as_tensor(rotation).to(shape.points)
+    if R.shape != (3, 3) or (R.T @ R - torch.eye(3).to(R)).abs().max() > ROTATION or R.det() < 0:
+        raise InvalidParameterError(
+            "rotation must be a 3 x 3 matrix R with RᵀR = I and determinant 1; it is "
+            f"{R.tolist()}. Pass et.random_rotation()."
+        )
     return replace(
         shape,
         points=s * shape.points @ R.T,

@@ -62,6 +62,10 @@ class TensorSpectrum:
     groups: list[slice]
     certificate: Certificate
 
+    def __repr__(self) -> str:
+        n, k = self.eigenvectors.shape
+        return f"TensorSpectrum({k} eigenpairs in {len(self.groups)} groups on {n} points)"
+
 
 def solve_spectrum(vertices: Any, faces: Any, k: Integer) -> TensorSpectrum:
     """Compute the k lowest eigenpairs of the cotangent operator, differentiable in the vertices.
