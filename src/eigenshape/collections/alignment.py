@@ -39,7 +39,7 @@ N_EARLY, N_LAST = 10, 3  # fine rounds of all places, and how many of these the 
 # Share by which partners in the first rounds may be farther than the nearest point: half of the time
 SLACK = 0.5
 LEAF = 32  # points in a leaf of the tree: with six coordinates a sixth faster than 16
-ON_SURFACE = 0.1
+ON_SURFACE = 0.1  # distance at which a point counts half in a gap
 # The gap of a surface, as a share of that of its mirror image, below which it is no mirror image, or
 # the other way round. On the tuning half of experiments/ch7_collection, skulls of others, whole or
 # cut, have 0.98 to 1.03, since their two sides are alike; hands of other individuals 0.55 to 0.67.
