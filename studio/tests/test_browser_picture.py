@@ -13,12 +13,15 @@ from browser import (
     open_page,
     picture,
     place_of,
+    serve_studio,
     vertex_values,
     wait_for_edits,
     wait_until,
     wait_until_still,
 )
 from PIL import Image
+
+import eigenshape as es
 
 pytestmark = pytest.mark.long
 
@@ -219,3 +222,30 @@ def test_axe_finds_nothing_serious_or_moderate(browser, url, dark):
             assert find_faults(page) == []
         page.keyboard.press("?")
         assert find_faults(page) == []
+
+
+def test_a_cortex_is_upright_and_gray_where_its_map_has_no_value(browser, tmp_path):
+    ball = es.icosphere(4)
+    # A left hemisphere, longest along y, as files of brains have it
+    cortex = es.TriangleMesh(ball.vertices * [30, 80, 50] - [35, 0, 0], ball.faces)
+    height = ball.vertices[:, 2]
+    values = np.where(height > 0, np.nan, height)
+    es.io.write_fields(cortex, tmp_path / "lh.height.gii", {"height": values})
+    with (
+        serve_studio(tmp_path / "lh.height.gii") as url,
+        open_page(browser, url) as page,
+    ):
+        wait_until_still(page)
+        find(page, "tab-shape").click()
+        find(page, "values").select_option("height")
+        wait_until_still(page)
+        seen = picture(page).astype(int)
+    rows, columns = np.nonzero(seen[..., 3] == 255)
+    assert np.ptp(columns) > 1.4 * np.ptp(rows)  # from the side
+    # The upper half has no value, and is as wide as the lower one.
+    middle = (columns.min() + columns.max()) // 2
+    spread = np.ptp(seen[..., :3], axis=2)
+    for share, gray in ((0.2, True), (0.35, True), (0.65, False), (0.8, False)):
+        row = int(rows.min() + share * np.ptp(rows))
+        assert seen[row, middle, 3] == 255
+        assert (spread[row, middle] < 3) == gray

@@ -1,6 +1,7 @@
 """eigenshape condense: regions of like heat of many shapes, in one table."""
 
 import csv
+import sys
 
 import numpy as np
 import pytest
@@ -52,3 +53,10 @@ def test_too_few_modes_are_named(shapes, tmp_path):
     assert "9 modes end too early for the time 0.001" in done.stderr
     done = run("condense", shapes, "--times", "soon", "-o", tmp_path / "t.csv", code=2)
     assert "--times takes numbers separated by commas" in done.stderr
+
+
+def test_a_missing_pyarrow_is_named_before_anything_is_read(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.delitem(sys.modules, "pyarrow.parquet", raising=False)
+    done = run("condense", "absent.ply", "--times", "1", "-o", tmp_path / "t.parquet", code=1)
+    assert "pyarrow must be installed" in done.stderr

@@ -18,8 +18,14 @@ import eigenshape as es
 from eigenshape import FileFormatError, InvalidShapeError
 from eigenshape.cli import app
 from eigenshape.features import Parcellation
-from eigenshape.io import read_fields, read_parcellation, write_fields, write_parcellation
-from eigenshape.io.formats.neuro import annotations, cifti, gifti, swc
+from eigenshape.io import (
+    read_fields,
+    read_parcellation,
+    read_volume,
+    write_fields,
+    write_parcellation,
+)
+from eigenshape.io.formats.neuro import annotations, cifti, gifti, nifti, swc
 from eigenshape.io.formats.neuro import freesurfer as fs
 
 CORTICES = Path(str(resources.files("neuromodes") / "data"))
@@ -208,6 +214,7 @@ def test_dense_scalars_of_cifti(tmp_path):
         name: values.tobytes() for name, values in fields.items()
     }
     read = nib.load(path)
+    assert read.nifti_header.get_intent()[0] == "ConnDenseScalar"
     assert (
         np.asarray(read.dataobj).tobytes()
         == np.float32([[0.5, -1, 3, 1, 2], [1, -2, 6, 2, 4]]).tobytes()
@@ -389,6 +396,93 @@ def test_a_skeleton_is_a_graph(tmp_path):
     assert shape.simplices.tolist() == [[1, 0], [2, 1], [3, 1]]
     assert shape.points.tolist() == [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]]
     assert es.solve_spectrum(es.cotangent_laplacian(shape), 2).eigenvalues[0] < 1e-9
+
+
+# Volumes.
+
+
+@pytest.mark.parametrize("name", ["a.mgz", "a.mgh", "a.nii", "a.nii.gz"])
+@pytest.mark.parametrize("kind", [np.uint8, np.int16, np.int32, np.float32])
+def test_a_volume_is_what_nibabel_reads(tmp_path, name, kind):
+    values = np.arange(24).reshape(2, 3, 4).astype(kind)
+    to_space = np.array([[-1, 0, 0, 3], [0, 0, 2, -4], [0, -0.5, 0, 5], [0, 0, 0, 1]], float)
+    image = nib.MGHImage if ".mg" in name else nib.Nifti1Image
+    image(values, to_space).to_filename(tmp_path / name)
+    found, place = read_volume(tmp_path / name)
+    assert found.dtype == kind
+    assert np.array_equal(found, values)
+    assert np.array_equal(place, to_space)
+
+
+def test_volumes_of_nibabel(tmp_path):
+    folder = Path(nib.__file__).parent / "tests" / "data"
+    for name in ("standard.nii.gz", "anatomical.nii", "reoriented_anat_moved.nii"):
+        found, place = read_volume(folder / name)
+        image = nib.load(folder / name)
+        assert np.array_equal(found, np.asanyarray(image.dataobj))
+        assert np.array_equal(place, image.affine)
+    for name, fact in (
+        ("test.mgz", "3 x 4 x 5 x 2 were found"),
+        ("functional.nii", r"it has \[17, 21, 3, 20\]"),
+        ("example_nifti2.nii.gz", "it has"),
+    ):
+        with pytest.raises(FileFormatError, match=f"one frame; .*{fact}"):
+            read_volume(folder / name)
+    nib.Nifti2Image(np.ones((2, 3, 4), np.int16), np.eye(4)).to_filename(tmp_path / "two.nii")
+    assert read_volume(tmp_path / "two.nii")[0].shape == (2, 3, 4)
+    # A volume of one number a voxel that has an axis of length one too many
+    nib.Nifti1Image(np.ones((2, 3, 4, 1), np.int16), np.eye(4)).to_filename(tmp_path / "b.nii")
+    assert read_volume(tmp_path / "b.nii")[0].shape == (2, 3, 4)
+
+
+def test_a_volume_that_does_not_say_where_it_lies(tmp_path):
+    nib.MGHImage(np.zeros((2, 4, 6), np.uint8), None).to_filename(tmp_path / "a.mgh")
+    data = bytearray((tmp_path / "a.mgh").read_bytes())
+    data[28:30] = b"\0\0"
+    (tmp_path / "a.mgh").write_bytes(data)
+    # The right is where x decreases, down where y increases, the front where z increases.
+    expected = [[-1, 0, 0, 1], [0, 0, 1, -3], [0, -1, 0, 2], [0, 0, 0, 1]]
+    assert np.array_equal(read_volume(tmp_path / "a.mgh")[1], expected)
+
+
+def test_a_head_of_few_labels_packs_well_and_is_read(tmp_path):
+    nib.MGHImage(np.zeros((256, 256, 200), np.int32), np.eye(4)).to_filename(tmp_path / "a.mgz")
+    assert (tmp_path / "a.mgz").stat().st_size < 300_000
+    assert read_volume(tmp_path / "a.mgz")[0].shape == (256, 256, 200)
+
+
+def test_a_volume_is_no_mesh(tmp_path):
+    (tmp_path / "a.nii.gz").write_bytes(b"")
+    with pytest.raises(FileFormatError, match=r"it is '.nii.gz'. es.io.read_volume reads"):
+        es.read_mesh(tmp_path / "a.nii.gz")
+
+
+def volume_errors(data, name, message, tmp_path):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(FileFormatError, match=message):
+        read_volume(tmp_path / name)
+
+
+def test_volumes_that_lie_are_refused(tmp_path):
+    nib.Nifti1Image(np.ones((2, 3, 4), np.int16), np.eye(4)).to_filename(tmp_path / "a.nii")
+    good = (tmp_path / "a.nii").read_bytes()
+    volume_errors(b"abcdef", "b.nii", "must begin with its header", tmp_path)
+    volume_errors(good[:300], "b.nii", "has 300 bytes of one", tmp_path)
+    volume_errors(good[:-1], "b.nii", "must hold a volume; ", tmp_path)
+    large = bytearray(good)
+    large[42:48] = np.full(3, 30000, "<i2").tobytes()
+    volume_errors(bytes(large), "b.nii", "54000000000000 bytes do not fit", tmp_path)
+    volume_errors(gzip.compress(good)[:50], "b.nii.gz", "A NIfTI file must", tmp_path)
+    volume_errors(b"\x1f\x8b" + good, "b.nii.gz", "A packed NIfTI file must be whole", tmp_path)
+    volume_errors(gzip.compress(bytes(large)), "b.nii.gz", "and 256 MiB; it declares", tmp_path)
+    color = np.zeros((2, 3, 4), np.dtype([("R", "u1"), ("G", "u1"), ("B", "u1")]))
+    nib.Nifti1Image(color, np.eye(4)).to_filename(tmp_path / "c.nii")
+    with pytest.raises(FileFormatError, match="one number for each voxel"):
+        read_volume(tmp_path / "c.nii")
+    nib.MGHImage(np.ones((2, 3, 4), np.uint8), np.eye(4)).to_filename(tmp_path / "a.mgh")
+    head = bytearray((tmp_path / "a.mgh").read_bytes())
+    head[78:82] = np.array(np.nan, ">f4").tobytes()
+    volume_errors(bytes(head), "b.mgh", "Places of voxels in an MGH file must be finite", tmp_path)
 
 
 # What is wrong is named.
@@ -642,6 +736,8 @@ def _no_module(name):
     raise ImportError(name)
 
 
+NUMBERS = np.arange(24, dtype=np.int16).reshape(2, 3, 4)
+VOLUMES = [kind(NUMBERS, np.eye(4)).to_bytes() for kind in (nib.MGHImage, nib.Nifti1Image)]
 FILES = {
     "surface": (gifti.parse, SURFACE),
     "maps": (gifti.parse_fields, MAPS),
@@ -655,6 +751,10 @@ FILES = {
     "cifti": (cifti.parse_fields, CIFTI),
     "cifti labels": (lambda data: cifti.parse_parcels(data, ON_THE_LEFT), CIFTI_LABELS),
     "skeleton": (swc.parse, SKELETON),
+    "volume": (fs.parse_volume, VOLUMES[0]),
+    "packed volume": (fs.parse_volume, gzip.compress(VOLUMES[0])),
+    "nifti": (nifti.parse_volume, VOLUMES[1]),
+    "packed nifti": (nifti.parse_volume, gzip.compress(VOLUMES[1])),
 }
 
 

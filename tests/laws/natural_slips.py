@@ -185,6 +185,11 @@ def written_parcels() -> Path:
     return FOLDER / "parcels.annot"
 
 
+def written_volume() -> Path:
+    es.io.write_fields(body(), FOLDER / "volume.mgh", {"height": height()})
+    return FOLDER / "volume.mgh"
+
+
 VALUES: dict[Any, Callable[[], Any]] = {
     es.features.Parcellation: parcels,
     es.compat.lapy.Solver: lambda: es.compat.lapy.Solver(
@@ -362,6 +367,11 @@ NAMED: dict[str, Callable[[], Any]] = {
     "mask_surface.mask": lambda: height() > 0,
     "read_edits.path": written_edits,
     "read_parcellation.path": written_parcels,
+    "read_volume.path": written_volume,
+    "structure_surfaces.labels": lambda: np.full((3, 3, 3), 11),
+    "structure_surfaces.structures": lambda: {"caudate": 11},
+    "to_space": lambda: np.diag([2.0, 2.0, 2.0, 1.0]),
+    "voxel_surface.inside": lambda: np.ones((3, 3, 3)),
     "recover_geometry.eigenvalues": lambda: es.shapes.sphere_eigenvalues(60),
     "region": lambda: HEAD,
     "response": lambda: np.ones_like,

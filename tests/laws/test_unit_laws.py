@@ -21,6 +21,7 @@ from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 
 UNITS = (2.0**-20, 2.0**20)
 TURN = es.Rotation([0, 0, 0], [1, 0, 0], 0.4)
+VOXELS = np.arange(125).reshape(5, 5, 5) % 3 == 1
 
 
 class Shapes:
@@ -251,6 +252,14 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
     "mask_surface": (1, lambda s: geometry.mask_surface(s.mesh, s.f > s.f.mean()).mesh),
     "brain_print": (0, lambda s: es.modes.brain_print({"lh": s.mesh}, 8).values),
     "condense": (2, lambda s: es.features.condense(s.mesh, s.f).areas),
+    "structure_surfaces": (
+        1,
+        lambda s: es.modes.structure_surfaces(VOXELS, np.diag([s.u, s.u, s.u, 1]), {"a": 1})["a"],
+    ),
+    "voxel_surface": (
+        1,
+        lambda s: calculus.voxel_surface(VOXELS, np.diag([s.u, s.u, s.u, 1])),
+    ),
     "parcellate": (
         0,
         lambda s: es.features.parcellate(

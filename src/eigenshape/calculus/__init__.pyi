@@ -36,3 +36,4 @@ from .vector_heat import VectorHeat as VectorHeat
 from .vector_heat import extend_scalar as extend_scalar
 from .vector_heat import prepare_vector_heat as prepare_vector_heat
 from .vector_heat import transport_vectors as transport_vectors
+from .voxels import voxel_surface as voxel_surface

@@ -160,7 +160,7 @@ def condense(
         raise InvalidParameterError(
             f"--times takes numbers separated by commas, such as 1e6,1e7; it is {times!r}."
         )
-    steps.require_output(output, steps.TABLES, "A table")
+    steps.require_table(output)
     work = partial(steps.condense_file, clock, n_modes, tolerance, repair_names(repair))
     items = es.io.find_items(sources)
     tables, failed = {}, {}

@@ -23,3 +23,4 @@ from .shape_files import read_points as read_points
 from .shape_files import read_shape as read_shape
 from .shape_files import write_points as write_points
 from .surface_files import read_surface as read_surface
+from .volumes import read_volume as read_volume

@@ -10,5 +10,6 @@ from .parcels import ParcelTree as ParcelTree
 from .parcels import nodal_parcels as nodal_parcels
 from .prints import BrainPrint as BrainPrint
 from .prints import brain_print as brain_print
+from .structures import structure_surfaces as structure_surfaces
 from .waves import blood_response as blood_response
 from .waves import wave_response as wave_response

@@ -192,7 +192,11 @@ def serve(  # noqa: PLR0913  one for each option of the command
     require_permission(host, "studio", allow_remote=allow_remote)
     share_one_arena()
     first = open_workspace(paths, index)
-    first.analysis.look_from(view, up)
+    # What is not requested is as the file says, if it does.
+    sides = zip((view, up), first.analysis.side, strict=True)
+    first.analysis.look_from(
+        *(known if isinstance(given, str) and given == "auto" else given for given, known in sides)
+    )
     # Who may come from another machine must not see the folders of this one.
     first.folders = None if allow_remote else Folders(Path.cwd())
     listening = _listen(host, port)

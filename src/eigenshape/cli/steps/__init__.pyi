@@ -3,9 +3,9 @@ from .collecting import find_landmarks as find_landmarks
 from .collecting import landmarks_outside as landmarks_outside
 from .collecting import unsure_sides as unsure_sides
 from .collection_report import write_collection_report as write_collection_report
-from .condensing import TABLES as TABLES
 from .condensing import condense_file as condense_file
 from .condensing import join_tables as join_tables
+from .condensing import require_table as require_table
 from .condensing import run_in_workers as run_in_workers
 from .condensing import write_table as write_table
 from .facts import shape_facts as shape_facts

@@ -13,6 +13,7 @@ from eigenshape._extras import import_extra
 from eigenshape._files import replace_file
 from eigenshape._workers import run_in_workers
 from eigenshape.cli.inputs import drops_missing
+from eigenshape.cli.steps.writing import require_output
 from eigenshape.features.condensed import condense
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.io import mesh_files
@@ -82,6 +83,13 @@ def join_tables(shapes: Sequence[tuple[str, RegionTable]]) -> Columns:
         "shape": names,
         **{name: np.concatenate([table.columns[name] for _, table in shapes]) for name in first},
     }
+
+
+def require_table(path: Path) -> None:
+    """Raise an error, before anything is computed, if a table cannot be written to the path."""
+    require_output(path, TABLES, "A table")
+    if path.suffix.lower() == ".parquet":
+        import_extra("pyarrow.parquet", "pyarrow")
 
 
 def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:

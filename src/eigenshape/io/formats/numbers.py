@@ -218,12 +218,13 @@ class Cursor:
             )
 
 
-def require_reasonable(size: int, n_bytes: int) -> None:
+def require_reasonable(size: int, n_bytes: int, always: int = ALWAYS) -> None:
     """Raise an error for a declared size that no real file has, before memory is allocated."""
-    most = ALWAYS + MOST_TIMES * n_bytes
+    most = always + MOST_TIMES * n_bytes
     if size > most:
         raise FileFormatError(
-            f"Compressed data must unpack to at most {MOST_TIMES} times the size of its file and 32 MiB; it declares "
+            f"Compressed data must unpack to at most {MOST_TIMES} times the size of its file and "
+            f"{always >> 20} MiB; it declares "
             f"{size} bytes in a file of {n_bytes}. If it is good, save it uncompressed."
         )
 

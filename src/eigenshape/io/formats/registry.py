@@ -27,6 +27,7 @@ Trait = Literal[
     "fields",
     "maps",
     "parcels",
+    "volume",
     "beside",
 ]
 
@@ -56,6 +57,8 @@ class Format:
           an empty dictionary; `format_maps(mesh, of_points, suffix)` writes those of a mesh.
         - "parcels": the file holds a parcellation and no mesh. `parse_parcels(data, mesh)` returns
           it; `format_parcels(mesh, parcellation)` writes that of a mesh.
+        - "volume": the file holds a number for each voxel. `parse_volume(data)` returns them, and
+          the affine map from voxels to space.
         - "colors": colors of vertices can be written.
         - "labels": labels of faces can be written. Other formats with colors get a material for each.
         - "beside": parts of the file lie in its folder, which `parse` takes as well.
@@ -96,8 +99,10 @@ FORMATS = (
     Format(".dtseries.nii", "neuro.cifti", ("maps",)),
     Format(".dlabel.nii", "neuro.cifti", ("maps", "parcels")),
     Format(".curv", "neuro.freesurfer", ("maps",)),
-    Format(".mgh", "neuro.freesurfer", ("maps",)),
-    Format(".mgz", "neuro.freesurfer", ("maps",)),
+    Format(".mgh", "neuro.freesurfer", ("maps", "volume")),
+    Format(".mgz", "neuro.freesurfer", ("maps", "volume")),
+    Format(".nii", "neuro.nifti", ("volume",)),
+    Format(".nii.gz", "neuro.nifti", ("volume",)),
     Format(".annot", "neuro.annotations", ("parcels",)),
     Format(".label", "neuro.annotations", ("parcels",)),
 )
@@ -118,6 +123,7 @@ POINT_FORMATS = suffixes_with("points")
 FIELD_FORMATS = suffixes_with("fields", "maps")
 MAP_FORMATS = suffixes_with("maps")
 PARCEL_FORMATS = suffixes_with("parcels")
+VOLUME_FORMATS = suffixes_with("volume")
 WRITTEN = suffixes_with("text", "binary")
 WRITTEN_CLOUDS = suffixes_with("cloud")
 WITH_MORE = suffixes_with("attributes", "fields")  # than positions and faces
@@ -161,6 +167,7 @@ def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> st
         remedies = {
             MAP_FORMATS: " es.io.read_fields reads the functions in it.",
             PARCEL_FORMATS: " es.io.read_parcellation reads the parcels in it.",
+            VOLUME_FORMATS: " es.io.read_volume reads the volume in it.",
         }
         remedy = next((text for kind, text in remedies.items() if suffix in kind), "")
         raise FileFormatError(

@@ -26,7 +26,7 @@ void main() {
   vec3 turn;
   vec3 place = moved(turn);
 #if COLORING == 1
-  place += swing * value * normal;
+  if (!isnan(value)) place += swing * value * normal; // 0 times no value is no place
 #endif
 #ifdef CLIPPED
   v_place = place;

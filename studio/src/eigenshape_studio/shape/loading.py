@@ -9,8 +9,16 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
+from eigenshape.geometry.repairs.masks import hemisphere_of
+from eigenshape.io.formats.registry import SHAPE_FORMATS, suffix_of
 from eigenshape.plot.camera import Up, View
 from eigenshape_studio.shape.parse import points_in
+from eigenshape_studio.shape.sides import recall_side
+
+# Formats of brains, in which x points to the right of the body, y to the front and z up, and where
+# the viewer of each hemisphere stands: outside. What is none is seen from the front left.
+OF_BRAINS = (".gii", ".surf")
+TOWARDS = {"left": (-1.0, 0.0, 0.0), "right": (1.0, 0.0, 0.0), "": (-1.0, 1.0, 0.6)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +69,10 @@ def load_file(path: str | Path) -> Loaded:
             if _is_field(numbers, mesh.n_vertices)
         }
     fields = check_fields(values, mesh.n_vertices)
-    return Loaded(mesh, attributes, fields, points=points_in(path, found.report))
+    side: tuple[View, Up] = ("auto", "auto")
+    if suffix_of(path, None, SHAPE_FORMATS) in OF_BRAINS and recall_side(mesh) is None:
+        side = (TOWARDS[hemisphere_of(mesh)], "z")
+    return Loaded(mesh, attributes, fields, side, points_in(path, found.report))
 
 
 def check_fields(values: Mapping[str, Any], n_vertices: int) -> dict[str, Field]:

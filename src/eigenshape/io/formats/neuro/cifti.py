@@ -120,6 +120,7 @@ def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) 
     model = axes.BrainModelAxis.from_mask(everywhere, name=f"cortex_{side}")
     labels = (parcellation.labels[None] + 1).astype(np.int32)
     image = nibabel.Cifti2Image(labels, (axes.LabelAxis(["parcels"], [table]), model))
+    image.nifti_header.set_intent("ConnDenseLabel")
     written: bytes = image.to_bytes()
     return written
 
@@ -177,5 +178,6 @@ def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
         columns.append(table[:, kept])
     rows = narrow("functions", np.hstack(columns))
     image = nibabel.Cifti2Image(rows, (axes.ScalarAxis(names[0]), models))
+    image.nifti_header.set_intent("ConnDenseScalar")
     written: bytes = image.to_bytes()
     return written

@@ -4,17 +4,19 @@ import gzip
 import zlib
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Shaped
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.neuro.shared import Arrays, narrow, one_table
-from eigenshape.io.formats.numbers import Cursor, require_reasonable
+from eigenshape.io.formats.neuro.shared import GZIP, VOLUME_SIZE, Arrays, narrow, one_table
+from eigenshape.io.formats.numbers import ALWAYS, Cursor, require_reasonable
 from eigenshape.io.formats.stl import single_precision
 
-SURFACE, CURVATURE, GZIP = b"\xff\xff\xfe", b"\xff\xff\xff", b"\x1f\x8b"  # first bytes
+SURFACE, CURVATURE = b"\xff\xff\xfe", b"\xff\xff\xff"  # first bytes
 MGH_NUMBERS = {0: ">u1", 1: ">i4", 3: ">f4", 4: ">i2"}
 MGH_HEADER = 284  # bytes
+# Sides, axes and center of a volume that does not say where it lies
+UNPLACED = (1, 1, 1, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0)
 MGH_WORD = {"f": 3, "i": 1}
 UNNAMED = "values"
 
@@ -64,17 +66,49 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     return {UNNAMED: values}, {}
 
 
-def _unpack(data: bytes) -> bytes:
+def _unpack(data: bytes, always: int = ALWAYS) -> bytes:
     unpacker = zlib.decompressobj(wbits=31)
     try:
         # The header tells how large the rest must be before that is unpacked.
         head = unpacker.decompress(data, MGH_HEADER)
         size = MGH_HEADER + 4 * int(np.prod(np.frombuffer(head, ">i4", 5)[1:].astype(float)))
-        require_reasonable(size, len(data))
+        require_reasonable(size, len(data), always)
         # Behind the numbers, a little text tells about the scanner.
         return head + unpacker.decompress(unpacker.unconsumed_tail, max(size, 1))
     except (zlib.error, ValueError, OverflowError) as err:
         raise FileFormatError(f"A packed MGH file must be whole; {err}.") from err
+
+
+def parse_volume(data: bytes) -> tuple[Shaped[np.ndarray, "a b c"], Float[np.ndarray, "4 4"]]:
+    """Return the numbers of a volume, and the map from voxels to space.
+
+    Raise FileFormatError if the file is not MGH of one frame, or does not hold what it declares.
+    """
+    unpacked = _unpack(data, VOLUME_SIZE) if data.startswith(GZIP) else data
+    cursor = Cursor(unpacked, "An MGH file")
+    version, *shape, n_frames, kind = cursor.wholes(">i4", 6).tolist()
+    if version != 1 or kind not in MGH_NUMBERS or n_frames != 1 or min(shape) < 1:
+        raise FileFormatError(
+            f"An MGH file of a volume must have one frame; version {version}, type {kind} and "
+            f"{' x '.join(map(str, shape))} x {n_frames} were found."
+        )
+    cursor.place += 4  # a word that means nothing here
+    placed = cursor.take(">i2", 1)[0] > 0
+    numbers = cursor.take(">f4", 15) if placed else np.array(UNPLACED)
+    # Sides of a voxel, then where its axes point, then where the center of the volume lies.
+    sides, axes, center = np.split(numbers.astype(np.float64), [3, 12])
+    to_space = np.eye(4)
+    to_space[:3, :3] = axes.reshape(3, 3).T * sides
+    to_space[:3, 3] = center - to_space[:3, :3] @ (np.array(shape) / 2)
+    if not np.isfinite(to_space).all():
+        raise FileFormatError(
+            f"Places of voxels in an MGH file must be finite; the map is {to_space.tolist()}."
+        )
+    cursor.place = MGH_HEADER
+    values = cursor.take(MGH_NUMBERS[kind], int(np.prod(np.array(shape, dtype=float))))
+    # The first axis is the fastest in the file.
+    values = values.reshape(shape, order="F")
+    return np.ascontiguousarray(values, values.dtype.newbyteorder("=")), to_space
 
 
 def _mgh_values(data: bytes) -> np.ndarray:
@@ -84,7 +118,7 @@ def _mgh_values(data: bytes) -> np.ndarray:
         raise FileFormatError(
             "An MGH file of a surface must have a number for each vertex and frame, "
             f"n x 1 x 1 x frames; version {version}, type {kind} and {n} x {height} x {depth} x "
-            f"{n_frames} were found."
+            f"{n_frames} were found. es.io.read_volume reads volumes."
         )
     cursor.place = MGH_HEADER
     values = cursor.take(MGH_NUMBERS[kind], n * n_frames)

@@ -11,6 +11,10 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.masks import hemisphere_of
 
 Arrays = dict[str, np.ndarray]
+GZIP = b"\x1f\x8b"  # first bytes
+# Bytes that a packed volume may always unpack to: labels of a head, 256 voxels a side in 32 bits,
+# are 64 MiB, and pack 200 times.
+VOLUME_SIZE = 2**28
 NO_PARCEL = "???"  # name of the label 0 in files of Connectome Workbench
 
 # Names of files that name a hemisphere: lh.aparc.annot, sub-01_hemi-L.label.gii, S1.L.aparc.label.gii

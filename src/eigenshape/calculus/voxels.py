@@ -1,0 +1,135 @@
+"""The surface of a region of voxels, such as a structure in a segmented scan."""
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from eigenshape._arrays import finite_rows, real_numbers
+from eigenshape._errors import InvalidParameterError
+from eigenshape._typing import ArrayLike
+from eigenshape.calculus.flows import taubin_smooth
+from eigenshape.calculus.level_sets import level_set
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.solids import split_solids
+
+# Chosen on ellipsoids with half axes of 3 to 24 voxels: with both, areas are within 4 % and
+# eigenvalues within 5 % for the smallest, 1 % and 2 % from half axes of 5 on. Without them the
+# steps between voxels make areas a quarter too large; a wider blur takes volume away.
+BLUR = 0.7  # in sides of a voxel, the standard deviation
+N_SMOOTHING_STEPS = 10
+LEAST_SHARE = 0.05  # of an edge, from its end to the surface: no triangle becomes a needle
+PAD = 4  # voxels around the region; beyond, the blurred region is 0
+CUBE = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+
+
+def voxel_surface(inside: ArrayLike, to_space: ArrayLike | None = None) -> TriangleMesh:
+    """Return the closed, smooth surface around voxels.
+
+    The centers of neighboring voxels are the corners of tetrahedra, and the surface is a level set
+    in these. It is therefore closed and a manifold for any region, which marching cubes do not
+    ensure where voxels touch at edges alone. The region is blurred a little, but each voxel stays
+    on its side; ten steps of Taubin's filter follow.
+
+    Parameters
+    ----------
+    inside : (a, b, c) bool
+        Whether a voxel belongs to the region; numbers 1 and 0 stand for True and False.
+    to_space : (4, 4) float, optional
+        Affine map from indices of voxels to coordinates, as `es.io.read_volume` returns it. By
+        default, coordinates are indices.
+
+    Returns
+    -------
+    TriangleMesh
+        Faces look outward. Cavities and pieces of the region have surfaces of their own.
+
+    Raises
+    ------
+    InvalidParameterError
+        If `inside` is no table of such values in three dimensions, or holds no voxel, or `to_space`
+        is no affine map that can be inverted.
+
+    See Also
+    --------
+    es.modes.structure_surfaces : Surfaces of all structures of a brain.
+    level_set : Level sets of functions on tetrahedra.
+    es.geometry.tetrahedralize : Fill the surface.
+
+    Examples
+    --------
+    A ball of radius 8 has the volume 2145.
+
+    >>> import numpy as np
+    >>> import eigenshape as es
+    >>> x, y, z = np.mgrid[-9:10, -9:10, -9:10]
+    >>> ball = es.calculus.voxel_surface(x**2 + y**2 + z**2 < 64)
+    >>> es.geometry.is_closed(ball), es.geometry.is_manifold(ball)
+    (True, True)
+    >>> round(es.geometry.enclosed_volume(ball), -1)
+    2080.0
+    """
+    given = real_numbers(inside, "inside")
+    region = given.astype(bool)
+    if given.ndim != 3 or not np.array_equal(given, region) or not region.any():
+        raise InvalidParameterError(
+            "inside must be True or False, or 1 or 0, for each voxel of a table of three dimensions, and "
+            f"True for one at least; the shape is {given.shape}, and there are {_first_values(given)}."
+        )
+    affine = as_affine(to_space)
+
+    # Everything happens in the box around the region.
+    places = np.argwhere(region)
+    low, high = places.min(axis=0), places.max(axis=0) + 1
+    box = tuple(slice(start, stop) for start, stop in zip(low, high, strict=True))
+    region = np.pad(region[box], PAD)
+    blurred = gaussian_filter(region.astype(np.float64), BLUR)
+    share = LEAST_SHARE
+    heights = np.where(region, np.maximum(blurred, 0.5 + share), np.minimum(blurred, 0.5 - share))
+
+    # Cubes between the centers of eight voxels, some of which are inside and some are not.
+    corners = np.array(CUBE)
+    shape = np.array(region.shape)
+    stops = [corner + shape - 1 for corner in corners]
+    eight = [
+        region[tuple(slice(start, stop) for start, stop in zip(corner, stops_of, strict=True))]
+        for corner, stops_of in zip(corners, stops, strict=True)
+    ]
+    crossed = np.any(eight, axis=0) & ~np.all(eight, axis=0)
+    cubes = np.argwhere(crossed)[:, None] + corners
+    numbers = np.ravel_multi_index(tuple(np.moveaxis(cubes, 2, 0)), region.shape)
+    used, cells = np.unique(numbers, return_inverse=True)
+    points = np.stack(np.unravel_index(used, region.shape), axis=1) + (low - PAD)
+    solid = split_solids(points.astype(np.float64), cells.reshape(-1, 8))
+
+    # The normals of a level set point to larger values, and those of a surface outward.
+    surface = level_set(solid, -heights.ravel()[used], -0.5).surface()
+    smooth = taubin_smooth(surface, N_SMOOTHING_STEPS)
+    mirrored = np.linalg.det(affine[:3, :3]) < 0
+    faces = surface.faces[:, ::-1] if mirrored else surface.faces
+    return TriangleMesh(smooth.points @ affine[:3, :3].T + affine[:3, 3], faces)
+
+
+def as_affine(to_space: ArrayLike | None) -> np.ndarray:
+    """Return an affine map of space as a matrix, by default that which changes nothing.
+
+    Raise InvalidParameterError if it is no such matrix or cannot be inverted.
+    """
+    if to_space is None:
+        return np.eye(4)
+    matrix = finite_rows(to_space, "to_space", 4)
+    if (
+        matrix.shape != (4, 4)
+        or not np.array_equal(matrix[3], [0, 0, 0, 1])
+        or np.linalg.matrix_rank(matrix[:3, :3]) < 3
+    ):
+        raise InvalidParameterError(
+            "to_space must be an affine map that can be inverted, a matrix of shape (4, 4) whose last row is "
+            f"0, 0, 0, 1; it is {matrix.tolist()} of shape {matrix.shape}."
+        )
+    return matrix
+
+
+def _first_values(values: np.ndarray) -> str:
+    """Return the first different values of a table as text."""
+    different = np.unique(values)
+    ending = ", ..." if len(different) > 3 else ""
+    return "the values " + ", ".join(f"{value:g}" for value in different[:3].astype(float)) + ending
