@@ -183,6 +183,7 @@ def main() -> None:
     parser.add_argument(
         "--limit", type=float, default=TIME_LIMIT, help="seconds after which a verb is given up"
     )
+    parser.set_defaults(repeats=1)  # each verb runs once
     options = parser.parse_args()
     report = Report(["numpy", "scipy"], options, COLUMNS, cells, threads="all threads")
     with tempfile.TemporaryDirectory() as temporary:
