@@ -192,7 +192,7 @@ class Shared:
         es.io.write_fields(self.animal, self.folder / "fields.vtu", {"heat": self.heat})
         self.halves = es.features.Parcellation((self.animal.vertices[:, 1] > 0).astype(int))
         es.io.write_parcellation(self.animal, self.folder / "halves.annot", self.halves)
-        es.io.write_fields(self.animal, self.folder / "heat.mgh", {"heat": self.heat})
+        es.io.write_fields(self.animal, self.folder / "heat.mgh", {"heat": self.heat[:, 0]})
         self.labels = np.arange(1000).reshape(10, 10, 10) % 7
         self.attributes = es.read_mesh(self.folder / "ball.ply", attributes=True)[1]
 

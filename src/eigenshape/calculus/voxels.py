@@ -15,9 +15,10 @@ from eigenshape.geometry.solids import split_solids
 # eigenvalues within 5 % for the smallest, 1 % and 2 % from half axes of 5 on. Without them the
 # steps between voxels make areas a quarter too large; a wider blur takes volume away.
 BLUR = 0.7  # in sides of a voxel, the standard deviation
-N_SMOOTHING_STEPS = 10
+N_SMOOTHING_STEPS = 10  # of Taubin's filter, as many as it takes by default
 LEAST_SHARE = 0.05  # of an edge, from its end to the surface: no triangle becomes a needle
 PAD = 4  # voxels around the region; beyond, the blurred region is 0
+# Corners of a cube, in the order of `split_solids`
 CUBE = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 
 
@@ -56,16 +57,18 @@ def voxel_surface(inside: ArrayLike, to_space: ArrayLike | None = None) -> Trian
 
     Examples
     --------
-    A ball of radius 8 has the volume 2145.
+    A ball of radius 8 has the volume 2145, and the blur takes some 2 % of what its voxels have. Of
+    an ellipsoid with half axes of 6, 6 and 3 voxels it takes 7 %.
 
     >>> import numpy as np
     >>> import eigenshape as es
     >>> x, y, z = np.mgrid[-9:10, -9:10, -9:10]
-    >>> ball = es.calculus.voxel_surface(x**2 + y**2 + z**2 < 64)
+    >>> inside = x**2 + y**2 + z**2 < 64
+    >>> ball = es.calculus.voxel_surface(inside)
     >>> es.geometry.is_closed(ball), es.geometry.is_manifold(ball)
     (True, True)
-    >>> round(es.geometry.enclosed_volume(ball), -1)
-    2080.0
+    >>> int(inside.sum()), round(es.geometry.enclosed_volume(ball), -1)
+    (2103, 2050.0)
     """
     given = real_numbers(inside, "inside")
     region = given.astype(bool)
