@@ -27,8 +27,7 @@ def make_pose(pose: int) -> tuple[es.TriangleMesh, et.ShapeTensors]:
 
 torch.manual_seed(0)
 train = [make_pose(pose)[1] for pose in range(1, 5)]
-ends = torch.log(train[0].eigenvalues[[1, -1]])
-energies = torch.linspace(*ends.tolist(), 24)
+energies = torch.linspace(*torch.log(train[0].eigenvalues[[1, -1]]).tolist(), 24)
 network = et.DiffusionNet(24, 32, width=32, n_blocks=2)
 
 
@@ -42,8 +41,7 @@ def describe(shape: et.ShapeTensors) -> torch.Tensor:
 
 optimizer = torch.optim.Adam(network.parameters(), lr=2e-3)
 for _ in range(60):
-    one, two = (train[number] for number in torch.randperm(4)[:2])
-    ours, theirs = describe(one), describe(two)
+    (one, ours), (two, theirs) = ((train[i], describe(train[i])) for i in torch.randperm(4)[:2])
     there = et.functional_map(one, two, ours, theirs)
     back = et.functional_map(two, one, theirs, ours)
     optimizer.zero_grad()
