@@ -23,8 +23,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 
 # Lengths are in units of the root mean square distance of a surface from its middle. All numbers
 # were chosen on the tuning half of experiments/ch7_collection: skulls, whole, and cut by planes.
-# Points of the surface that is placed: in the fine rounds, and in both halves of the rough ones
-N_POINTS, N_ROUGH = 1200, (120, 240)
+N_POINTS, N_ROUGH = 1200, 240  # of the surface that is placed, for its refined and rough places
 N_WHOLE = 6000, 1200  # of the whole; denser, since a gap ends at the nearest point
 NORMAL_WEIGHT = 0.15  # length of a normal beside a place
 N_TURNS = 32  # random ones, besides the four that align the principal axes
@@ -36,8 +35,6 @@ N_KEPT, N_REFINED = 126, 10  # of 504 starts: after half of the rough rounds, an
 ROUGH_REACH = np.geomspace(0.6, 0.2, 10)
 FINE_REACH = np.geomspace(0.2, 0.05, 40)
 N_EARLY, N_LAST = 10, 3  # fine rounds of all places, and how many of these the later rounds refine
-# Share by which partners in the first rounds may be farther than the nearest point: half of the time
-SLACK = 0.5
 LEAF = 32  # points in a leaf of the tree: with six coordinates a sixth faster than 16
 ON_SURFACE = 0.1  # distance at which a point counts half in a gap
 # The gap of a surface, as a share of that of its mirror image, below which it is no mirror image, or
@@ -182,9 +179,9 @@ def align_surfaces(
         sizes = np.array(SIZES)[grid[2]]
         starts = _Places(sizes, turns[grid[0]], offsets[grid[1]], np.zeros(len(sizes)))
         half = len(ROUGH_REACH) // 2
-        few, some = (points[:: N_POINTS // number] for number in N_ROUGH)
-        starts = _refine(few, rough_tree, starts, ROUGH_REACH[:half], SLACK).best(N_KEPT)
-        starts = _refine(some, rough_tree, starts, ROUGH_REACH[half:]).best(N_REFINED)
+        few = points[:: N_POINTS // N_ROUGH]
+        starts = _refine(few, rough_tree, starts, ROUGH_REACH[:half]).best(N_KEPT)
+        starts = _refine(few, rough_tree, starts, ROUGH_REACH[half:]).best(N_REFINED)
         return settle(points, starts)
 
     def settle(points: Float[np.ndarray, "k 6"], places: _Places) -> _Places:
@@ -286,16 +283,9 @@ def _turns(
 
 
 def _refine(
-    points: Float[np.ndarray, "k 6"],
-    tree: cKDTree,
-    places: _Places,
-    reaches: np.ndarray,
-    slack: float = 0.0,
+    points: Float[np.ndarray, "k 6"], tree: cKDTree, places: _Places, reaches: np.ndarray
 ) -> _Places:
-    """Move points from each place to their nearest partners, with an ever shorter reach.
-
-    A partner may be farther than the nearest point, by the share `slack`.
-    """
+    """Move points from each place to their nearest partners, with an ever shorter reach."""
     ours, normals = points[:, :3], points[:, 3:]
     scales, rotations, translations = places.scales, places.rotations, places.translations
 
@@ -303,7 +293,7 @@ def _refine(
         turned = ours @ rotations.transpose(0, 2, 1)
         moved = scales[:, None, None] * turned + translations[:, None]
         facing = normals @ rotations.transpose(0, 2, 1)
-        distances, partners = tree.query(np.concatenate([moved, facing], axis=2), eps=slack)
+        distances, partners = tree.query(np.concatenate([moved, facing], axis=2))
         return distances, tree.data[partners, :3]
 
     for reach in reaches:
