@@ -85,20 +85,15 @@ def voxel_surface(inside: ArrayLike, to_space: ArrayLike | None = None) -> Trian
     box = tuple(slice(start, stop) for start, stop in zip(low, high, strict=True))
     region = np.pad(region[box], PAD)
     blurred = gaussian_filter(region.astype(np.float64), BLUR)
-    share = LEAST_SHARE
-    heights = np.where(region, np.maximum(blurred, 0.5 + share), np.minimum(blurred, 0.5 - share))
+    heights = np.where(
+        region, np.maximum(blurred, 0.5 + LEAST_SHARE), np.minimum(blurred, 0.5 - LEAST_SHARE)
+    )
 
     # Cubes between the centers of eight voxels, some of which are inside and some are not.
-    corners = np.array(CUBE)
-    shape = np.array(region.shape)
-    stops = [corner + shape - 1 for corner in corners]
-    eight = [
-        region[tuple(slice(start, stop) for start, stop in zip(corner, stops_of, strict=True))]
-        for corner, stops_of in zip(corners, stops, strict=True)
-    ]
-    crossed = np.any(eight, axis=0) & ~np.all(eight, axis=0)
-    cubes = np.argwhere(crossed)[:, None] + corners
-    numbers = np.ravel_multi_index(tuple(np.moveaxis(cubes, 2, 0)), region.shape)
+    cubes = np.lib.stride_tricks.sliding_window_view(region, (2, 2, 2))
+    crossed = cubes.any(axis=(3, 4, 5)) & ~cubes.all(axis=(3, 4, 5))
+    corners = np.argwhere(crossed)[:, None] + np.array(CUBE)
+    numbers = np.ravel_multi_index(tuple(np.moveaxis(corners, 2, 0)), region.shape)
     used, cells = np.unique(numbers, return_inverse=True)
     points = np.stack(np.unravel_index(used, region.shape), axis=1) + (low - PAD)
     solid = split_solids(points.astype(np.float64), cells.reshape(-1, 8))
