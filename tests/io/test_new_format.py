@@ -100,6 +100,7 @@ def test_the_docs_list_the_formats_with_what_they_can():
         readers = {
             "`read_mesh`": {"cells"},
             "`read_points`": {"points"},
+            "`read_volume`": {"volume"},
             "`read_fields`": {"maps"},
             "`read_parcellation`": {"parcels"},
         }

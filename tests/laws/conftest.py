@@ -1,5 +1,7 @@
 """Values that laws share: they take seconds to make, and no call may change them."""
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 from thread_calls import Shared
@@ -8,7 +10,7 @@ from eigenshape.collections import alignment, surface_fit
 from eigenshape.matching import match, target
 
 
-@pytest.fixture(scope="session", autouse=True)
+@contextmanager
 def few_points():
     """Align, bend and match by few starts, steps and points: a fifth of the time, and laws hold for any number."""
     with pytest.MonkeyPatch.context() as patch:
@@ -20,7 +22,15 @@ def few_points():
         yield
 
 
+@pytest.fixture(scope="module", autouse=True)
+def by_few_points():
+    """Laws take few points, and what the same process tests after them takes all."""
+    with few_points():
+        yield
+
+
 @pytest.fixture(scope="session")
-def shared(few_points, tmp_path_factory):
+def shared(tmp_path_factory):
     """Return what all public functions are called with."""
-    return Shared(tmp_path_factory.mktemp("shared"))
+    with few_points():
+        return Shared(tmp_path_factory.mktemp("shared"))

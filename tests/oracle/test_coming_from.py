@@ -118,12 +118,22 @@ def shared_names(folder: Path) -> dict[str, Any]:
     }
 
 
+def write_volume(folder: Path, label: int) -> Path:
+    """Write a volume with a cube that has a label, and return its path."""
+    nibabel = import_module("nibabel")
+    voxels = np.zeros((9, 9, 9), np.uint8)
+    voxels[3:6, 3:6, 3:6] = label
+    nibabel.Nifti1Image(voxels, np.eye(4)).to_filename(folder / "labels.nii")
+    return folder / "labels.nii"
+
+
 def our_names(shared: dict[str, Any]) -> dict[str, Any]:
     mesh = bumpy_ball()
     laplacian = es.cotangent_laplacian(mesh)
     spectrum = es.solve_spectrum(laplacian, 40)
     return shared | {
         "es": es,
+        "aseg_path": write_volume(Path(shared["path"]).parent, 11),  # the left caudate nucleus
         "mesh": mesh,
         "sheet": es.shapes.grid(8, 6),
         "solid": es.shapes.box(3, 3, 3),
@@ -383,6 +393,7 @@ def names_for_collections(folder: Path) -> dict[str, Any]:
         "other": other,
         "points": mesh.vertices[:5],
         "rows": [3, 7],
+        "path": write_volume(folder, 1),
         "mesh_path": folder / "scans" / "a.ply",
         "new_mesh_path": folder / "new.ply",
         "particles_path": folder / "a_local.particles",
