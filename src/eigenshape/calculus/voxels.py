@@ -75,7 +75,8 @@ def voxel_surface(inside: ArrayLike, to_space: ArrayLike | None = None) -> Trian
     if given.ndim != 3 or not np.array_equal(given, region) or not region.any():
         raise InvalidParameterError(
             "inside must be True or False, or 1 or 0, for each voxel of a table of three dimensions, and "
-            f"True for one at least; the shape is {given.shape}, and there are {_first_values(given)}."
+            f"True for one at least; the shape is {given.shape}, and there are the values "
+            f"{different_values(given, 3, 'values')}."
         )
     affine = as_affine(to_space)
 
@@ -126,8 +127,8 @@ def as_affine(to_space: ArrayLike | None) -> np.ndarray:
     return matrix
 
 
-def _first_values(values: np.ndarray) -> str:
-    """Return the first different values of a table as text."""
-    different = np.unique(values)
-    ending = ", ..." if len(different) > 3 else ""
-    return "the values " + ", ".join(f"{value:g}" for value in different[:3].astype(float)) + ending
+def different_values(table: np.ndarray, most: int, noun: str) -> str:
+    """List the different values of a table, the first of them if they are too many."""
+    there = np.unique(table)
+    ending = f", ... ({len(there)} {noun})" if len(there) > most else ""
+    return ", ".join(f"{value:g}" for value in there[:most].astype(float)) + ending

@@ -103,8 +103,7 @@ def unique_edges(
     """Return pairs of n points without duplicates, the lower first, in lexicographic order."""
     # np.unique hashes integers, which takes several times as long as sorting them.
     keys = np.sort((np.minimum(one, two) * n + np.maximum(one, two)).ravel())
-    is_new = np.append(True, keys[1:] != keys[:-1])[: len(keys)]
-    return np.column_stack(np.divmod(keys[is_new], n))
+    return np.column_stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], n))
 
 
 def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:

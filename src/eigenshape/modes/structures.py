@@ -8,7 +8,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import real_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
-from eigenshape.calculus.voxels import as_affine, voxel_surface
+from eigenshape.calculus.voxels import as_affine, different_values, voxel_surface
 from eigenshape.geometry.mesh import TriangleMesh
 
 # The structures of BrainPrint and their labels in aseg.mgz of FreeSurfer (FreeSurferColorLUT.txt).
@@ -44,6 +44,7 @@ FREESURFER_STRUCTURES: dict[str, tuple[int, ...]] = {
     "Right-Accumbens-area": (58,),
     "Right-VentralDC": (60,),
 }
+MOST_NAMED = 20  # labels of a volume, in a message
 
 
 def structure_surfaces(
@@ -110,18 +111,13 @@ def structure_surfaces(
         elif structures is not None:
             raise InvalidParameterError(
                 f"Each structure must have a voxel; {name!r} has none of the labels "
-                f"{of_structure.tolist()}. {_labels_there(volume)}"
+                f"{of_structure.tolist()}. The volume holds "
+                f"{different_values(volume, MOST_NAMED, 'labels')}."
             )
     if not surfaces:
         raise InvalidParameterError(
             "A structure of FreeSurfer must be among the labels, or structures= name others, as in "
-            f"{{'Left-Caudate': 11}}; none is there. {_labels_there(volume)}"
+            f"{{'Left-Caudate': 11}}; none is there. The volume holds "
+            f"{different_values(volume, MOST_NAMED, 'labels')}."
         )
     return surfaces
-
-
-def _labels_there(volume: np.ndarray) -> str:
-    """Return a sentence with the first labels of a volume."""
-    there = np.unique(volume)
-    ending = f", ... ({len(there)} labels)" if len(there) > 20 else ""
-    return "The volume holds " + ", ".join(f"{label:g}" for label in there[:20]) + ending + "."

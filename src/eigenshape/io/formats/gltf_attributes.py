@@ -46,10 +46,10 @@ COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 # What a document may hold besides a scene with materials.
 EXTRAS = ("skins", "animations", "cameras", "extensions")
-# Attributes of vertices that go to other formats, that viewers compute, or that are named as skins.
-CARRIED = {"POSITION", "NORMAL", "TANGENT", "COLOR_0", "JOINTS_0", "WEIGHTS_0"}
 TANGENTS = "tangents, which viewers compute anew"
 MADE_ANEW = ("POSITION", "NORMAL", "TANGENT")
+# Attributes of vertices that are made anew, go to other formats or are named as skins.
+CARRIED = {*MADE_ANEW, "COLOR_0", "JOINTS_0", "WEIGHTS_0"}
 DRACO = "KHR_draco_mesh_compression"
 Columns = dict[str, tuple[np.ndarray, bool]]  # numbers, and whether whole ones mean shares of one
 
