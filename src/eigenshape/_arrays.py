@@ -322,7 +322,7 @@ def whole_number(
     `reason` says why there is an upper bound, where the number alone does not.
     """
     try:
-        number = operator.index(value)
+        number = int(operator.index(value))  # of True, too
     except TypeError as err:
         raise InvalidParameterError(f"{name} must be a whole number; it is {value!r}.") from err
     if number < low and (high is None or reason):

@@ -107,9 +107,10 @@ class LinearSolver(ReadOnly):
         Raises
         ------
         InvalidParameterError
-            If an array has another length or a number is not finite, a point that is fixed twice
-            has two values, the right-hand side does not sum to 0 on a component where nothing is
-            fixed, no x meets all constraints, or x is too large for floating-point numbers.
+            If an array has another length or a number is not finite, values are given where no
+            point is fixed, or targets without constraints, a point that is fixed twice has two
+            values, the right-hand side does not sum to 0 on a component where nothing is fixed, no
+            x meets all constraints, or x is too large for floating-point numbers.
         """
         load = _columns(right, "right", self.n_points, "point")
         given = _columns(values, "values", len(self._given), "fixed point")
@@ -450,6 +451,10 @@ def _columns(value: ArrayLike, name: str, n_rows: int, noun: str) -> Float[np.nd
     """Return `value` as a table with one row per point, fixed point or constraint."""
     numbers = real_numbers(value, name).astype(np.float64)
     if numbers.ndim == 0:
+        if not n_rows and numbers != 0:
+            raise InvalidParameterError(
+                f"{name} must be 0 where there is no {noun}; it is {numbers}."
+            )
         numbers = np.full((n_rows, 1), numbers)
     if numbers.ndim not in (1, 2) or len(numbers) != n_rows:
         raise InvalidParameterError(

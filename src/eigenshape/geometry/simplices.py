@@ -48,7 +48,7 @@ def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "
 
 
 def _size(coordinates: Float[np.ndarray, "..."]) -> float:
-    largest = max(coordinates.max(), -coordinates.min())
+    largest = max(coordinates.max(initial=0.0), -coordinates.min(initial=0.0))
     # One less than the exponent of frexp, so that the power exists for the largest float too.
     return float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
 

@@ -108,7 +108,7 @@ def find_items(
     items = list(by_name.values())
     if labels is not None:
         items = _labeled(items, Path(labels))
-    return items if part is None else _part_of(items, *part)
+    return items if part is None else _part_of(items, part)
 
 
 def _items_of(source: Path) -> Iterator[Item]:
@@ -156,9 +156,11 @@ def _files_below(folder: Path) -> Iterator[Path]:
             yield from (here / name for name in files)
 
 
-def _part_of(items: Sequence[Item], part: Integer, n_parts: Integer) -> list[Item]:
-    count = whole_number(n_parts, "The number of parts", 1)
-    number = whole_number(part, "The number of a part", 1, count)
+def _part_of(items: Sequence[Item], part: tuple[Integer, Integer]) -> list[Item]:
+    if not isinstance(part, tuple | list) or len(part) != 2:
+        raise InvalidParameterError(f"part must be a pair (i, n); it is {part!r}.")
+    count = whole_number(part[1], "The number of parts", 1)
+    number = whole_number(part[0], "The number of a part", 1, count)
     return [
         item
         for item in items

@@ -8,6 +8,7 @@ from typing import Literal, overload
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
+from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidShapeError
 from eigenshape._files import as_path, replace_file
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -404,6 +405,7 @@ def _replaced_by_parts(held: MeshAttributes, has_part_materials: bool) -> list[s
 
 
 def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
+    require_type(colors, np.ndarray, "colors")
     if (
         suffix not in WITH_COLORS
         or colors.dtype != np.uint8
@@ -416,6 +418,7 @@ def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None
 
 
 def _require_labels(labels: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
+    require_type(labels, np.ndarray, "face_labels")
     if suffix not in WITH_COLORS or labels.shape != (mesh.n_faces,):
         raise InvalidParameterError(
             f"face_labels must be ({mesh.n_faces},) and go to {', '.join(WITH_COLORS)}; they are {labels.shape} and "

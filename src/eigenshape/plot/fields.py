@@ -292,7 +292,8 @@ def value_scale(
     known = field.compressed()
     if not known.size:
         raise InvalidParameterError("values must hold a number; all are NaN.")
-    ends = finite_values([known.min(), known.max()] if limits is None else [*limits], "limits")
+    extremes = [known.min(), known.max()]
+    ends = finite_values(extremes if limits is None else np.asarray(limits), "limits")
     if len(ends) != 2 or ends[0] > ends[1]:
         raise InvalidParameterError(
             f"limits must be two numbers, the lower one first; they are {ends.tolist()}."

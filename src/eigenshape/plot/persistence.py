@@ -6,6 +6,7 @@ from matplotlib.colors import to_hex
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
+from eigenshape._errors import InvalidParameterError
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
 from eigenshape.features.segmentation import Tree, merge_targets
 from eigenshape.plot.figure import Figure
@@ -85,7 +86,7 @@ def figure_merge_tree(
     ----------
     tree : MergeTree or PartTree
     persistence : float, optional
-        Height of the cut, in the unit of the function.
+        Height of the cut, in the unit of the function, at least 0.
     n_maxima : int
         Number of maxima to draw, the most persistent ones; at least 1.
     label : str
@@ -98,7 +99,7 @@ def figure_merge_tree(
     Raises
     ------
     InvalidParameterError
-        If `n_maxima` is below 1.
+        If `n_maxima` is below 1, or the persistence negative or NaN.
 
     Examples
     --------
@@ -110,6 +111,8 @@ def figure_merge_tree(
     'cut at 0.5: 2 regions left'
     """
     require_type(tree, Tree, "tree")
+    if persistence is not None and not persistence >= 0:
+        raise InvalidParameterError(f"persistence must be at least 0; it is {persistence}.")
     shown = min(whole_number(n_maxima, "n_maxima", 1), len(tree.maxima))
     into = merge_targets(tree)[:shown]
     finite = tree.persistence[np.isfinite(tree.persistence)]

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 from matplotlib.ticker import MaxNLocator
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_values, record
+from eigenshape._arrays import finite_values, positive_number, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.plot.figure import Figure
@@ -46,6 +46,11 @@ def figure_spectrum(
     -------
     matplotlib.figure.Figure
 
+    Raises
+    ------
+    InvalidParameterError
+        If the area is not positive and finite.
+
     See Also
     --------
     figure_spectra : Plot several spectra.
@@ -72,7 +77,7 @@ def figure_spectrum(
     label = "eigenvalues of the operator"
     axes.plot(number, spectrum.eigenvalues, ".", color="#1f77b4", markersize=5, label=label)
     if area is not None:
-        weyl, label = 4 * np.pi * number / area, "Weyl's law, 4π i / area"
+        weyl, label = 4 * np.pi * number / positive_number(area, "area"), "Weyl's law, 4π i / area"
         axes.plot(number, weyl, "-", color="#999999", lw=1, label=label)
     ends = [end for end in (proof.floor, proof.shift) if np.isfinite(end)]
     if proof.complete and ends:

@@ -151,8 +151,7 @@ def grid(n_x: int = 20, n_y: int = 20, *, width: float = 1.0, height: float = 1.
     >>> es.shapes.grid(4, 2)
     TriangleMesh(15 vertices, 16 faces)
     """
-    whole_number(n_x, "n_x", 1, 10**6)
-    whole_number(n_y, "n_y", 1, 10**6)
+    n_x, n_y = whole_number(n_x, "n_x", 1, 10**6), whole_number(n_y, "n_y", 1, 10**6)
     positive_values([width, height], "width and height")
     x, y = np.meshgrid(
         np.linspace(0, width, n_x + 1), np.linspace(0, height, n_y + 1), indexing="ij"

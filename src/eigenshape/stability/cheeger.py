@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record, whole_number
+from eigenshape._arrays import ReadOnly, finite_number, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -135,8 +135,10 @@ def cheeger_estimate(
     upper, level, mode = min(
         (*_best_cut(mesh, spectrum.eigenvectors[:, mode]), mode) for mode in range(1, count + 1)
     )
-    a = np.sqrt(max(-least_curvature, 0.0)) if least_curvature is not None else np.inf
-    lower = (np.sqrt(a**2 + 10 * values[1]) - a) / 10 if np.isfinite(a) else 0.0
+    lower = 0.0
+    if least_curvature is not None:
+        a = np.sqrt(max(-finite_number(least_curvature, "least_curvature"), 0.0))
+        lower = (np.sqrt(a**2 + 10 * values[1]) - a) / 10
     part = spectrum.eigenvectors[:, mode] > level
     return CheegerEstimate(upper, float(2 * np.sqrt(values[1])), float(lower), mode, part)
 

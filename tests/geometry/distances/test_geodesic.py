@@ -197,6 +197,28 @@ def test_farthest_points_are_chosen_one_after_the_other_with_all_distances():
     np.testing.assert_array_equal(near[1][within], rows[within])
 
 
+@pytest.mark.parametrize("source", [-1, 150, [0, 150]])
+def test_a_wave_from_what_is_no_vertex_is_refused(source):
+    with pytest.raises(InvalidParameterError, match="A source must"):
+        geodesic_waves(grid(14, 9))(source)
+
+
+def test_a_wave_has_room_for_repeated_sources():
+    wave = geodesic_waves(grid(3, 3))
+    np.testing.assert_array_equal(wave([4, 7] * 500), wave([4, 7]))
+
+
+@pytest.mark.parametrize("reach", [np.nan, -1.0])
+def test_a_reach_must_be_a_distance(reach):
+    mesh = grid(3, 3)
+    with pytest.raises(InvalidParameterError, match="reach must be"):
+        geodesic_distances(mesh, [0], reach=reach)
+    with pytest.raises(InvalidParameterError, match="reach must be"):
+        geodesic_waves(mesh)(0, reach)
+    with pytest.raises(InvalidParameterError, match="reach must be"):
+        farthest_points(mesh, 2, reach=reach)
+
+
 def test_waves_that_follow_each_other_are_as_if_alone():
     mesh = grid(14, 9)
     wave = geodesic_waves(mesh)

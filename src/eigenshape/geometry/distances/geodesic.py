@@ -8,8 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import positive_values, whole_number, whole_numbers
-from eigenshape._errors import InvalidShapeError
+from eigenshape._arguments import describe_value
+from eigenshape._arrays import positive_values, real_numbers, whole_number, whole_numbers
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import SpareMemory, map_in_threads, one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
@@ -135,7 +136,7 @@ def geodesic_distances(
     InvalidShapeError
         If the mesh does not have dimension 2.
     InvalidParameterError
-        If a source is not a vertex.
+        If a source is not a vertex, or the reach is negative or no number.
 
     See Also
     --------
@@ -168,7 +169,22 @@ def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]
         entries: list[Any] = list(sources)  # type: ignore[arg-type]
     except TypeError:  # one number
         entries = [sources]
-    return [np.unique(whole_numbers(entry, "A source", 0, n_points - 1)) for entry in entries]
+    return [source_points(entry, n_points) for entry in entries]
+
+
+def source_points(source: ArrayLike, n_points: int) -> Int[np.ndarray, " s"]:
+    """Return the points of one source, ascending and each once. Raises an error if one is not a point."""
+    return np.unique(whole_numbers(source, "A source", 0, n_points - 1))
+
+
+def _checked_reach(reach: float) -> float:
+    """Return a distance that may be zero or infinite."""
+    distance = real_numbers(reach, "reach")
+    if distance.ndim or not distance >= 0:
+        raise InvalidParameterError(
+            f"reach must be a distance, at least 0; it is {describe_value(reach)}."
+        )
+    return float(distance)
 
 
 def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
@@ -187,7 +203,8 @@ def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
     callable
         Called as ``wave(sources, reach)`` with one or several vertices and the largest distance
         that is needed, in length. Returns the distance of each vertex to the nearest source, (n,),
-        infinite beyond the reach.
+        infinite beyond the reach. Raises an InvalidParameterError if a source is not a vertex, or
+        the reach is negative or no number.
 
     Raises
     ------
@@ -211,9 +228,9 @@ def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
     memory = SpareMemory(lambda: (_scratch(fans, n), np.empty(n, dtype=np.int64), np.empty(n)))
 
     def wave(source: ArrayLike, reach: float = np.inf) -> Float[np.ndarray, " n"]:
-        sources = np.atleast_1d(np.asarray(source, dtype=np.int64))
+        sources, radius = source_points(source, n), _checked_reach(reach) / scale
         with memory.lend() as (scratch, reached, distances):
-            count = spread_wave(fans, reach / scale, sources, scratch, reached, distances)
+            count = spread_wave(fans, radius, sources, scratch, reached, distances)
             found = np.full(n, np.inf)
             found[reached[:count]] = in_length(distances[:count], scale, 1)
         return found
@@ -251,7 +268,7 @@ def farthest_points(
     Raises
     ------
     InvalidParameterError
-        If count is not in 1..n.
+        If count is not in 1..n, or the reach is negative or no number.
     InvalidShapeError
         If the mesh does not have dimension 2.
 
@@ -276,7 +293,7 @@ def farthest_points(
     # Each choice waits for the wave before it. So where all distances are wanted, waves that only
     # reach what they come nearest to make the choices, and long ones follow, side by side. The short
     # ones add about a fiftieth.
-    everywhere = bool(np.isinf(reach))
+    everywhere = bool(np.isinf(_checked_reach(reach)))
     shortest = 0.0 if everywhere else reach
     choices = islice(farthest_first(wave, n, first, reach=shortest), count)
     for number, (vertex, row) in enumerate(choices):

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import real_numbers, whole_numbers
+from eigenshape._arrays import real_numbers, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -139,16 +139,17 @@ def unmask(
     [5.0, nan, 7.0, nan]
     """
     rows = real_numbers(values, "values").astype(np.float64)
-    places = whole_numbers(vertices, "A vertex", 0, int(n_vertices) - 1)
+    n = whole_number(n_vertices, "n_vertices", 0)
+    places = whole_numbers(vertices, "A vertex", 0, n - 1)
     if rows.ndim not in (1, 2) or len(rows) != len(places):
         raise InvalidParameterError(
             f"values must hold one row for each of {len(places)} vertices; the shape is {rows.shape}."
         )
     try:
-        whole = np.full((int(n_vertices), *rows.shape[1:]), np.nan)
-    except MemoryError as err:
+        whole = np.full((n, *rows.shape[1:]), np.nan)
+    except (MemoryError, ValueError) as err:  # the second beyond any address
         raise InvalidParameterError(
-            f"The values of n_vertices vertices must fit into memory; n_vertices is {n_vertices}."
+            f"The values of n_vertices vertices must fit into memory; n_vertices is {n}."
         ) from err
     whole[places] = rows
     return whole

@@ -9,8 +9,10 @@ from scipy.cluster.vq import kmeans2
 from scipy.special import logsumexp
 
 from eigenshape._arguments import require_each
+from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
+from eigenshape._typing import Integer
 from eigenshape.retrieval.patches.codebook import (
     BASES,
     N_AXES,
@@ -29,7 +31,7 @@ ROUNDS = 60  # of expectation and maximization at most
 CONVERGED = 1e-5  # gain of the mean log-likelihood below which the fit ends
 
 
-def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook:
+def train_codebook(shapes: Sequence[Patches], *, seed: Integer = 0) -> PatchCodebook:
     """Learn a codebook from the patches of shapes without labels.
 
     At each base radius the numbers are scaled to unit variance, turned to their 20 principal axes
@@ -50,7 +52,8 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
     Raises
     ------
     InvalidParameterError
-        If there are fewer than 64 patches, two for each Gaussian.
+        If there are fewer than 64 patches, two for each Gaussian, or the seed is no whole number
+        or negative.
 
     See Also
     --------
@@ -65,6 +68,7 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
     (3, 32, 20)
     """
     require_each(shapes, Patches, "shapes")
+    chance = whole_number(seed, "seed", 0)
     count = sum(len(shape.vertices) for shape in shapes)
     if count < 2 * N_ENTRIES:
         raise InvalidParameterError(
@@ -82,7 +86,7 @@ def train_codebook(shapes: Sequence[Patches], *, seed: int = 0) -> PatchCodebook
             values, vectors = sl.eigh(scaled.T @ scaled / len(scaled))
             lengths = np.sqrt(np.maximum(values[::-1][:N_AXES], LEAST_EIGENVALUE))
             axes = vectors[:, ::-1][:, :N_AXES] / lengths
-            books.append((mean, spread, axes, *_fit_mixture(scaled @ axes, seed)))
+            books.append((mean, spread, axes, *_fit_mixture(scaled @ axes, chance)))
     return PatchCodebook(
         *(np.stack(parts).astype(np.float32) for parts in zip(*books, strict=True))
     )

@@ -145,7 +145,7 @@ def separated_groups(eigenvalues: ArrayLike, *, ratio: float = SEPARATED) -> lis
     Raises
     ------
     InvalidParameterError
-        If eigenvalues are not finite or not ascending, or the ratio is not above 1.
+        If eigenvalues are not finite or not ascending, or the ratio is not above 1 and finite.
 
     Examples
     --------
@@ -154,8 +154,8 @@ def separated_groups(eigenvalues: ArrayLike, *, ratio: float = SEPARATED) -> lis
     [slice(0, 1, None), slice(1, 4, None), slice(4, 5, None)]
     """
     values = finite_values(eigenvalues, "eigenvalues")
-    if not ratio > 1:
-        raise InvalidParameterError(f"ratio must be above 1; it is {ratio}.")
+    if not 1 < ratio < np.inf:
+        raise InvalidParameterError(f"ratio must be above 1, and finite; it is {ratio}.")
     _require_ascending(values)
     gaps = np.concatenate([[np.inf], np.diff(values), [np.inf]])
     ends = [0]

@@ -110,7 +110,14 @@ def spectral_embedding(
         )
     chosen = slice(first, first + n_wanted)
     values = spectrum.eigenvalues[chosen]
-    embedded = spectrum.eigenvectors[:, chosen] * values ** float(exponent)
+    with np.errstate(over="ignore"):
+        weights = values ** float(exponent)
+    if not np.isfinite(weights).all():
+        raise InvalidParameterError(
+            f"power must leave powers of eigenvalues finite; those of {values[0]:.4g} to "
+            f"{values[-1]:.4g} are not with {power!r}."
+        )
+    embedded = spectrum.eigenvectors[:, chosen] * weights
     return (
         embedded
         if t is None
