@@ -66,6 +66,7 @@ sphinx_gallery_conf = {
 html_theme = "pydata_sphinx_theme"
 html_title = "eigenshape"
 html_static_path = ["_static"]
+html_favicon = "_static/favicon.svg"
 html_css_files = ["eigenshape.css"]
 html_context = {"default_mode": "auto"}  # light or dark, as the reader's system is
 html_theme_options = {

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from browser import (
     PANEL,
+    drop_file,
     find,
     move_pointer,
     open_page,
@@ -62,6 +63,22 @@ def test_a_limb_lights_up_and_bends_without_any_step_before(page, mesh, rig):
     page.keyboard.press("Control+z")
     wait_for_edits(page, 0)
     np.testing.assert_array_equal(positions(page), mesh.vertices.astype("f4"))
+
+
+def test_a_character_with_seams_says_what_keeps_its_limbs_from_bending(page, tmp_path, mesh):
+    """Files of animation programs hold each vertex on a seam twice."""
+    seam = np.flatnonzero(mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 0)
+    faces = mesh.faces.copy()
+    faces[seam] += mesh.n_vertices
+    doubled = es.TriangleMesh(np.tile(mesh.vertices, (2, 1)), faces)
+    es.write_mesh(es.repair(doubled, ["drop_unreferenced"]).mesh, tmp_path / "character.obj")
+    drop_file(page, "stage", tmp_path / "character.obj")
+    page.get_by_text("Pieces that lie edge on edge must share their vertices").first.wait_for()
+    assert find(page, "hint").inner_text().startswith("No limb can be bent yet. Pieces that lie")
+    assert "The tab Shape offers the repairs" in find(page, "hint").inner_text()
+    find(page, "tab-shape").click()
+    find(page, "repair-weld_seams").click()
+    wait_until(page, HAS_LIMBS)
 
 
 def test_beside_a_limb_the_view_turns_and_few_controls_are_seen(page):

@@ -36,7 +36,7 @@ def with_diagonal(matrix):
 MATRICES = {
     "surface": with_diagonal(es.cotangent_laplacian(es.shapes.fibonacci_sphere(4000)).stiffness),
     "solid": with_diagonal(es.cotangent_laplacian(es.shapes.box(9, 9, 9)).stiffness),
-    "pieces": with_diagonal(sp.block_diag([np.ones((7, 7))] * 200)),
+    "pieces": with_diagonal(sp.block_diag([sp.csc_array(np.ones((7, 7)))] * 200)),
     "clique": with_diagonal(sp.csc_array(np.ones((300, 300)))),
     "one point": sp.csc_array(np.array([[2.0]])),
 }

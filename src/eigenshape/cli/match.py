@@ -97,7 +97,8 @@ def _print_match(found: es.matching.ShapeMatch) -> None:
     """Print in words how good a map is."""
     text = (
         f"{found.n_vertices} vertices; {found.sure().mean():.0%} have a confidence of at least "
-        f"0.5, the mean is {found.confidence.mean():.2f}."
+        f"0.5, the mean is {found.confidence.mean():.2f}. It is the probability that a vertex is "
+        "within 5 % of the root of the whole's area of its true place."
     )
     if not found.handed:
         text += " Nothing tells outside from inside: left and right may be exchanged."

@@ -171,8 +171,8 @@ def test_without_scikit_learn_the_extra_is_named(monkeypatch):
 
 
 def test_fewer_clusters_than_components_cannot_be_requested():
-    edges = sp.block_diag(5 * [[[0.0, 1.0], [1.0, 0.0]]], format="csr")
-    graph = sp.csr_array(edges)
+    edge = sp.csr_array([[0.0, 1.0], [1.0, 0.0]])
+    graph = sp.csr_array(sp.block_diag(5 * [edge]))
     spectrum = es.solve_spectrum(es.operators.graph_laplacian(graph, "normalized"), 8)
     assert es.spectral.count_clusters(spectrum, most=5) == 5
     with pytest.raises(

@@ -168,7 +168,8 @@ def count_clusters(spectrum: Spectrum, most: int | None = None) -> int:
 
     >>> import eigenshape as es
     >>> from scipy.sparse import block_diag, csr_array
-    >>> graph = csr_array(block_diag(3 * [[[0, 1], [1, 0]]]))
+    >>> edge = csr_array([[0, 1], [1, 0]])
+    >>> graph = csr_array(block_diag(3 * [edge]))
     >>> laplacian = es.operators.graph_laplacian(graph, "normalized")
     >>> es.spectral.count_clusters(es.solve_spectrum(laplacian, 6))
     3

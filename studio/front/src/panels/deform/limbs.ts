@@ -64,7 +64,8 @@ export class Limbs implements PointerTool {
   /** What a person should know or do now. */
   get hint(): string {
     const { deformation, parts } = this.app.state;
-    if ([deformation, parts].some(({ status }) => status === "failed")) return NO_LIMBS;
+    const failed = [deformation, parts].find(({ status }) => status === "failed");
+    if (failed) return `No limb can be bent yet. ${failed.message}`;
     if (deformation.status === "none") return "A shape as large as this is prepared for bending on request; see above.";
     if (deformation.status !== "ready") return "The shape is being prepared for bending …";
     if (!this.labels) return "Its limbs are being found …";
