@@ -39,6 +39,7 @@ def test_all_specimens_correspond_and_failures_are_named(built):
     assert np.linalg.det(np.linalg.lstsq(
         built.unreflected[2] - built.unreflected[2].mean(axis=0),
         built.points[0] - built.points[0].mean(axis=0),
+        rcond=None,
     )[0]) > 0  # fmt: skip
 
 

@@ -72,11 +72,11 @@ def test_two_regions_move_at_once():
 def literal_skeleton(rig, regions, handles, n_modes):
     """Equation 6.1 as it stands: cut the region out of K, move it, and fit what results by the low modes."""
     modes = rig.eigenvectors[:, :n_modes]
-    skeleton = modes @ np.linalg.lstsq(modes, rig.mesh.vertices)[0]
+    skeleton = modes @ np.linalg.lstsq(modes, rig.mesh.vertices, rcond=None)[0]
     target = skeleton.copy()
     for region, handle in zip(regions, handles, strict=True):
         target[region] += handle.carry(skeleton, np.ones(len(skeleton)))[region]
-    return skeleton, modes @ np.linalg.lstsq(modes, target)[0]
+    return skeleton, modes @ np.linalg.lstsq(modes, target, rcond=None)[0]
 
 
 @pytest.mark.parametrize("n_modes", [8, 50, 300])
@@ -172,7 +172,7 @@ def test_the_two_passes_of_the_thesis_by_hand(small):
         binding, handle, literal_details(faces, before, after, details), details
     )
     modes = rig.eigenvectors[:, :most]
-    second = modes @ np.linalg.lstsq(modes, first)[0]
+    second = modes @ np.linalg.lstsq(modes, first, rcond=None)[0]
     expected = second + literal_details(faces, fine, second, rig.mesh.vertices - fine)
     np.testing.assert_allclose(
         bend(binding, [handle], mode="thesis").vertices, expected, atol=1e-10

@@ -65,7 +65,7 @@ def test_biharmonic_weights_by_a_dense_solve():
     free = binding.part.free
     weights = binding.shares[0].copy()
     held = np.setdiff1d(np.arange(492), free)
-    weights[free] = np.linalg.lstsq(root[:, free], -root[:, held] @ weights[held])[0]
+    weights[free] = np.linalg.lstsq(root[:, free], -root[:, held] @ weights[held], rcond=None)[0]
     found = biharmonic_blend(binding, [Translation([0, 0, 1])])
     np.testing.assert_allclose(found, rig.mesh.vertices + weights[:, None] * [0, 0, 1], atol=1e-8)
 

@@ -63,7 +63,7 @@ def test_orientation_tells_a_shape_from_its_mirror_image():
         found = es.functional_map(
             spectrum, spectrum, n_modes=12, descriptors="waves", meshes=(shape, target)
         )
-        turned = np.linalg.lstsq(centered, centered[refined_points(found)])[0]
+        turned = np.linalg.lstsq(centered, centered[refined_points(found)], rcond=None)[0]
         assert np.linalg.det(turned) == pytest.approx(
             handed, abs=0.2
         )  # vertices are not quite mirrored

@@ -325,7 +325,7 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
 def _connect(path: Path, mode: str) -> sqlite3.Connection:
     uri = f"{path.absolute().as_uri()}?{mode}"
     return sqlite3.connect(
-        uri, LONGEST_WAIT, isolation_level=None, check_same_thread=False, uri=True
+        uri, timeout=LONGEST_WAIT, isolation_level=None, check_same_thread=False, uri=True
     )
 
 
