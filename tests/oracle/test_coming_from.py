@@ -238,9 +238,9 @@ def names_of_brainprint(shared: dict[str, Any]) -> dict[str, Any]:
 N_EQUAL = {
     "brainprint": 2,
     "lapy": 13,
-    "neuromodes": 1,
-    "libigl": 16,
-    "potpourri3d": 1,
+    "neuromodes": 16,
+    "libigl": 14,
+    "potpourri3d": 3,
     "pyfm": 1,
 }
 PEERS = {
