@@ -43,6 +43,12 @@ def test_files_in_docs_are_there(page):
     assert not missing - PATTERNS
 
 
+def test_experiments_that_comments_name_are_there():
+    for path in (ROOT / "src").rglob("*.py"):
+        for name in re.findall(r"\b(?:experiments|benchmarks)/\w+", path.read_text()):
+            assert (ROOT / name).exists() or (ROOT / f"{name}.py").exists(), (path.name, name)
+
+
 def test_every_public_name_is_mentioned_beside_the_api_pages():
     files = [*PAGES, *(ROOT / "gallery").rglob("*.py"), *(ROOT / "experiments").rglob("*.py")]
     words = {word for path in files for word in re.findall(r"\w+", path.read_text())}

@@ -199,6 +199,22 @@ def test_a_whole_of_two_pieces_is_matched_piece_by_piece(target):
     assert "piece 0 of the part was placed on piece 0 of the whole" in match.report
 
 
+def test_a_part_fits_both_of_two_equal_pieces():
+    fish = es.make_creature("fish", n_vertices=500)
+    beside = es.TriangleMesh(fish.vertices + 3.0, fish.faces)
+    whole = prepare_target(es.geometry.disjoint_union(fish, beside))
+    alone, one = match_shapes(moved(fish), fish), match_shapes(moved(fish), whole)
+    assert (alone.n_equally_good, one.n_equally_good) == (1, 2)
+    assert alone.confidence.mean() > 0.9
+    assert 0.4 < one.confidence.mean() <= 0.5
+    assert one.report[-1].startswith("piece 0 of the part fits piece ")
+    # Two fishes fit in two ways, and each of them may be either.
+    two = match_shapes(es.geometry.disjoint_union(moved(fish), fish), whole)
+    assert two.n_equally_good == 2
+    assert two.confidence.max() <= 0.5
+    assert np.unique(two.vertices // fish.n_vertices).tolist() == [0, 1]
+
+
 @pytest.mark.long
 def test_a_speck_beside_a_whole_is_left_out_by_name(target, cut, unmoved):
     speck = es.TriangleMesh(1e-3 * np.eye(3), [[0, 1, 2]])

@@ -233,6 +233,16 @@ def names_of_brainprint(shared: dict[str, Any]) -> dict[str, Any]:
     return names | {"Brainprint": Instance(kind, lambda: kind(Path(), **checks))}
 
 
+# Arrays and numbers that are equal on both sides of a page, at least: a row that says no more what it
+# said lowers this.
+N_EQUAL = {
+    "brainprint": 2,
+    "lapy": 13,
+    "neuromodes": 16,
+    "libigl": 14,
+    "potpourri3d": 3,
+    "pyfm": 1,
+}
 PEERS = {
     "brainprint": names_of_brainprint,
     "lapy": names_of_lapy,
@@ -335,24 +345,36 @@ def as_numbers(value: Any) -> np.ndarray | None:
     return None
 
 
-def complaints_about(cells: list[str], theirs: dict[str, Any], ours: dict[str, Any]) -> list[str]:
+def compare_row(
+    cells: list[str], theirs: dict[str, Any], ours: dict[str, Any]
+) -> tuple[int, list[str]]:
+    """Run both sides of a row. Return how many numbers or arrays are equal, and what is wrong."""
     with contextlib.redirect_stdout(io.StringIO()):
         try:
             expected = run(cells[0], theirs)
         except Exception as error:  # noqa: BLE001 - the law is that there is none
-            return [f"{cells[0]}: {type(error).__name__}: {error}"]
+            return 0, [f"{cells[0]}: {type(error).__name__}: {error}"]
         try:
             found = run(cells[1], ours)
         except Exception as error:  # noqa: BLE001
-            return [f"{cells[1]}: {type(error).__name__}: {error}"]
-    numbers = [as_numbers(values[0]) if values else None for values in (expected, found)]
-    if any(each is None for each in numbers) or numbers[0].shape != numbers[1].shape:
-        return []
+            return 0, [f"{cells[1]}: {type(error).__name__}: {error}"]
     if DIFFERENCE.search(cells[1]):
-        return []
-    if np.allclose(*numbers, rtol=1e-6, atol=1e-9 * np.abs(numbers[0]).max()):
-        return []
-    return [f"{cells}: {numbers[0].ravel()[:5]} there, {numbers[1].ravel()[:5]} here"]
+        return 0, []
+    # Where one side has more calls than the other, the first ones say the same.
+    n_compared = len(found) if len(found) == len(expected) else 1
+    n_equal, complaints = 0, []
+    for their_value, our_value in zip(expected[:n_compared], found[:n_compared], strict=False):
+        there, here = as_numbers(their_value), as_numbers(our_value)
+        if there is None or here is None:
+            continue
+        if there.shape == here.shape and np.allclose(
+            there, here, rtol=1e-6, atol=1e-9 * np.abs(there).max()
+        ):
+            n_equal += 1
+        else:
+            shown = [f"{each.shape} {each.ravel()[:5]}" for each in (there, here)]
+            complaints.append(f"{cells}: {shown[0]} there, {shown[1]} here")
+    return n_equal, complaints
 
 
 @pytest.mark.parametrize("page", PEERS)
@@ -363,9 +385,10 @@ def test_every_row_runs(page, tmp_path):
     except ImportError as error:
         pytest.skip(f"{error}")
     ours = our_names(shared)
-    rows = rows_of(page)
-    complaints = [text for cells in rows for text in complaints_about(cells, theirs, ours)]
+    outcomes = [compare_row(cells, theirs, ours) for cells in rows_of(page)]
+    complaints = [text for _, texts in outcomes for text in texts]
     assert not complaints, "\n".join(complaints)
+    assert sum(n_equal for n_equal, _ in outcomes) >= N_EQUAL[page]
 
 
 def names_for_collections(folder: Path) -> dict[str, Any]:

@@ -103,6 +103,12 @@ def solve_harmonic(
     --------
     es.calculus.polyharmonic_matrix : The energy that is minimized.
 
+    Notes
+    -----
+    Each order costs digits, on finer meshes more: between units of length, which change rounding
+    alone, results of orders 1, 2 and 3 differed by 2e-14, 4e-11 and 7e-6 of the largest value on a
+    creature of 800 vertices, and by 6e-14, 8e-9 and 4e-3 on an elk of 5,194.
+
     Examples
     --------
     >>> import eigenshape as es

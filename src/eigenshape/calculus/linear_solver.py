@@ -10,7 +10,6 @@ from scipy.sparse.csgraph import connected_components
 
 from eigenshape._arrays import ReadOnly, point_functions, real_numbers, record, require_finite_rows
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import Shown
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.operators.laplacian import as_symmetric, find_zero_row_sums, require_points
@@ -468,7 +467,7 @@ def _columns(value: ArrayLike, name: str, n_rows: int, noun: str) -> Float[np.nd
 # `LinearSolver` is for the systems of users: it checks pivots and right-hand sides at each call. What
 # follows is for systems that are built inside, where the remedy is a repair of the mesh.
 @record
-class GroundedFactor(Shown):
+class GroundedFactor(ReadOnly):
     """A stiffness matrix, factored with fixed points and one point of each component at 0.
 
     `factorize_grounded` makes it.

@@ -105,7 +105,7 @@ def _print_match(found: es.matching.ShapeMatch) -> None:
     if found.n_equally_good > 1:
         text += (
             f" At least {found.n_equally_good} maps that differ fit equally well, since the shape "
-            "can be turned into itself; this is one of them."
+            "can be turned into itself or the whole has equal pieces; this is one of them."
         )
     out.print("\n".join([text, *(f"{sentence}." for sentence in found.report)]))
 

@@ -58,7 +58,7 @@ class EdgeWeights(ReadOnly):
 
 
 @record
-class FreePart:
+class FreePart(ReadOnly):
     """The free vertices and their equations.
 
     Attributes

@@ -150,7 +150,7 @@ def move_skeleton(
 
 
 @record
-class FramedDetails:
+class FramedDetails(ReadOnly):
     """Details of a shape on a skeleton, in the local frames of the skeleton.
 
     Attributes

@@ -21,8 +21,8 @@ from eigenshape.matching.registration import (
 )
 from eigenshape.scans.reconstruction import reconstruct_surface
 
-# Least score of two scans that are joined. Of 50 pairs of frames of shapes that are not round, on
-# the tuning half of experiments/ch7_frames, 17 of 19 above it were placed right, and 4 of 23 below.
+# Least score of two scans that are joined. Of 50 pairs of frames of shapes that are not round, of the
+# tuning half of experiments/ch5_retrieval, 17 of 19 above it were placed right, and 4 of 23 below.
 LEAST_SCORE = 0.3
 
 

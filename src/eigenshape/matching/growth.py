@@ -170,15 +170,16 @@ def _grow_again(plan: FitPlan, costs: Float[np.ndarray, "m k"], fits: list[Fit])
 def equally_good_maps(
     plan: FitPlan, differences: Float[np.ndarray, "m k"], maps: Sequence[FittedMap]
 ) -> tuple[int, Float[np.ndarray, " n"]]:
-    """Count maps that differ from each other and fit as well as the first one, itself among them.
+    """Count maps that differ from each other and fit as well as any, the first one among them.
 
-    Also return at how many places each vertex may lie: 1, and 1 for each other map that moves it.
+    It is 0 if the first one does not. Also return at how many places each vertex may lie: 1, and 1
+    for each other map that moves it.
     """
     best, vertices = maps[0], plan.whole.mesh.vertices
     found, n_places = [best], np.ones(len(plan.shares))
     most = max(EQUALLY_GOOD, EQUALLY_GOOD_IN_EDGES * float(edge_lengths(plan.whole.mesh).mean()))
     if best.fit.misfit > most:
-        return 1, n_places
+        return 0, n_places
 
     def elsewhere(one: FittedMap, other: FittedMap) -> Float[np.ndarray, " n"]:
         gaps = np.linalg.norm(vertices[one.fit.places] - vertices[other.fit.places], axis=1)

@@ -104,7 +104,9 @@ def match_shapes(
         "known": both shapes have one unit of length. A number: lengths of the part are multiplied
         by it first. "unknown": seven sizes are tried, which takes five times as long. "auto": the
         root of the ratio of areas if both shapes are complete and differ in size by more than
-        10 %; else "known", or "unknown" if the part is too large or too small for that.
+        10 %; else "known", or "unknown" if the part is too large or too small for that. If the
+        numbers of pieces differ, the piece of the whole that is nearest in size to the largest one
+        of the part stands for all.
     progress : callable, optional
         Called as progress(fraction_done, message).
 
@@ -167,15 +169,20 @@ def match_shapes(
 
 @record
 class _Piece:
-    """The map of a connected part; see `ShapeMatch`."""
+    """The map of a connected part; see `ShapeMatch`.
+
+    `confidence` is that without other maps that fit as well, which put each vertex at `n_places`.
+    `n_perfect` is the number of those maps, this one among them; 0 if this one fits less well.
+    """
 
     faces: Int[np.ndarray, " n"]
     weights: Float[np.ndarray, "n 3"]
     confidence: Float[np.ndarray, " n"]
+    n_places: Float[np.ndarray, " n"]
     evidence: Float[np.ndarray, "n c"]
     quality: Quality
     handed: bool
-    n_equally_good: int
+    n_perfect: int
 
 
 def _match_pieces(
@@ -202,6 +209,9 @@ def _match_pieces(
     report += report_left_out(mesh, matched, "part") + target.report
     found: list[_Piece] = []
     free = [each.piece.area / factor**2 for each in target.pieces]
+    # Pieces of the whole on which a piece of the part fits equally well
+    twins = np.zeros((len(free), len(free)), dtype=bool)
+    n_equally_good = 1
     for number, piece in enumerate(matched):
         # A piece of the whole that other pieces cover is only taken if there is no other.
         roomy = [k for k, area in enumerate(free) if area >= FREE * piece.area] or [0]
@@ -211,11 +221,22 @@ def _match_pieces(
         free[best] -= piece.area
         faces[piece.vertices] = target.pieces[best].piece.faces[one.faces]
         weights[piece.vertices] = one.weights
-        sure[piece.vertices], evidence[piece.vertices] = one.confidence, one.evidence
+        others = [k for k in maps if k != best and one.n_perfect and maps[k].n_perfect]
+        twins[best, others] = twins[others, best] = True
+        if one.n_perfect:
+            # Had a piece before this one taken the twin, this one might lie where that one does.
+            others += [k for k in np.flatnonzero(twins[best]).tolist() if k not in maps]
+        # Each of several equally good places is as likely as the others.
+        n_elsewhere = one.n_perfect * len(others)
+        sure[piece.vertices] = one.confidence / (one.n_places + n_elsewhere)
+        n_equally_good = max(n_equally_good, one.n_perfect + n_elsewhere)
+        evidence[piece.vertices] = one.evidence
         done[piece.vertices] = True
         found.append(one)
         if len(target.pieces) > 1:
             report += (f"piece {number} of the part was placed on piece {best} of the whole",)
+        for other in others:
+            report += (f"piece {number} of the part fits piece {other} of the whole as well",)
     if not done.all():
         nearest = np.flatnonzero(done)[cKDTree(mesh.vertices[done]).query(mesh.vertices[~done])[1]]
         faces[~done], weights[~done] = faces[nearest], weights[nearest]
@@ -236,7 +257,7 @@ def _match_pieces(
         orientation=mean("orientation"),
         coverage=mean("coverage"),
         handed=all(one.handed for one in found),
-        n_equally_good=max(one.n_equally_good for one in found),
+        n_equally_good=n_equally_good,
         scale=factor,
         report=report,
     )
@@ -272,9 +293,8 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
         else:
             # Step 6: make the best map smooth.
             faces, weights = refine_places(modes, target.modes, whole.mesh, best.fit.places)
-        n_equally_good, n_places = equally_good_maps(plan, differences, maps)
-        # Each of several equally good places is as likely as the others.
-        sure = confidence(evidence) / n_places
+        n_perfect, n_places = equally_good_maps(plan, differences, maps)
+        sure = confidence(evidence)
     else:
         # Too few points agree for a map: take the most similar patch of each, and trust none.
         partners = differences.argmin(axis=1)
@@ -283,7 +303,9 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
         quality = rate_map(part, whole, differences, pairs, places)
         faces, weights = corners_of_faces(whole.mesh, places)
         sure, evidence = np.zeros(len(places)), np.zeros((len(places), N_COLUMNS))
-        n_equally_good = 1
-    values = np.column_stack([sure, evidence])
+        n_perfect, n_places = 0, np.ones(len(places))
+    values = np.column_stack([sure, n_places, evidence])
     faces, weights, values = carry_map(copy, target.piece.copy, faces, weights, values)
-    return _Piece(faces, weights, values[:, 0], values[:, 1:], quality, handed, n_equally_good)
+    return _Piece(
+        faces, weights, values[:, 0], values[:, 1], values[:, 2:], quality, handed, n_perfect
+    )

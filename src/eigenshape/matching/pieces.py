@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import record
+from eigenshape._arrays import ReadOnly, record
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import edge_lengths, face_areas, mean_normals, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -164,7 +164,7 @@ def _nearest_places(
 
 
 @record
-class Piece:
+class Piece(ReadOnly):
     """A connected piece of a mesh: its faces and vertices there, its area, and its working copy."""
 
     faces: Int[np.ndarray, " f"]

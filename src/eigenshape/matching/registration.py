@@ -23,7 +23,7 @@ from eigenshape.retrieval.patches.matching import PatchPoints, squared_distances
 from eigenshape.retrieval.patches.patches import RADII, extract_patches
 
 # Lengths below are in sides of the larger box of the two scans. All numbers were chosen on the
-# tuning half of experiments/ch7_frames.
+# tuning half of experiments/ch5_retrieval.
 N_SAMPLES = 600  # points of a scan whose fit is measured
 N_CANDIDATES = 5  # partners of each patch, in both directions
 MOST_CANDIDATES = 400  # most similar pairs of patches; memory grows with their square

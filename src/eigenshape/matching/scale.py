@@ -52,11 +52,18 @@ def choose_factor(
     area = sum(piece.clean_area() for piece in pieces)
     ratio = target.area / area
     if scale == "auto" and is_complete(mesh) and is_complete(target.mesh):
+        reason = "areas: both shapes are complete"
+        if len(pieces) != len(target.pieces):
+            # Not all pieces have a counterpart, so the nearest in size is taken for that of the largest.
+            ratios = [piece.area / pieces[0].clean_area() for piece in target.pieces]
+            nearest = int(np.argmin(np.abs(np.log(ratios))))
+            ratio = ratios[nearest]
+            reason = f"the areas of piece 0 of the part and piece {nearest} of the whole"
         factor = float(np.sqrt(ratio))
         if 1 / SAME_SIZE < factor < SAME_SIZE:
             return 1.0, ()
         chosen = f"lengths of the part were multiplied by {factor:.3g}"
-        return factor, (f"{chosen}, the root of the ratio of areas: both shapes are complete",)
+        return factor, (f"{chosen}, the root of the ratio of {reason}",)
     is_small = max(piece.area for piece in pieces) < LEAST_AREA * surface_area(target.mesh)
     if scale == "unknown" or (scale == "auto" and (is_small or ratio * MOST_AREA < 1)):
         factor = _find_factor(pieces[0], target)

@@ -48,7 +48,8 @@ class ShapeMatch(ReadOnly):
     n_equally_good : int
         How many maps that differ over most of the part fit as well as this one, itself among them: 1
         if it is the only one. A ball turned on itself has many, a cube 24. The search ends at about
-        ten. Where other maps place a vertex elsewhere, its confidence is divided by their number.
+        ten. A whole of two equal pieces has two, and `report` names the other piece. Where other maps
+        place a vertex elsewhere, its confidence is divided by their number.
     scale : float
         Factor by which lengths of the part were multiplied.
     report : tuple of str

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import record
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._threads import map_in_threads
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
@@ -21,7 +21,7 @@ ROWS_AT_ONCE = 1000  # vertices of which a thread has distances to all others in
 
 
 @record
-class Modes:
+class Modes(ReadOnly):
     """Eigenvalues, in 1 / unit², and eigenfunctions of a surface, orthonormal by its areas."""
 
     eigenvalues: Float[np.ndarray, " k"]

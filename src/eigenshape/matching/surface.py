@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Complex64, Float, Float32, Int
 
-from eigenshape._arrays import record
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._threads import map_in_threads
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
@@ -31,7 +31,7 @@ MATCHED_RADII = RADII[list(BASES)]  # of the discs that are compared, in units
 
 
 @record
-class View:
+class View(ReadOnly):
     """Points of a whole, by number, that one viewpoint sees, and their whitened discs there."""
 
     points: Int[np.ndarray, " q"]
@@ -40,7 +40,7 @@ class View:
 
 
 @record
-class Surface:
+class Surface(ReadOnly):
     """A mesh in the unit of the whole, and m of its vertices with what matching compares.
 
     `distances` are from the points to all vertices, `columns` the same as rows of vertices, and

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import record
+from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
@@ -17,7 +17,7 @@ from eigenshape.operators.tufted import edge_keys, side_ends
 
 
 @record
-class Directions:
+class Directions(ReadOnly):
     """The directions of the sides of all faces; side 3f + s runs from corner s of face f to the next.
 
     Attributes

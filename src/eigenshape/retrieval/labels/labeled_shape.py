@@ -34,7 +34,7 @@ SMALLEST_RADIUS, LARGEST_RADIUS = 0.005, 1.0  # of balls, in sides of the box
 
 
 @record
-class LabelPoints:
+class LabelPoints(ReadOnly):
     """Points of a shape, their descriptors, and their distances.
 
     Attributes

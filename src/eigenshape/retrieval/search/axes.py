@@ -4,7 +4,7 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float32, Int8, Int16
 
-from eigenshape._arrays import freeze, record
+from eigenshape._arrays import ReadOnly, freeze, record
 from eigenshape._threads import one_blas_thread
 
 # Axes kept at each base radius. With 64 the best ten were missed five times as often, and 256
@@ -15,7 +15,7 @@ LARGEST_OF_QUERY = 8191  # the sum of 3 × 128 products with coarse rows stays b
 
 
 @record
-class PatchAxes:
+class PatchAxes(ReadOnly):
     """Axes on which codes of one codebook vary most.
 
     Attributes
