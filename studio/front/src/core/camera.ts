@@ -48,6 +48,16 @@ export class Eye {
     return controls;
   }
 
+  /** Take the size of the canvas, of which the lowest pixels are covered: pictures fit above them. */
+  frame(width: number, height: number, covered: number): void {
+    this.camera.setViewOffset(width, height - covered, 0, 0, width, height);
+  }
+
+  /** Return how many pixels of the canvas the picture is high. */
+  get pixels(): number {
+    return this.camera.view?.fullHeight ?? this.canvas.clientHeight;
+  }
+
   /** Show all vertices upright, from the front; `world` brings them into the scene. */
   fit(vertices: Float32Array, world: three.Matrix4): void {
     const up = new three.Vector3(...this.up);

@@ -73,6 +73,7 @@ export class Viewer {
   private solid = false;
   private folded = false;
   private clipped = false;
+  private covered = 0; // pixels, from below
 
   constructor(readonly stage: HTMLElement) {
     const { canvas, surface, skeleton, discs } = this;
@@ -393,7 +394,7 @@ export class Viewer {
 
   /** Return how many pixels of the page a length has at the point that the camera turns about. */
   pixelsOf(length: number): number {
-    return (this.canvas.clientHeight * length) / (this.eye.height * this.extent);
+    return (this.eye.pixels * length) / (this.eye.height * this.extent);
   }
 
   /** Return the ray through a place of the canvas, in the coordinates of the mesh. */
@@ -415,9 +416,15 @@ export class Viewer {
     const { clientWidth: width, clientHeight: height } = this.stage;
     if (!width || !height) return;
     this.renderer?.setSize(width, height);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.eye.frame(width, height, this.covered);
     this.draw();
+  }
+
+  /** Let the shape be seen above what covers so many of the lowest pixels. */
+  cover(pixels: number): void {
+    if (pixels === this.covered) return;
+    this.covered = pixels;
+    this.resize();
   }
 
   /** Draw now. In software, edges are smooth only in a `fine` picture, drawn when all is at rest. */
