@@ -326,7 +326,8 @@ def test_keys_alone_choose_bend_and_undo(page, mesh, rig):
     chosen = np.flatnonzero(region_mask(mesh, BoxRegion(low, high)))
     np.testing.assert_array_equal(region(page), chosen)
 
-    page.keyboard.press("v")
+    walk_to(page, "tool-pivot")
+    page.keyboard.press("Enter")
     walk_to(page, "pivot-2")
     page.keyboard.type("0.125")
     page.keyboard.press("Enter")

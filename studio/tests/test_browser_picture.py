@@ -14,6 +14,7 @@ from browser import (
     open_page,
     picture,
     place_of,
+    positions,
     serve_studio,
     vertex_values,
     wait_for_edits,
@@ -215,6 +216,12 @@ def test_on_a_phone_fingers_turn_zoom_and_bend_where_they_are_told_to(browser, u
         assert [box["width"] for box in boxes] == [PHONE[0] / 2, PHONE[0] / 2]
         assert boxes[0]["height"] == boxes[1]["height"] == stage["height"]
         assert page.evaluate("eigenshape.second.viewer.covered") > 100
+        # Also where the panel has gone away, nothing of them is cut off.
+        find(page, "sheet").click()
+        wait_until_still(page)
+        assert page.evaluate("eigenshape.second.viewer.covered") == 0
+        places = np.array([place_of(page, point) for point in positions(page)[::9]])
+        assert 0 < places[:, 0].min() < places[:, 0].max() < PHONE[0] / 2
 
 
 def swipe(page, fingers, x, y):

@@ -103,7 +103,6 @@ export class Studio {
     this.viewer = new Viewer(this.page.get("stage"));
     this.viewer.onView = (view) => settings.set("view", view);
     new ResizeObserver(() => this.cover()).observe(this.page.get("panels"));
-    this.secondShown.push(() => this.cover());
     this.page.on({
       theme: () => this.switchTheme(),
       sheet: () => this.showSheet(!this.main.classList.contains("sheet")),
@@ -414,7 +413,9 @@ export class Studio {
   private cover(): void {
     const panels = this.page.get("panels");
     const lies = this.main.classList.contains("sheet") && getComputedStyle(panels).position === "absolute";
-    for (const viewer of [this.viewer, this.second?.viewer]) viewer?.cover(lies ? panels.offsetHeight : 0);
+    const pixels = lies ? panels.offsetHeight : 0;
+    this.second?.viewer.cover(pixels, true);
+    this.viewer.cover(pixels);
   }
 
   private setTheme(dark: boolean): void {

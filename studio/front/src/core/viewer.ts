@@ -73,7 +73,7 @@ export class Viewer {
   private solid = false;
   private folded = false;
   private clipped = false;
-  private covered = 0; // pixels, from below
+  covered = 0; // pixels, from below
 
   constructor(readonly stage: HTMLElement) {
     const { canvas, surface, skeleton, discs } = this;
@@ -420,11 +420,15 @@ export class Viewer {
     this.draw();
   }
 
-  /** Let the shape be seen above what covers so many of the lowest pixels. */
-  cover(pixels: number): void {
+  /**
+   * Let the shape be seen above what covers so many of the lowest pixels. A camera that follows
+   * another one is moved by that.
+   */
+  cover(pixels: number, follows = false): void {
     if (pixels === this.covered) return;
     this.covered = pixels;
-    this.resize();
+    if (follows || !this.vertices.length) this.resize();
+    else this.eye.reframe(() => this.resize(), this.vertices, this.space.matrixWorld);
   }
 
   /** Draw now. In software, edges are smooth only in a `fine` picture, drawn when all is at rest. */
