@@ -159,6 +159,7 @@ def check_that_the_map_stays(page):
         act()
         wait_until(page, f"eigenshape.state.shape !== {number}")
         number = page.evaluate("eigenshape.state.shape")
+        wait_until_still(page)
         wait_until(page, f"{MAP} !== null")
         assert page.evaluate(f"Array.from({MAP}.partners[0])") == partners
 
