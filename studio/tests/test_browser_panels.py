@@ -1,5 +1,6 @@
 """The panels in a real browser: what they show is what the library computes."""
 
+import csv
 import io
 
 import numpy as np
@@ -486,3 +487,26 @@ def test_tab_reaches_every_control_of_every_panel(page):
         assert not missed, (name, missed)
         page.evaluate("eigenshape.pages.get(eigenshape.active.id).tab.focus()")
         page.keyboard.press("ArrowRight")
+
+
+def test_a_part_is_named_and_all_are_saved_as_a_table(page, tmp_path):
+    open_panel(page, "parts", "diagram")
+    labels = vertex_labels(page)
+    move_slider(page, "maximum", 1)
+    part = page.evaluate("eigenshape.active.part")
+    find(page, "part-name").fill('the "head"')
+    find(page, "part-name").press("Enter")
+    assert find(page, "chosen-part").inner_text().startswith('the "head": ')
+    page.reload()  # names survive that
+    find(page, "all-parts").wait_for()
+    wait_until_still(page)
+    with page.expect_download() as saved:
+        find(page, "save-parts").click()
+    assert saved.value.suggested_filename == "quadruped.parts.csv"
+    saved.value.save_as(tmp_path / "parts.csv")
+    with (tmp_path / "parts.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["vertex"]) for row in rows] == list(range(len(labels)))
+    assert [int(row["part"]) for row in rows] == labels.tolist()
+    names = {int(row["part"]): row["name"] for row in rows}
+    assert names == {each: f"part {each}" for each in set(labels)} | {part: 'the "head"'}

@@ -39,6 +39,7 @@ export class Viewer {
   onView: (view: View) => void = () => {};
   onMove: () => void = () => {}; // of the camera
   twin: Colors | null = null; // is told of all colors
+  partNames: Record<number, string> = {}; // that the person gave, by the number of the part
   /** Everything in the coordinates of the mesh; the scene around it has size 1 at any unit. */
   readonly space = new three.Group();
   readonly scene = new three.Scene();
@@ -231,9 +232,10 @@ export class Viewer {
   private showTip(hit: Hit | null, x: number, y: number): void {
     const { scalars, labels, tip } = this;
     const value = hit && scalars && formatNumber(scalars.values[hit.vertex]!);
-    const part = hit && labels && `part ${labels[hit.vertex]}`;
+    const label = hit && labels && labels[hit.vertex]!;
+    const part = label !== null && (this.partNames[label] ?? `part ${label}`);
     tip.hidden = !value && !part;
-    tip.textContent = value ? `${value} at vertex ${hit.vertex}` : (part ?? "");
+    tip.textContent = value ? `${value} at vertex ${hit.vertex}` : part || "";
     Object.assign(tip.style, { left: `${x}px`, top: `${y}px` });
   }
 
