@@ -241,6 +241,8 @@ def measure_size(browser: Browser, folder: Path, n_vertices: int) -> list[Row]:
         memory = peak_memory(server)
         studio.wait_until_still(page)
         held = process_memory(browser_processes())
+        # Daylight is computed with the first frames, which are not those that are meant.
+        studio.wait_until(page, "eigenshape.viewer.ambient.ground.visible")
         server.suspend()  # only the browser shall work now
         million = n_vertices > LARGEST_CREATURE
         step = "() => eigenshape.viewer.invalidate()"
@@ -351,6 +353,7 @@ def main() -> None:
     parser.add_argument(
         "--minutes", type=float, default=0.0, help="of work by a script, for the memory; none"
     )
+    parser.add_argument("--sizes", type=int, nargs="+", help="vertices of the table of sizes")
     parser.add_argument(
         "--only", action="append", choices=["drag", "opening", "sizes", "report", "work"]
     )
@@ -366,7 +369,7 @@ def main() -> None:
             "opening": lambda: measure_opening(browser, folder, large),
             "sizes": lambda: [
                 found
-                for size in (QUICK_SIZES if options.quick else SIZES)
+                for size in options.sizes or (QUICK_SIZES if options.quick else SIZES)
                 for found in measure_size(browser, folder, size)
             ],
             "report": lambda: measure_report(folder, reported),
