@@ -49,6 +49,7 @@ SIZES, QUICK_SIZES = (5_000, 25_000, 100_000, 1_000_000), (2_000, 8_000)
 N_FRAMES = 30
 WARM = 120.0  # seconds of work after which memory may no longer grow
 BEAST = "giraffe"
+MOST_LIT = 400_000  # faces of a shape for which daylight is computed, as in ambient.ts
 LARGEST_CREATURE = 100_000  # vertices; larger shapes are subdivided
 # Resolves with the seconds from the end of the next stroke of the pointer until regions can be moved.
 WATCH = """() => {
@@ -242,7 +243,8 @@ def measure_size(browser: Browser, folder: Path, n_vertices: int) -> list[Row]:
         studio.wait_until_still(page)
         held = process_memory(browser_processes())
         # Daylight is computed with the first frames, which are not those that are meant.
-        studio.wait_until(page, "eigenshape.viewer.ambient.ground.visible")
+        if mesh.n_faces <= MOST_LIT:
+            studio.wait_until(page, "eigenshape.viewer.ambient.ground.visible")
         server.suspend()  # only the browser shall work now
         million = n_vertices > LARGEST_CREATURE
         step = "() => eigenshape.viewer.invalidate()"
