@@ -107,7 +107,11 @@ FIGURES = {
     "index": Figure("bench_index.py --sizes 10000", STORE),
     "service": Figure("bench_service.py --minutes 1", ("retrieval/store", "../../studio/src")),
     "build": Figure("bench_build.py", STORE),
-    "studio": Figure("bench_studio.py", ("../../studio", "deformation")),
+    "studio": Figure(
+        "bench_studio.py --only drag --only opening --only report",
+        ("../../studio", "deformation"),
+    ),
+    "studio_sizes": Figure("bench_studio.py --only sizes", ("../../studio",)),
     "ugly": Figure(
         "bench_ugly.py --only nasty --limit 600", ("geometry/repairs", "io", "operators")
     ),

@@ -270,6 +270,11 @@ def region(page: Page, number: int = 0) -> np.ndarray:
     )
 
 
+def limb(page: Page, number: int) -> np.ndarray:
+    """Return the vertices of a limb, ascending: those of its part, and of all that hangs on it."""
+    return np.array(page.evaluate(f"Array.from({PANEL}.limbs.verticesOf({number}))"), dtype=int)
+
+
 def wait_until_bound(page: Page) -> None:
     """Wait until the regions can be moved."""
     wait_until(page, f"{PANEL}.form.root.dataset.ready === 'true'")

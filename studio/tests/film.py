@@ -51,7 +51,11 @@ DECORATE = """() => {
     const follow = ({ clientX, clientY }) =>
         Object.assign(pointer.style, { left: `${clientX}px`, top: `${clientY}px` });
     window.addEventListener("pointermove", follow, { capture: true });
-    window.caption = make({ left: "28px", bottom: "48px", font: "600 30px system-ui, sans-serif", color: "#24221f" });
+    // The page gives elements of its body all its height.
+    window.caption = make({
+        left: "28px", bottom: "48px", height: "auto",
+        font: "600 30px system-ui, sans-serif", color: "#24221f",
+    });
 }"""
 
 

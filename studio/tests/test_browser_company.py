@@ -143,9 +143,25 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
 
     check_painting_on_the_second(page, es.read_mesh(other))
 
+    check_that_the_map_stays(page)
+
     find(page, "close-match").click()
     wait_until(page, "eigenshape.second === null")
     assert page.locator('[data-test="canvas"]').count() == 1
+
+
+def check_that_the_map_stays(page):
+    """The map stays when the shape takes the pose of the other one, and when that is undone."""
+    find(page, "tab-compare").click()
+    partners = page.evaluate(f"Array.from({MAP}.partners[0])")
+    number = page.evaluate("eigenshape.state.shape")
+    for act in (find(page, "take-pose").click, lambda: page.keyboard.press("Control+z")):
+        act()
+        wait_until(page, f"eigenshape.state.shape !== {number}")
+        number = page.evaluate("eigenshape.state.shape")
+        wait_until_still(page)
+        wait_until(page, f"{MAP} !== null")
+        assert page.evaluate(f"Array.from({MAP}.partners[0])") == partners
 
 
 def check_painting_on_the_second(page, second):
@@ -220,6 +236,14 @@ def test_a_cloud_is_shown_as_points_or_as_its_surface(page, tmp_path):
     wait_until(page, "eigenshape.state.n_points === 642")
     find(page, "cloud").wait_for()
     assert not page.evaluate("eigenshape.viewer.surface.visible")
+    # Nothing lies over its buttons.
+    click = """(name) => {
+        const box = eigenshape.main.querySelector('[data-test="cloud"]').getBoundingClientRect();
+        const root = eigenshape.main.getRootNode();
+        return [0.1, 0.5, 0.9].map((share) =>
+            root.elementFromPoint(box.x + share * box.width, box.y + box.height / 2).textContent);
+    }"""
+    assert page.evaluate(click) == ["Points", "Surface", "Surface"]
     find(page, "cloud").get_by_text("Surface").click()
     assert page.evaluate("eigenshape.viewer.surface.visible")
     page.keyboard.press("Control+z")

@@ -326,13 +326,22 @@ def test_keys_alone_choose_bend_and_undo(page, mesh, rig):
     chosen = np.flatnonzero(region_mask(mesh, BoxRegion(low, high)))
     np.testing.assert_array_equal(region(page), chosen)
 
+    walk_to(page, "tool-pivot")
+    page.keyboard.press("Enter")
+    walk_to(page, "pivot-2")
+    page.keyboard.type("0.125")
+    page.keyboard.press("Enter")
+    pivot = page.evaluate(f"{PANEL}.motion.pivotOf(0)")
+    assert pivot[2] == 0.125
+
     walk_to(page, "exact-kind")
     page.keyboard.press("Home")
     walk_to(page, "exact-amount")
     page.keyboard.type("35")
     page.keyboard.press("Enter")
     wait_for_edits(page, 1)
-    bent = turn_by(mesh, rig, chosen, 35).vertices
+    motion = es.Rotation(pivot, [1, 0, 0], np.radians(35))
+    bent = bend(bind(rig, [chosen]), [motion]).vertices
     np.testing.assert_allclose(positions(page), bent, atol=SHADER)
 
     page.keyboard.press("Tab")  # in a field the keys belong to its text

@@ -6,6 +6,7 @@ from browser import (
     PANEL,
     drop_file,
     find,
+    limb,
     move_pointer,
     open_page,
     place_of,
@@ -16,6 +17,8 @@ from browser import (
     wait_until,
     wait_until_still,
 )
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 import eigenshape as es
 from eigenshape.deformation import bend, bind
@@ -37,14 +40,13 @@ def page(browser, url):
 
 def test_a_limb_lights_up_and_bends_without_any_step_before(page, mesh, rig):
     assert find(page, "hint").inner_text().startswith("Point at a limb")
-    labels = np.array(page.evaluate(f"Array.from({LIMBS}.labels)"))
-    limb = page.evaluate(HAS_LIMBS)
-    chosen = np.flatnonzero(labels == limb["number"])
+    number = page.evaluate(HAS_LIMBS)["number"]
+    chosen = limb(page, number)
     x, y = place_of(page, mesh.vertices[chosen].mean(axis=0))
     move_pointer(page, x, y)
-    wait_until(page, f"{LIMBS}.lit === {limb['number']}")
+    wait_until(page, f"{LIMBS}.lit === {number}")
     lit = vertex_values(page, "mark").reshape(-1, 4)[:, 3]
-    inside = labels == limb["number"]
+    inside = np.isin(np.arange(mesh.n_vertices), chosen)
     assert ((lit > lit.max() / 2) == inside).mean() > 0.97  # its rim is soft
     assert not lit[~inside].all()
 
@@ -63,6 +65,27 @@ def test_a_limb_lights_up_and_bends_without_any_step_before(page, mesh, rig):
     page.keyboard.press("Control+z")
     wait_for_edits(page, 0)
     np.testing.assert_array_equal(positions(page), mesh.vertices.astype("f4"))
+    # In another panel no limb is lit.
+    move_pointer(page, x, y)
+    wait_until(page, f"{LIMBS}.lit === {number}")
+    find(page, "tab-shape").click()
+    assert not vertex_values(page, "mark").any()
+
+
+def test_what_hangs_on_a_limb_moves_with_it(page, mesh):
+    # Where the quadruped has more parts than limbs, one of them hangs on another.
+    labels = np.array(page.evaluate(f"Array.from({LIMBS}.labels)"))
+    body = page.evaluate(f"{LIMBS}.body")
+    edges = np.vstack([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
+    for number in np.unique(labels[labels != body]):
+        # Without this limb the rest is in one piece, which holds the body.
+        rest = np.setdiff1d(np.arange(mesh.n_vertices), limb(page, number))
+        inside = np.isin(edges, rest).all(axis=1)
+        graph = coo_array(
+            (np.ones(inside.sum()), edges[inside].T), shape=(mesh.n_vertices, mesh.n_vertices)
+        )
+        pieces = connected_components(graph, directed=False)[1]
+        assert len(set(pieces[rest])) == 1
 
 
 def test_a_character_with_seams_says_what_keeps_its_limbs_from_bending(page, tmp_path, mesh):

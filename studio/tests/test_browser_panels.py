@@ -1,5 +1,6 @@
 """The panels in a real browser: what they show is what the library computes."""
 
+import csv
 import io
 
 import numpy as np
@@ -457,3 +458,55 @@ def test_report_opens_from_a_file_without_a_server(browser, folder, mesh):
     with open_page(browser, f"{path.as_uri()}#parts") as page:
         find(page, "diagram").wait_for()
         assert find(page, "tab-parts").get_attribute("aria-selected") == "true"
+
+
+def test_tab_reaches_every_control_of_every_panel(page):
+    wait_until(page, "eigenshape.state.parts.status === 'ready'")
+    open_panel(page, "search")
+    find(page, "search").click()
+    find(page, "match-0").wait_for()
+    list_controls = """window.controls = [...eigenshape.main.querySelectorAll(
+            "button, input, select, summary, canvas[tabindex]"
+        )].filter((each) => each.checkVisibility({ visibilityProperty: true }) && !each.disabled
+            && each.role !== "tab"), controls.map((each) =>
+            each.dataset.test || each.outerHTML.slice(0, 90))"""
+    # Arrow keys go from tab to tab, as everywhere.
+    find(page, "tab-deform").click()
+    tabs = page.evaluate("[...eigenshape.pages.keys()]")
+    for name in tabs:
+        assert page.evaluate("eigenshape.active.id") == name
+        wait_until_still(page)
+        names = page.evaluate(list_controls)
+        page.evaluate("eigenshape.viewer.canvas.focus()")
+        reached = {page.evaluate("controls.indexOf(eigenshape.viewer.canvas)")}
+        focus = "controls.indexOf(eigenshape.main.getRootNode().activeElement)"
+        for _ in range(len(names) + 5):
+            page.keyboard.press("Tab")
+            reached.add(page.evaluate(focus))
+        missed = [each for i, each in enumerate(names) if i not in reached]
+        assert not missed, (name, missed)
+        page.evaluate("eigenshape.pages.get(eigenshape.active.id).tab.focus()")
+        page.keyboard.press("ArrowRight")
+
+
+def test_a_part_is_named_and_all_are_saved_as_a_table(page, tmp_path):
+    open_panel(page, "parts", "diagram")
+    labels = vertex_labels(page)
+    move_slider(page, "maximum", 1)
+    part = page.evaluate("eigenshape.active.part")
+    find(page, "part-name").fill('the "head"')
+    find(page, "part-name").press("Enter")
+    assert find(page, "chosen-part").inner_text().startswith('the "head": ')
+    page.reload()  # names survive that
+    find(page, "all-parts").wait_for()
+    wait_until_still(page)
+    with page.expect_download() as saved:
+        find(page, "save-parts").click()
+    assert saved.value.suggested_filename == "quadruped.parts.csv"
+    saved.value.save_as(tmp_path / "parts.csv")
+    with (tmp_path / "parts.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["vertex"]) for row in rows] == list(range(len(labels)))
+    assert [int(row["part"]) for row in rows] == labels.tolist()
+    names = {int(row["part"]): row["name"] for row in rows}
+    assert names == {each: f"part {each}" for each in set(labels)} | {part: 'the "head"'}

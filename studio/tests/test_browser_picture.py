@@ -8,11 +8,13 @@ from browser import (
     PANEL,
     find,
     find_faults,
+    limb,
     move_pointer,
     move_slider,
     open_page,
     picture,
     place_of,
+    positions,
     serve_studio,
     vertex_values,
     wait_for_edits,
@@ -177,12 +179,18 @@ def test_on_a_phone_fingers_turn_zoom_and_bend_where_they_are_told_to(browser, u
         assert find(page, "stage").bounding_box() == stage  # the panel lies over it
         find(page, "tab-deform").click()
         find(page, "hint").wait_for()
+        assert "Finger: turns" in find(page, "hint").inner_text()
+        # All of the shape is seen above the panel, and is picked where it is seen.
+        wait_until_still(page)
+        top = find(page, "panels").bounding_box()["y"]
+        places = np.array([place_of(page, mesh.vertices[v]) for v in range(0, mesh.n_vertices, 9)])
+        assert places[:, 1].max() < top
+        assert front_vertices(page, mesh)
         find(page, "sheet").click()
         assert not find(page, "hint").is_visible()
 
-        labels = np.array(page.evaluate(f"Array.from({PANEL}.limbs.labels)"))
-        limb = page.evaluate(f"{PANEL}.limbs.farthest().number")
-        x, y = place_of(page, mesh.vertices[labels == limb].mean(axis=0))
+        chosen = limb(page, page.evaluate(f"{PANEL}.limbs.farthest().number"))
+        x, y = place_of(page, mesh.vertices[chosen].mean(axis=0))
         camera = "eigenshape.viewer.camera.position.toArray()"
         distance = "eigenshape.viewer.camera.position.distanceTo(eigenshape.viewer.controls.target)"
         start, away = page.evaluate(camera), page.evaluate(distance)
@@ -200,6 +208,20 @@ def test_on_a_phone_fingers_turn_zoom_and_bend_where_they_are_told_to(browser, u
         assert find(page, "finger").inner_text() == "Finger: bends or paints"
         swipe(page, fingers, x, y)
         wait_for_edits(page, 1)
+        # Two shapes stand side by side, both above the panel.
+        find(page, "tab-compare").click()
+        find(page, "second-sample").select_option("hand")
+        wait_until(page, "eigenshape.second?.viewer.vertices.length > 0")
+        boxes = [find(page, name).bounding_box() for name in ("stage", "beside")]
+        assert [box["width"] for box in boxes] == [PHONE[0] / 2, PHONE[0] / 2]
+        assert boxes[0]["height"] == boxes[1]["height"] == stage["height"]
+        assert page.evaluate("eigenshape.second.viewer.covered") > 100
+        # Also where the panel has gone away, nothing of them is cut off.
+        find(page, "sheet").click()
+        wait_until_still(page)
+        assert page.evaluate("eigenshape.second.viewer.covered") == 0
+        places = np.array([place_of(page, point) for point in positions(page)[::9]])
+        assert 0 < places[:, 0].min() < places[:, 0].max() < PHONE[0] / 2
 
 
 def swipe(page, fingers, x, y):

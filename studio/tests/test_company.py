@@ -165,6 +165,12 @@ def test_a_correction_is_made_and_taken_back(poses):
     away = np.linalg.norm(bent.vertices - whole.vertices, axis=1)
     still = np.linalg.norm(part.vertices - whole.vertices, axis=1)
     assert away.mean() < 0.5 * still.mean()
+    # The map is that of the new pose, too, and can be corrected there.
+    posed = beside.of_pose(bent)
+    assert posed.is_of(bent, 1)
+    assert posed.job.wait(600)
+    np.testing.assert_array_equal(posed.array("partners/0"), beside.array("partners/0"))
+    assert posed.check_pairs(np.array([7, near], "<u4")).tolist() == [[7, near]]
 
 
 def test_landmarks_are_placed_saved_and_loaded():

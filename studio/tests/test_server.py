@@ -5,6 +5,7 @@ import http.client
 import json
 import os
 import re
+import signal
 import socket
 import struct
 import subprocess
@@ -42,9 +43,9 @@ TAB = "a-tab-of-the-tests"
 class Server:
     """A studio in a process of its own, and requests to it."""
 
-    def __init__(self, path):
-        command = [sys.executable, "-c", SCRIPT, str(path)]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    def __init__(self, path, setup="", stderr=None):
+        command = [sys.executable, "-c", setup + SCRIPT, str(path)]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True)
         self.url = self.process.stdout.readline().strip()
         parts = urlsplit(self.url)
         self.port, self.token = parts.port, parts.query.removeprefix("token=")
@@ -416,6 +417,24 @@ def test_many_good_calls_leave_the_server_well(server):
 def test_another_address_takes_permission(host):
     with pytest.raises(es.InvalidParameterError, match="--allow-remote"):
         serve(host=host, browse=False)
+
+
+def test_ctrl_c_while_a_call_is_answered_prints_nothing(tmp_path):
+    path = tmp_path / "ball.ply"
+    es.write_mesh(es.icosphere(1), path)
+    slow = (
+        "import time\n"
+        "from eigenshape_studio.tab.workspace import Workspace\n"
+        "Workspace.answer = lambda *_: (print('asked', flush=True), time.sleep(6))\n"
+    )
+    running = Server(path, setup=slow, stderr=subprocess.PIPE)
+    with socket.create_connection(("127.0.0.1", running.port), timeout=60) as connection:
+        connection.sendall(running.request())
+        assert running.process.stdout.readline() == "asked\n"
+        running.process.send_signal(signal.SIGINT)
+        _, errors = running.process.communicate(timeout=60)
+    running.client.close()
+    assert (running.process.returncode, errors) == (0, "")
 
 
 def test_the_command_prints_the_address(tmp_path):

@@ -102,6 +102,7 @@ export class Studio {
     this.setTheme(settings.get("theme", matchMedia("(prefers-color-scheme: dark)").matches));
     this.viewer = new Viewer(this.page.get("stage"));
     this.viewer.onView = (view) => settings.set("view", view);
+    new ResizeObserver(() => this.cover()).observe(this.page.get("panels"));
     this.page.on({
       theme: () => this.switchTheme(),
       sheet: () => this.showSheet(!this.main.classList.contains("sheet")),
@@ -381,7 +382,7 @@ export class Studio {
       this.timer = window.setTimeout(() => this.refresh().catch((error) => this.fail(error)), POLL);
   }
 
-  private refreshPanels(): void {
+  refreshPanels(): void {
     if (this.active) this.addPanels();
     this.large.refresh(this.state);
     for (const { panel } of this.pages.values()) panel.refresh(this.state);
@@ -402,9 +403,19 @@ export class Studio {
   }
 
   /** Slide the panel over the shape, or away, where the window is narrow. */
-  private showSheet(seen: boolean): void {
+  showSheet(seen: boolean): void {
     this.main.classList.toggle("sheet", seen);
     this.page.get("sheet").ariaExpanded = String(seen);
+    this.cover();
+  }
+
+  /** Let the shapes be seen above the panel, where that lies over them. */
+  private cover(): void {
+    const panels = this.page.get("panels");
+    const lies = this.main.classList.contains("sheet") && getComputedStyle(panels).position === "absolute";
+    const pixels = lies ? panels.offsetHeight : 0;
+    this.second?.viewer.cover(pixels, true);
+    this.viewer.cover(pixels);
   }
 
   private setTheme(dark: boolean): void {

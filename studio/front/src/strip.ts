@@ -42,6 +42,7 @@ export class Strip {
       finger: () => {
         viewer.fingerTurns = !viewer.fingerTurns;
         this.showFinger();
+        app.refreshPanels(); // the hint says what a finger does
       },
     });
     const keys = { E: "edges", X: "cut", M: "measure", F: "film" };

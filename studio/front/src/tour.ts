@@ -2,10 +2,11 @@
 
 import type { Studio } from "./app";
 import type { Vec3 } from "./core/backend";
-import { h } from "./core/dom";
+import { h, isTouch } from "./core/dom";
 import type { Limbs } from "./panels/deform/limbs";
 
 const BEND = 0.7; // radians
+const TOUCH = "Tap “Finger: turns” above; then drag it, and it bends.";
 const LOOK = 0.5; // radians by which the view turns
 
 /** Wait for frames until a time has passed, and say at each which share of it; stop where asked. */
@@ -44,11 +45,11 @@ export async function runTour(app: Studio, limbs: Limbs): Promise<void> {
     const show = ([x, y]: number[]) =>
       Object.assign(hand.style, { left: `${x}px`, top: `${y}px` });
     hand.hidden = false;
-    say("Point at a limb: it lights up.");
+    say(isTouch() ? "These are its limbs." : "Point at a limb: it lights up.");
     await play(2500, signal, (share) => show(from.map((each, i) => each + share * (to[i]! - each))));
     limbs.light(limb.number);
     await play(1500, signal, () => {});
-    say("Drag it, and it bends. Ctrl+Z takes it back.");
+    say(isTouch() ? TOUCH : "Drag it, and it bends. Ctrl+Z takes it back.");
     await limbs.hold(limb.number, limb.tip);
     const axis = viewer.axes.towards.toArray() as Vec3;
     const pivot = limbs.pivot.toArray() as Vec3;
@@ -58,7 +59,7 @@ export async function runTour(app: Studio, limbs: Limbs): Promise<void> {
     });
     limbs.light(-1);
     hand.hidden = true;
-    say("Drag anywhere else, and the view turns. The wheel, or two fingers, zoom.");
+    say(isTouch() ? "One finger turns the view, two zoom." : "Drag anywhere else, and the view turns. The wheel zooms.");
     let before = 0;
     await play(5000, signal, (share) => {
       viewer.controls.rotateLeft(LOOK * (wave(share) - before));

@@ -1,7 +1,7 @@
 /** The first page where no file was opened: drop one, or try a sample. */
 
 import type { Studio } from "./app";
-import { h, pictureOf } from "./core/dom";
+import { h, isTouch, pictureOf } from "./core/dom";
 
 const TITLES: Record<string, string> = { quadruped: "Animal", biped: "Person", hand: "Hand" };
 
@@ -39,7 +39,7 @@ export function welcome(app: Studio): void {
   const card = h(
     "section",
     { class: "welcome", "data-test": "welcome", "aria-label": "Open a shape" },
-    h("h2", {}, "Drop a 3D file here"),
+    h("h2", {}, isTouch() ? "Open a 3D file" : "Drop a 3D file here"),
     h("p", { class: "note" }, app.state.suffixes.split(",").slice(0, 6).join("  "), " and others"),
     h("button", open, "Choose a file …"),
     app.state.capabilities.includes("folders") && h("button", openFolder, "A folder …"),

@@ -1,6 +1,7 @@
 """Listening on an address, and serving an application there until Ctrl-C or SIGTERM."""
 
 import asyncio
+import logging
 import signal
 import socket
 import threading
@@ -50,6 +51,13 @@ class TimedProtocol(H11Protocol):
                 self.transport.close()
 
         self.loop.call_later(HEADER_SECONDS, close_if_late)
+
+
+def _tells_more(record: logging.LogRecord) -> bool:
+    """Say whether a line of the log tells more than that Ctrl-C left a request without an answer."""
+    error = record.exc_info[1] if record.exc_info else None
+    ended = isinstance(error, asyncio.CancelledError)
+    return not ended and "graceful shutdown exceeded" not in record.getMessage()
 
 
 class _Server(uvicorn.Server):
@@ -143,6 +151,7 @@ def run_app(
         h11_max_incomplete_event_size=32 << 10,
         timeout_graceful_shutdown=grace,
     )
+    logging.getLogger("uvicorn.error").addFilter(_tells_more)
     server = _Server(config)
 
     async def run() -> None:

@@ -38,6 +38,7 @@ export class Beside {
     first.stage.after(this.stage);
     first.stage.parentElement!.classList.add("compare");
     this.viewer = new Viewer(this.stage);
+    this.viewer.cover(first.covered, true);
     const button = { type: "button", "data-test": "close-match", title: "Close the second shape" };
     this.stage.append(
       h("div", { class: "caption" }, name, h("button", { ...button, click: close }, "Close")),

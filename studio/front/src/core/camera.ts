@@ -48,10 +48,38 @@ export class Eye {
     return controls;
   }
 
+  /** Take the size of the canvas, of which the lowest pixels are covered: pictures fit above them. */
+  frame(width: number, height: number, covered: number): void {
+    this.camera.setViewOffset(width, height - covered, 0, 0, width, height);
+  }
+
+  /** Return how many pixels of the canvas the picture is high. */
+  get pixels(): number {
+    return this.camera.view?.fullHeight ?? this.canvas.clientHeight;
+  }
+
+  /** Take another size, and come nearer or go away so that the shape fills the picture as before. */
+  reframe(act: () => void, vertices: Float32Array, world: three.Matrix4): void {
+    const whole = () => this.lookAt(vertices, world, this.axes.towards).distance;
+    const before = whole();
+    act();
+    const { target } = this.controls;
+    this.camera.position.sub(target).multiplyScalar(whole() / before).add(target);
+    this.controls.update();
+  }
+
   /** Show all vertices upright, from the front; `world` brings them into the scene. */
   fit(vertices: Float32Array, world: three.Matrix4): void {
-    const up = new three.Vector3(...this.up);
     const towards = new three.Vector3(...this.towards);
+    const { target, distance } = this.lookAt(vertices, world, towards);
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).addScaledVector(towards, distance);
+    this.controls.update();
+  }
+
+  /** Return the point to look at, and from how far, for all vertices to be seen from a side. */
+  private lookAt(vertices: Float32Array, world: three.Matrix4, towards: three.Vector3) {
+    const up = new three.Vector3(...this.up);
     const right = up.clone().cross(towards).normalize();
     const above = towards.clone().cross(right);
     const turn = new three.Matrix4().makeBasis(right, above, towards).transpose();
@@ -71,9 +99,7 @@ export class Eye {
     const size = sides.getSize(new three.Vector3()).divideScalar(2);
     const distance = Math.max(size.x / halves.x, size.y / halves.y);
     const target = right.multiplyScalar(middle.x).addScaledVector(above, middle.y);
-    this.controls.target.copy(target);
-    this.camera.position.copy(target).addScaledVector(towards, distance);
-    this.controls.update();
+    return { target, distance };
   }
 
   get view(): { position: Vec3; target: Vec3 } {

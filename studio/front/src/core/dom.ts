@@ -4,6 +4,9 @@ import type { Progress } from "./backend";
 
 type Child = Node | string | null | undefined | false;
 
+/** Say whether the pointer is a finger. */
+export const isTouch = () => matchMedia("(pointer: coarse)").matches;
+
 export const nextFrame = () => new Promise(requestAnimationFrame);
 
 /** Return an element: functions are listeners, booleans are flags, the rest are attributes. */
@@ -21,6 +24,16 @@ export function h<K extends keyof HTMLElementTagNameMap>(
   element.append(...children.filter((child): child is Node | string => !!child));
   return element;
 }
+
+/** Return the input for one coordinate of a point such as "pivot". */
+export function buildCoordinate(name: string, axis: number, change: () => void): HTMLInputElement {
+  const title = `${name.replace("-", " ")} ${"xyz"[axis]}`;
+  const id = `${name}-${axis}`;
+  return h("input", { type: "number", step: "any", "data-test": id, title, "aria-label": title, change });
+}
+
+/** Return a coordinate as it is written into its input. */
+export const writeCoordinate = (value: number) => String(Number(value.toPrecision(5)));
 
 /** Controls, made out of HTML, by the names in their `data-test`. */
 export class Form<Root extends HTMLElement = HTMLElement> {

@@ -31,12 +31,12 @@ export class Picker {
 
   /** Return what lies under a place of the picture, in pixels of the page. */
   pick(x: number, y: number, camera: three.PerspectiveCamera, world: three.Matrix4): Hit | null {
-    const { clientWidth, clientHeight } = this.renderer.domElement;
     const mesh = new three.Mesh(this.geometry, this.material);
     mesh.matrixWorld.copy(world);
-    camera.setViewOffset(clientWidth, clientHeight, x - 0.5, y - 0.5, 1, 1);
+    const seen = { ...camera.view! };
+    camera.setViewOffset(seen.fullWidth, seen.fullHeight, x - 0.5, y - 0.5, 1, 1);
     const [rest, place] = this.draw(mesh, camera, 1, 1);
-    camera.clearViewOffset();
+    camera.setViewOffset(seen.fullWidth, seen.fullHeight, 0, 0, seen.width, seen.height);
     if (!rest![3]) return null;
     const point = new three.Vector3().fromArray(rest!);
     const { vertex, face } = this.findFace(rest![3] - 1, point);

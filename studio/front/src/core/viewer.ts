@@ -39,6 +39,7 @@ export class Viewer {
   onView: (view: View) => void = () => {};
   onMove: () => void = () => {}; // of the camera
   twin: Colors | null = null; // is told of all colors
+  partNames: Record<number, string> = {}; // that the person gave, by the number of the part
   /** Everything in the coordinates of the mesh; the scene around it has size 1 at any unit. */
   readonly space = new three.Group();
   readonly scene = new three.Scene();
@@ -73,6 +74,7 @@ export class Viewer {
   private solid = false;
   private folded = false;
   private clipped = false;
+  covered = 0; // pixels, from below
 
   constructor(readonly stage: HTMLElement) {
     const { canvas, surface, skeleton, discs } = this;
@@ -230,9 +232,10 @@ export class Viewer {
   private showTip(hit: Hit | null, x: number, y: number): void {
     const { scalars, labels, tip } = this;
     const value = hit && scalars && formatNumber(scalars.values[hit.vertex]!);
-    const part = hit && labels && `part ${labels[hit.vertex]}`;
+    const label = hit && labels && labels[hit.vertex]!;
+    const part = label !== null && (this.partNames[label] ?? `part ${label}`);
     tip.hidden = !value && !part;
-    tip.textContent = value ? `${value} at vertex ${hit.vertex}` : (part ?? "");
+    tip.textContent = value ? `${value} at vertex ${hit.vertex}` : part || "";
     Object.assign(tip.style, { left: `${x}px`, top: `${y}px` });
   }
 
@@ -393,7 +396,7 @@ export class Viewer {
 
   /** Return how many pixels of the page a length has at the point that the camera turns about. */
   pixelsOf(length: number): number {
-    return (this.canvas.clientHeight * length) / (this.eye.height * this.extent);
+    return (this.eye.pixels * length) / (this.eye.height * this.extent);
   }
 
   /** Return the ray through a place of the canvas, in the coordinates of the mesh. */
@@ -415,9 +418,19 @@ export class Viewer {
     const { clientWidth: width, clientHeight: height } = this.stage;
     if (!width || !height) return;
     this.renderer?.setSize(width, height);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.eye.frame(width, height, this.covered);
     this.draw();
+  }
+
+  /**
+   * Let the shape be seen above what covers so many of the lowest pixels. A camera that follows
+   * another one is moved by that.
+   */
+  cover(pixels: number, follows = false): void {
+    if (pixels === this.covered) return;
+    this.covered = pixels;
+    if (follows || !this.vertices.length) this.resize();
+    else this.eye.reframe(() => this.resize(), this.vertices, this.space.matrixWorld);
   }
 
   /** Draw now. In software, edges are smooth only in a `fine` picture, drawn when all is at rest. */

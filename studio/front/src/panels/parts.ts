@@ -4,7 +4,7 @@ import type uPlot from "uplot";
 import type { Studio } from "../app";
 import type { State } from "../core/backend";
 import { formatNumber, partColors } from "../core/colors";
-import { Form } from "../core/dom";
+import { download, Form } from "../core/dom";
 import { cutParts } from "../core/parts";
 import { ColoringPanel } from "./coloring";
 import markup from "./parts.html?raw";
@@ -38,6 +38,8 @@ export class PartsPanel extends ColoringPanel {
       persistence: () => this.cutAt(this.levelAt(form.number("persistence"))),
       "all-parts": () => this.selectPart(-1),
       maximum: () => this.select(form.number("maximum")),
+      "part-name": () => this.namePart(form.get("part-name").value.trim()),
+      "save-parts": () => this.save(),
     });
     return form.root;
   }
@@ -67,6 +69,7 @@ export class PartsPanel extends ColoringPanel {
     const names = ["parts/cuts", "diagram", "areas"];
     const wanted = Promise.all(names.map((name) => this.get(name)));
     const [cuts, diagram, areas] = await this.latest(wanted);
+    viewer.partNames = settings.get(this.namesKey, {});
     if (!fresh) return this.paint();
     Object.assign(this, { finest, cuts, diagram, areas });
     this.levels = state.parts.levels.map((level) => level ?? Infinity);
@@ -110,6 +113,8 @@ export class PartsPanel extends ColoringPanel {
     viewer.setLabels(this.labels, this.part < 0 ? colors : pale);
     viewer.setPoints(this.index < 0 ? [] : [this.diagram[4 * this.index + 3]!], POINT);
     this.form.text("chosen-part", this.describePart());
+    this.form.get("name-row").hidden = this.part < 0;
+    this.form.get("part-name").value = viewer.partNames[this.part] ?? "";
     this.plot?.redraw(false);
   }
 
@@ -120,7 +125,31 @@ export class PartsPanel extends ColoringPanel {
       all += area;
       if (this.labels[vertex] === this.part) inside += area;
     });
-    return `Part ${this.part}: ${((100 * inside) / all).toFixed(1)} % of the area.`;
+    const name = this.app.viewer.partNames[this.part] ?? `Part ${this.part}`;
+    return `${name}: ${((100 * inside) / all).toFixed(1)} % of the area.`;
+  }
+
+  private get namesKey(): string {
+    return `names of parts of ${this.app.state.digest}`;
+  }
+
+  /** Give the chosen part a name, or take it away; it keeps the name when there are more or fewer parts. */
+  private namePart(name: string): void {
+    const { viewer, settings } = this.app;
+    const { [this.part]: _, ...others } = viewer.partNames;
+    viewer.partNames = name ? { ...others, [this.part]: name } : others;
+    settings.set(this.namesKey, viewer.partNames);
+    this.paint();
+  }
+
+  /** Save the part of each vertex, and its name, as a table. */
+  private save(): void {
+    const { app } = this;
+    const rows = Array.from(this.labels, (part, vertex) => {
+      const name = (app.viewer.partNames[part] ?? `part ${part}`).replaceAll('"', '""');
+      return `${vertex},${part},"${name}"`;
+    });
+    download(["vertex,part,name", ...rows, ""].join("\n"), app.fileName("parts.csv"), "text/csv");
   }
 
   private selectPart(part: number): void {

@@ -7,7 +7,7 @@ import { rgbOf } from "../core/colors";
 import { Form, h, type NamedFile } from "../core/dom";
 import markup from "./search.html?raw";
 
-const [PART, TINT] = ["#e08a2e", 190]; // as the first region of Deform
+const [PART, TINT] = ["#e08a2e", 190]; // as the first region of Bend
 const N_MATCHES = 12; // three on each row of the wall
 
 /** What was searched with, which survives a reload. */
@@ -88,7 +88,7 @@ export class SearchPanel implements Panel {
   private searchPart(): void {
     const region = this.painted();
     if (region.length) this.search(region);
-    else this.app.say("Paint a part first: choose Deform, and paint on the shape.");
+    else this.app.say("Paint a part first: choose Bend and its brush, and paint on the shape.");
   }
 
   private async search(region: Uint32Array | null): Promise<void> {

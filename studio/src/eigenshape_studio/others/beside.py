@@ -57,6 +57,26 @@ class Beside:
         if self.job is None or self.job.status in ("none", "failed"):
             self.job = Job(self._match)
 
+    def is_of(self, mesh: es.TriangleMesh, number: int) -> bool:
+        """Say whether this is the second shape with a number, beside a mesh."""
+        return self.meshes[0] is mesh and self.number == number
+
+    @property
+    def has_map(self) -> bool:
+        """Whether the map is there."""
+        return self.job is not None and self.job.result is not None
+
+    def of_pose(self, mesh: es.TriangleMesh) -> "Beside":
+        """Return the second shape beside another pose of the first one, with the map that was found.
+
+        Corrections by hand are not in it yet.
+        """
+        first = self._first
+        assert first is not None  # noqa: S101  a pose is taken by a map
+        assert first.match is not None  # noqa: S101
+        known = map_of_match(mesh, self.meshes[1], first.match)
+        return Beside(mesh, self.meshes[1], self.name, self.number, known)
+
     def check_pairs(self, pairs: np.ndarray) -> np.ndarray:
         """Return pairs of vertices, ours and theirs, as a table.
 

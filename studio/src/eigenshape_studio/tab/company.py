@@ -22,6 +22,7 @@ from eigenshape_studio.tab.history import Shape
 from eigenshape_studio.tab.scene import Scene
 from eigenshape_studio.tab.searching import Searching
 
+MOST_KEPT = 4  # second shapes whose maps are kept, so that undo finds them again
 SAMPLE_POSE = 1  # of a sample beside the shape; the one that opens as the shape has pose 0
 
 
@@ -43,7 +44,8 @@ class Company:
 
     def __init__(self, scene: Scene, searching: Searching) -> None:
         self._of, self._searching = scene, searching
-        self._beside: Beside | None = None  # of the shape at rest and the second one
+        # Each of a shape at rest and a second one; the present one stands last.
+        self._kept: list[Beside] = []
         self._lock = threading.Lock()
         self.works: Works = {
             "beside": self._open,
@@ -61,8 +63,8 @@ class Company:
 
     def close(self) -> None:
         """Stop what is still computed."""
-        if self._beside is not None:
-            self._beside.cancel()
+        for kept in self._kept:
+            kept.cancel()
 
     def facts(self) -> dict[str, Any]:
         """Return what the page shows."""
@@ -88,22 +90,27 @@ class Company:
         now, shapes = self._of.history.now, self._of.history.shapes
         with self._lock:
             if now.beside < 0:
-                self.close()
-                self._beside = None
+                self._leave()
                 return None
             mesh, second = now.shape.mesh, shapes[now.beside]
             try:
                 other = second.mesh
             except (es.EigenshapeError, OSError):  # its file has gone, or changed
                 return None
-            kept = self._beside
-            if kept is None or kept.meshes[0] is not mesh or kept.number != second.number:
-                self.close()
+            pair = mesh, second.number
+            kept = next((each for each in self._kept if each.is_of(*pair)), None)
+            if kept is None:
+                self._leave()
                 known = self._known_map(mesh, second)
                 kept = Beside(mesh, other, second.name, second.number, known)
-                self._beside = kept
+                self._kept = [*self._kept, kept][-MOST_KEPT:]
             kept.correct(np.frombuffer(now.pairs, dtype=np.int64).reshape(-1, 2))
             return kept
+
+    def _leave(self) -> None:
+        """Stop maps that are on the way; those that were found are kept."""
+        self.close()
+        self._kept = [kept for kept in self._kept if kept.has_map]
 
     def _known_map(self, mesh: es.TriangleMesh, second: Shape) -> DenseMap | None:
         """Return the map from the mean of the collection to one of its specimens."""
@@ -157,8 +164,15 @@ class Company:
         self._of.history.did("Correct the map", pairs=pairs.tobytes())
 
     def _take_pose(self, _meta: Meta, _arrays: Arrays) -> None:
-        """Bend the shape into the pose of the second one; the result becomes the shape."""
-        self._of.show(self._require_beside().take_pose(), self._of.analysis.name)
+        """Bend the shape into the pose of the second one; the result becomes the shape.
+
+        The map stays: its vertices are the same.
+        """
+        beside = self._require_beside()
+        bent = beside.take_pose()
+        with self._lock:
+            self._kept = [*self._kept, beside.of_pose(bent)][-MOST_KEPT:]
+        self._of.show(bent, self._of.analysis.name)
 
     def _show_mean(self, _meta: Meta, _arrays: Arrays) -> None:
         """Show the mean of the collection."""

@@ -122,6 +122,7 @@ export class DeformPanel implements Panel {
 
   hidden(): void {
     this.active = false;
+    this.limbs.light(-1);
     this.app.viewer.setPointer();
     this.app.second?.viewer.setPointer();
     this.motion.drop();

@@ -1,10 +1,14 @@
-/** Limbs: the one under the pointer lights up, and a drag bends it; no region has to be chosen. */
+/**
+ * Limbs: the one under the pointer lights up, and a drag bends it; no region has to be chosen. A limb is
+ * a part with all that hangs on it, as the foot hangs on the shin, and has the number of that part.
+ */
 
 import * as three from "three";
 import type { Studio } from "../../app";
 import type { Vec3 } from "../../core/backend";
 import { softenBorders } from "../../core/borders";
-import { cutParts } from "../../core/parts";
+import { isTouch } from "../../core/dom";
+import { cutParts, limbOf, touchingParts } from "../../core/parts";
 import { PlainDrag } from "../../core/tools";
 import type { Hit, PointerTool } from "../../core/viewer";
 import type { Motion } from "./motion";
@@ -12,6 +16,8 @@ import type { Selection } from "./selection";
 
 const HINT =
   "Point at a limb: it lights up. Drag it, and it bends. Drag anywhere else to turn the view.";
+const TOUCH_FIRST = "Tap “Finger: turns” over the picture; then a finger that drags a limb bends it.";
+const TOUCH = "Drag a limb: it bends. Drag anywhere else to turn the view; two fingers zoom.";
 const KEYS = "Shift with the arrow keys turns it, Enter bends it, Escape lets it go. N: the next one.";
 const STEP = Math.PI / 36; // by which a key turns a limb
 const NO_LIMBS = "No limb stands out on this shape. Choose a region by hand, under “More”.";
@@ -19,6 +25,7 @@ const NO_LIMBS = "No limb stands out on this shape. Choose a region by hand, und
 export class Limbs implements PointerTool {
   private labels: Int32Array | null = null; // part of each vertex
   private body = -1; // the largest part, which stays
+  private touching: Set<number>[] = []; // parts that each part touches
   private lit = -1;
   private bound = -1; // the limb that can be moved
   private chosen = -1; // by the keyboard
@@ -58,6 +65,7 @@ export class Limbs implements PointerTool {
     const sizes = new Uint32Array(levels.length);
     for (const label of this.labels) sizes[label]!++;
     this.body = sizes.indexOf(Math.max(...sizes));
+    this.touching = touchingParts(this.app.viewer.faces, this.labels, levels.length);
     return true;
   }
 
@@ -69,7 +77,9 @@ export class Limbs implements PointerTool {
     if (deformation.status === "none") return "A shape as large as this is prepared for bending on request; see above.";
     if (deformation.status !== "ready") return "The shape is being prepared for bending …";
     if (!this.labels) return "Its limbs are being found …";
-    return this.labels.some((label) => label !== this.body) ? HINT : NO_LIMBS;
+    if (this.labels.every((label) => label === this.body)) return NO_LIMBS;
+    if (!isTouch()) return HINT;
+    return this.app.viewer.fingerTurns ? TOUCH_FIRST : TOUCH;
   }
 
   /** Return the limb of a vertex, or -1. */
@@ -94,7 +104,8 @@ export class Limbs implements PointerTool {
 
   /** Return how much each vertex belongs to a limb, of 255, without a step at its rim. */
   private glowOf(limb: number): Uint8Array {
-    const labels = this.labels!.map((label) => Number(label === limb));
+    const parts = limbOf(limb, this.body, this.touching);
+    const labels = this.labels!.map((label) => Number(parts.has(label)));
     const paint = Uint8Array.from({ length: 3 * labels.length }, (_, i) =>
       i % 3 ? 0 : 255 * labels[i / 3]!,
     );
@@ -174,7 +185,7 @@ export class Limbs implements PointerTool {
     if (!labels || this.app.state.deformation.status !== "ready") return null;
     const { vertices } = this.app.viewer;
     const [center, point] = [new three.Vector3(), new three.Vector3()];
-    const body = this.verticesOf(this.body);
+    const body = this.verticesIn(new Set([this.body]));
     for (const vertex of body) center.add(point.fromArray(vertices, 3 * vertex));
     center.divideScalar(body.length);
     let [best, least] = [-1, 0];
@@ -207,6 +218,10 @@ export class Limbs implements PointerTool {
   }
 
   private verticesOf(limb: number): Uint32Array {
-    return Uint32Array.from(this.labels!.keys()).filter((each) => this.labels![each] === limb);
+    return this.verticesIn(limbOf(limb, this.body, this.touching));
+  }
+
+  private verticesIn(parts: Set<number>): Uint32Array {
+    return Uint32Array.from(this.labels!.keys()).filter((each) => parts.has(this.labels![each]!));
   }
 }

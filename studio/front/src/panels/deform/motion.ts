@@ -2,7 +2,7 @@
 
 import type { Studio } from "../../app";
 import type { Change, Handle, Vec3 } from "../../core/backend";
-import { h, nextFrame, type Form } from "../../core/dom";
+import { buildCoordinate, h, nextFrame, writeCoordinate, type Form } from "../../core/dom";
 import { FIXED } from "../../core/regions";
 import { MotionTool, type MotionKind } from "../../core/tools";
 import type { Selection } from "./selection";
@@ -30,8 +30,14 @@ export class Motion {
       canDrag: (vertex) => this.canDrag(vertex),
       moved: (handle) => this.moved(handle),
       released: () => this.several || this.commit(),
-      pivoted: (pivot) => (this.pivots[this.selection.region] = pivot),
+      pivoted: (pivot) => {
+        this.pivots[this.selection.region] = pivot;
+        this.writePivot();
+      },
     });
+    form
+      .get("pivot-place")
+      .append("pivot", ...AXES.map((axis) => buildCoordinate("pivot", axis, () => this.readPivot())));
     const kinds = ["x", "y", "z"].map((axis) => `Rotate about ${axis}, °`);
     kinds.push(...["x", "y", "z"].map((axis) => `Move along ${axis}`));
     form.get("exact-kind").append(...kinds.map((kind) => h("option", {}, kind)));
@@ -88,9 +94,11 @@ export class Motion {
   show(kind: MotionKind | null, visible: boolean): void {
     this.form.get("apply").hidden = !this.several;
     const { region } = this.selection;
-    if (kind && visible && this.ready && this.rows.includes(region))
-      this.mover.show(this.pivotOf(region), kind);
+    const moves = kind !== null && visible && this.ready && this.rows.includes(region);
+    if (moves) this.mover.show(this.pivotOf(region), kind);
     else this.mover.hide();
+    this.form.get("pivot-place").hidden = !moves || kind !== "pivot";
+    if (moves) this.writePivot();
     if (kind && visible) this.app.viewer.setPointer("grab", null, this.mover);
   }
 
@@ -128,6 +136,20 @@ export class Motion {
 
   pivotOf(region: number): Vec3 {
     return this.pivots[region] ?? this.rims[region]!;
+  }
+
+  private writePivot(): void {
+    this.pivotOf(this.selection.region).forEach((value, axis) => {
+      this.form.get(`pivot-${axis}`).value = writeCoordinate(value);
+    });
+  }
+
+  /** Take the pivot that was written. */
+  private readPivot(): void {
+    const pivot = AXES.map((axis) => this.form.number(`pivot-${axis}`)) as Vec3;
+    if (!pivot.every(Number.isFinite)) return;
+    this.pivots[this.selection.region] = pivot;
+    this.mover.show(pivot, "pivot");
   }
 
   /** A drag may begin on any region that is bound; it becomes the chosen one. */

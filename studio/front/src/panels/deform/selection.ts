@@ -4,7 +4,7 @@ import type { Studio } from "../../app";
 import type { State, Vec3 } from "../../core/backend";
 import type { Beside } from "../../core/beside";
 import { partColors, rgbOf } from "../../core/colors";
-import { h, type Form } from "../../core/dom";
+import { buildCoordinate, h, writeCoordinate, type Form } from "../../core/dom";
 import { cutParts } from "../../core/parts";
 import { FIXED, Regions } from "../../core/regions";
 import { BoxTool } from "../../core/tools";
@@ -66,19 +66,14 @@ export class Selection {
     });
     form.get("regions").append(...swatches);
     for (const name of ["low", "high"])
-      form.get("corners").append(name, ...AXES.map((axis) => this.buildCorner(name, axis)));
+      form
+        .get("corners")
+        .append(name, ...AXES.map((axis) => buildCoordinate(`box-${name}`, axis, () => this.readBox())));
     form.get("brush-radius").valueAsNumber = settings.get("radius", 0.1);
     form.on({
       "brush-radius": () => this.showRadius(),
       "region-parts": () => this.showParts(form.number("region-parts")),
     });
-  }
-
-  /** Return the input for a coordinate of a corner of the box. */
-  private buildCorner(name: string, axis: number): HTMLElement {
-    const title = `${name} ${"xyz"[axis]}`;
-    const labels = { "data-test": `box-${name}-${axis}`, title, "aria-label": title };
-    return h("input", { type: "number", step: "any", ...labels, change: () => this.readBox() });
   }
 
   /** Begin with a new shape, without regions. */
@@ -225,7 +220,7 @@ export class Selection {
   private writeBox(): void {
     for (const name of ["low", "high"] as const)
       this.box[name].forEach((value, i) => {
-        this.form.get(`box-${name}-${i}`).value = String(Number(value.toPrecision(5)));
+        this.form.get(`box-${name}-${i}`).value = writeCoordinate(value);
       });
   }
 
