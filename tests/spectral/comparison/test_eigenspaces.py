@@ -179,7 +179,7 @@ def test_groups_have_no_unit(values, power):
 
 
 def test_bad_input_to_groups():
-    with pytest.raises(InvalidParameterError, match="ratio must be above 1; it is 1"):
+    with pytest.raises(InvalidParameterError, match="ratio must be above 1, and finite; it is 1"):
         separated_groups([0, 1], ratio=1.0)
     with pytest.raises(InvalidParameterError, match="number 1 is 3 and number 2 is 2"):
         separated_groups([0, 3, 2])
