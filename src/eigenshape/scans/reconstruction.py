@@ -145,9 +145,10 @@ def _oriented_normals(
     normals = axes[:, :, 0]
     n, k = neighbors.shape
     one, two = np.repeat(np.arange(n), k), neighbors.ravel()
+    places = one.astype(np.int32), two.astype(np.int32)  # as SciPy 1.15 needs them for the forest
     bend = 1 - np.abs(np.einsum("ni,ni->n", normals[one], normals[two]))
     # A stored weight of zero would be no edge.
-    graph = sp.csr_array((bend + 1e-3, (one, two)), shape=(n, n))
+    graph = sp.csr_array((bend + 1e-3, places), shape=(n, n))
     forest = csgraph.minimum_spanning_tree(graph.maximum(graph.T))
     count, part = csgraph.connected_components(forest, directed=False)
     for number in range(count):
