@@ -4,6 +4,7 @@ import meshio
 import numpy as np
 import pytest
 import pyvista
+import vtk
 
 import eigenshape as es
 from eigenshape import FileFormatError, InvalidParameterError
@@ -70,6 +71,20 @@ def test_we_read_those_of_pyvista(tmp_path, suffix, binary):
     # PyVista gives normals to points and cells under one name.
     assert found["Normals"].shape == (BALL.n_vertices, 3)
     assert found["face_Normals"].shape == (BALL.n_faces, 3)
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_numbers_of_points_of_vtk_are_read(tmp_path, binary):
+    surface = es.io.to_pyvista(BALL)
+    numbers = vtk.vtkIdTypeArray()
+    numbers.SetName("origin")
+    for number in range(BALL.n_vertices):
+        numbers.InsertNextValue(7 * number)
+    surface.GetPointData().AddArray(numbers)
+    surface.save(tmp_path / "a.vtk", binary=binary)
+    assert b"vtkIdType" in (tmp_path / "a.vtk").read_bytes()
+    found = read_fields(tmp_path / "a.vtk")["origin"]
+    np.testing.assert_array_equal(found, 7 * np.arange(BALL.n_vertices))
 
 
 def test_legacy_sections_of_other_writers(tmp_path):

@@ -74,7 +74,7 @@ def heat_distances(vertices: Any, faces: Any, sources: Any, *, time_factor: floa
         for entries in (values, heat_values)
     )
     heat_factor, poisson = factorize_definite(A), factorize_grounded(W)
-    components = torch.from_numpy(poisson.components).to(points.device)
+    components = torch.tensor(poisson.components, device=points.device)
     reached = components[:, None] == components[start]
     impulses = torch.zeros(n, len(start), dtype=torch.float64, device=points.device)
     impulses[start, range(len(start))] = 1.0

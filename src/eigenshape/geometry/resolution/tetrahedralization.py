@@ -103,7 +103,8 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
         solid.AddElements(dim=2, index=side, data=surface.faces.astype(np.int32), base=0)
         solid.GenerateVolumeMesh(maxh=WITHOUT_LIMIT if longest is None else longest / scale)
         inside = np.array(solid.Coordinates())[mesh.n_vertices :]
-        corners = solid.Elements3D().NumPy()["nodes"].astype(np.int64) - 1
+        # Older versions of Netgen have room for the nodes of elements of higher order behind.
+        corners = solid.Elements3D().NumPy()["nodes"][:, :4].astype(np.int64) - 1
     points = np.concatenate([surface.vertices, (inside + center) * scale])
     found = SimplicialMesh(points, corners) if len(corners) else None
     filled = 0.0 if found is None else float(simplex_volumes(found).sum())

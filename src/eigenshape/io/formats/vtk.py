@@ -22,6 +22,7 @@ from eigenshape.io.formats.numbers import Cursor, quote_line
 KINDS = {
     b"float": ">f4", b"double": ">f8", b"char": ">i1", b"unsigned_char": ">u1", b"int": ">i4",
     b"vtktypeint64": ">i8", b"vtktypeint32": ">i4", b"long": ">i8",
+    b"vtkidtype": ">i4",  # which VTK writes as an int, whatever its size in memory
 }  # fmt: skip
 # Fewest points of a cell of each section.
 SECTIONS = {b"VERTICES": 1, b"LINES": 2, b"POLYGONS": 3, b"TRIANGLE_STRIPS": 3, b"CELLS": 1}

@@ -299,9 +299,9 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
         # Not mode=ro: whoever closes an index last moves the log into the database.
         database = _connect(folder / DATABASE, "mode=rw")
         try:
-            database.execute("SELECT count(*) FROM sqlite_master")
+            with closed_on_error(database):
+                database.execute("SELECT count(*) FROM sqlite_master")
         except sqlite3.OperationalError:
-            database.close()
             if os.access(folder, os.W_OK):
                 raise
             # SQLite cannot make the files of its log beside a read-only database, which nobody
@@ -313,13 +313,24 @@ def open_to_read(folder: Path) -> sqlite3.Connection:
                     "Read it once with the right to write, or copy it to a writable folder."
                 ) from None
             database = _connect(folder / DATABASE, "mode=ro&immutable=1")
-        require_format(str(folder / DATABASE), database)
-        database.execute("PRAGMA query_only = ON")
-        database.execute(f"PRAGMA cache_size = -{CACHED}")
-        database.execute(f"PRAGMA mmap_size = {MAPPED}")
-        database.execute("BEGIN")
-        database.execute("SELECT count(*) FROM recipe").fetchone()  # from here on, one state
+        with closed_on_error(database):
+            require_format(str(folder / DATABASE), database)
+            database.execute("PRAGMA query_only = ON")
+            database.execute(f"PRAGMA cache_size = -{CACHED}")
+            database.execute(f"PRAGMA mmap_size = {MAPPED}")
+            database.execute("BEGIN")
+            database.execute("SELECT count(*) FROM recipe").fetchone()  # from here on, one state
         return database
+
+
+@contextmanager
+def closed_on_error(database: sqlite3.Connection) -> Iterator[None]:
+    """Close a connection if the block raises: nobody else has it then."""
+    try:
+        yield
+    except BaseException:
+        database.close()
+        raise
 
 
 def _connect(path: Path, mode: str) -> sqlite3.Connection:

@@ -26,6 +26,7 @@ from eigenshape.retrieval.store.database import (
     Facts,
     Seal,
     checksum,
+    closed_on_error,
     committed_changes,
     explained,
     integer_checksums,
@@ -410,10 +411,11 @@ def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
     place, committed = str(folder / DATABASE), committed_changes(folder)
     with explained(folder):
         database = open_to_read(folder)
-        damages: list[Damage] = []
-        seals = read_seals(place, database, damages)
-        damages += [] if damages else lost_changes(committed, seals)
-        recipes = read_recipes(place, database, damages)
+        with closed_on_error(database):
+            damages: list[Damage] = []
+            seals = read_seals(place, database, damages)
+            damages += [] if damages else lost_changes(committed, seals)
+            recipes = read_recipes(place, database, damages)
     columns = None if before is None or before.damages else before.descriptors
     state = IndexState(folder, database, seals, recipes, damages, columns)
     # A connection refers to itself, so it would wait for the garbage collector.
