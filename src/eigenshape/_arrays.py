@@ -206,6 +206,16 @@ def positive_number(value: ArrayLike, name: str) -> float:
     return _one(positive_values(value, name), name)
 
 
+def number_from_zero(value: ArrayLike, name: str) -> float:
+    """Return `value` as a float from zero on, which may be infinite."""
+    number = real_numbers(value, name)
+    if number.ndim or not number >= 0:
+        raise InvalidParameterError(
+            f"{name} must be a number of at least 0; it is {describe_value(value)}."
+        )
+    return float(number)
+
+
 def _one(values: NDArray[np.float64], name: str) -> float:
     if len(values) != 1:
         raise InvalidParameterError(f"{name} must be one number; there are {len(values)}.")

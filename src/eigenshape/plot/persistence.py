@@ -5,8 +5,7 @@ from jaxtyping import Int
 from matplotlib.colors import to_hex
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
+from eigenshape._arrays import number_from_zero, whole_number
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
 from eigenshape.features.segmentation import Tree, merge_targets
 from eigenshape.plot.figure import Figure
@@ -111,12 +110,11 @@ def figure_merge_tree(
     'cut at 0.5: 2 regions left'
     """
     require_type(tree, Tree, "tree")
-    if persistence is not None and not persistence >= 0:
-        raise InvalidParameterError(f"persistence must be at least 0; it is {persistence}.")
     shown = min(whole_number(n_maxima, "n_maxima", 1), len(tree.maxima))
     into = merge_targets(tree)[:shown]
     finite = tree.persistence[np.isfinite(tree.persistence)]
-    cut = persistence if persistence is not None and np.isfinite(persistence) else 0.0
+    wanted = 0.0 if persistence is None else number_from_zero(persistence, "persistence")
+    cut = wanted if np.isfinite(wanted) else 0.0
     top = HEADROOM * max(float(finite.max(initial=0.0)), cut) or 1.0
     figure = Figure(figsize=(max(4.5, 2.2 + 0.24 * shown), 4.6), layout="constrained")
     axes = figure.subplots()

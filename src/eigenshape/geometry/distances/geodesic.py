@@ -8,9 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import describe_value
-from eigenshape._arrays import positive_values, real_numbers, whole_number, whole_numbers
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from eigenshape._arrays import number_from_zero, positive_values, whole_number, whole_numbers
+from eigenshape._errors import InvalidShapeError
 from eigenshape._threads import SpareMemory, map_in_threads, one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
@@ -177,16 +176,6 @@ def source_points(source: ArrayLike, n_points: int) -> Int[np.ndarray, " s"]:
     return np.unique(whole_numbers(source, "A source", 0, n_points - 1))
 
 
-def _checked_reach(reach: float) -> float:
-    """Return a distance that may be zero or infinite."""
-    distance = real_numbers(reach, "reach")
-    if distance.ndim or not distance >= 0:
-        raise InvalidParameterError(
-            f"reach must be a distance, at least 0; it is {describe_value(reach)}."
-        )
-    return float(distance)
-
-
 def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
     """Return a function that computes geodesic distances on one mesh, many times.
 
@@ -228,7 +217,7 @@ def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
     memory = SpareMemory(lambda: (_scratch(fans, n), np.empty(n, dtype=np.int64), np.empty(n)))
 
     def wave(source: ArrayLike, reach: float = np.inf) -> Float[np.ndarray, " n"]:
-        sources, radius = source_points(source, n), _checked_reach(reach) / scale
+        sources, radius = source_points(source, n), number_from_zero(reach, "reach") / scale
         with memory.lend() as (scratch, reached, distances):
             count = spread_wave(fans, radius, sources, scratch, reached, distances)
             found = np.full(n, np.inf)
@@ -293,7 +282,7 @@ def farthest_points(
     # Each choice waits for the wave before it. So where all distances are wanted, waves that only
     # reach what they come nearest to make the choices, and long ones follow, side by side. The short
     # ones add about a fiftieth.
-    everywhere = bool(np.isinf(_checked_reach(reach)))
+    everywhere = bool(np.isinf(number_from_zero(reach, "reach")))
     shortest = 0.0 if everywhere else reach
     choices = islice(farthest_first(wave, n, first, reach=shortest), count)
     for number, (vertex, row) in enumerate(choices):
