@@ -3,16 +3,17 @@
 import * as three from "three";
 import { h } from "./dom";
 
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i; // names of renderers
+
 /** Start WebGL in a canvas; null where there is none, and the stage says why. */
 export function startRenderer(
   canvas: HTMLCanvasElement,
   stage: HTMLElement,
   onReturn: () => void,
 ): { renderer: three.WebGLRenderer; inSoftware: boolean } | null {
-  const start = (options: WebGLContextAttributes) => canvas.getContext("webgl2", options);
-  const onCard = start({ antialias: true, failIfMajorPerformanceCaveat: true });
+  const inSoftware = drawsInSoftware();
   // Without a graphics card, smoothing edges would double the time of a frame.
-  const context = onCard ?? start({ antialias: false });
+  const context = canvas.getContext("webgl2", { antialias: !inSoftware });
   if (!context?.getExtension("EXT_color_buffer_float")) {
     showNotice(
       stage,
@@ -31,7 +32,21 @@ export function startRenderer(
     notice?.remove();
     onReturn();
   });
-  return { renderer, inSoftware: !onCard };
+  return { renderer, inSoftware };
+}
+
+/**
+ * Whether the browser draws without a graphics card. Asked to fail then, it does, unless somebody
+ * told it to draw in software: then only the name of the renderer says so.
+ */
+function drawsInSoftware(): boolean {
+  const canvas = document.createElement("canvas");
+  const probe = canvas.getContext("webgl2", { failIfMajorPerformanceCaveat: true });
+  if (!probe) return true;
+  const named = probe.getExtension("WEBGL_debug_renderer_info");
+  const name = String(probe.getParameter(named?.UNMASKED_RENDERER_WEBGL ?? probe.RENDERER));
+  probe.getExtension("WEBGL_lose_context")?.loseContext(); // browsers allow only few at a time
+  return SOFTWARE.test(name);
 }
 
 function showNotice(stage: HTMLElement, text: string): HTMLElement {
