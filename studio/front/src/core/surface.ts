@@ -26,11 +26,14 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
       phase: { value: 1 },
       plain: { value: new three.Vector3(...rgbOf(plain)).divideScalar(255) },
       opacity: { value: 1 },
+      picture: { value: new three.Vector2() },
     });
     material.side = three.DoubleSide;
     material.defines = { COLORING: UNCOLORED };
     super(new three.BufferGeometry(), material);
     this.frustumCulled = false; // the shader moves vertices out of the box of the geometry
+    this.onBeforeRender = (renderer) =>
+      renderer.getDrawingBufferSize(material.uniforms.picture!.value);
   }
 
   setMesh(vertices: Float32Array, faces: Uint32Array): void {

@@ -21,7 +21,6 @@ out vec4 v_mark;
 out vec3 v_place;
 #endif
 out vec3 v_normal;
-out vec3 v_view;
 void main() {
   vec3 turn;
   vec3 place = moved(turn);
@@ -31,9 +30,7 @@ void main() {
 #ifdef CLIPPED
   v_place = place;
 #endif
-  vec4 seen = modelViewMatrix * vec4(place, 1.0);
   v_normal = normalMatrix * moved_normal(turn);
-  v_view = -seen.xyz;
   v_ambient = ambient;
 #if COLORING == 1
   v_value = phase * value;
@@ -45,5 +42,5 @@ void main() {
 #ifdef MARKED
   v_mark = mark;
 #endif
-  gl_Position = projectionMatrix * seen;
+  gl_Position = projectionMatrix * (modelViewMatrix * vec4(place, 1.0));
 }
