@@ -2,8 +2,8 @@
 
 import pytest
 import pyvista as pv
-from pyvista import _vtk
 from test_declarations import XML
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from eigenshape import FileFormatError
 from eigenshape.io.formats.vtu import parse
@@ -23,7 +23,7 @@ def binaries(tmp_path_factory):
         ("zlib", True, 1),
         ("lz4", True, 2),
     ):
-        writer = _vtk.vtkXMLUnstructuredGridWriter()
+        writer = vtkXMLUnstructuredGridWriter()
         writer.SetFileName(str(folder / name))
         writer.SetInputData(pv.UnstructuredGrid({10: CUBE.simplices}, CUBE.points))
         writer.SetEncodeAppendedData(encoded)

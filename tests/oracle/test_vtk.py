@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import pyvista as pv
-from pyvista import _vtk
+from vtkmodules.vtkIOLegacy import vtkPolyDataWriter, vtkUnstructuredGridWriter
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
 from eigenshape import SimplicialMesh, TriangleMesh, read_mesh, read_shape
 from eigenshape.shapes.domains import box
@@ -22,7 +23,7 @@ MODES = {"ascii": 0, "binary": 1, "appended": 2}
 @pytest.mark.parametrize("order", ["little", "big"])
 def test_every_form_of_vtu(tmp_path, mode, compressor, encoded, header, order):
     path = tmp_path / "a.vtu"
-    writer = _vtk.vtkXMLUnstructuredGridWriter()
+    writer = vtkXMLUnstructuredGridWriter()
     writer.SetFileName(str(path))
     writer.SetInputData(with_data(GRID))
     writer.SetDataMode(MODES[mode])
@@ -54,7 +55,7 @@ def test_legacy_grids_surfaces_and_strips(tmp_path, binary, version):
     assert strips.n_strips
     shapes = {"grid": GRID, "ball": ball, "strips": strips}
     for name, shape in shapes.items():
-        writer = _vtk.vtkPolyDataWriter() if name != "grid" else _vtk.vtkUnstructuredGridWriter()
+        writer = vtkPolyDataWriter() if name != "grid" else vtkUnstructuredGridWriter()
         writer.SetFileName(str(tmp_path / f"{name}.vtk"))
         writer.SetInputData(with_data(shape) if name != "strips" else shape)
         (writer.SetFileTypeToBinary if binary else writer.SetFileTypeToASCII)()

@@ -123,6 +123,10 @@ def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
 
     The block calls what it is given with the share that is done and the name of the current step.
     """
+    # A Progress that is disabled prints an empty line at its end, before rich 14.3.
+    if not err.is_terminal:
+        yield lambda share, step: None
+        return
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -131,7 +135,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
+    with Progress(*columns, console=err, transient=True) as bar:
         task = bar.add_task(title, total=1.0)
 
         def update(share: float, step: str) -> None:

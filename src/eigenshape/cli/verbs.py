@@ -46,7 +46,7 @@ TOGETHER = {
 }  # fmt: skip
 MARKUP: Any = "markdown"  # leaves plain brackets alone, which rich markup would take for its own
 
-# typer brings its own copy of click since version 0.20 and used the package before; this is the
+# typer brings its own copy of click since version 0.26 and used the package before; this is the
 # class of usage errors of whichever is in use
 UsageError: Any = typer.BadParameter.__base__
 
