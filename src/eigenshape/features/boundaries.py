@@ -138,7 +138,7 @@ def build_network(mesh: TriangleMesh, tensors: Float[np.ndarray, "f 3 3"]) -> _N
     """Measure the graph of the faces, with the cost of a cut along each inner edge."""
     points, _ = scale_to_unit(mesh)
     unit = TriangleMesh(points, mesh.faces)
-    table = edge_table(unit)
+    table = edge_table(mesh)  # which this mesh has listed already
     pairs, edges = face_pairs(table)
     centers = points[mesh.faces].mean(axis=1)
     across = centers[pairs[:, 1]] - centers[pairs[:, 0]]

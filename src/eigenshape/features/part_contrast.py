@@ -149,7 +149,7 @@ def _measure(mesh: TriangleMesh, parts: Segmentation, spectrum: Spectrum) -> _Pa
     sampled = np.bincount(labels[sample], weights=weights, minlength=count)
     log_radii = weights * np.log(radii / side)
     logs = np.bincount(labels[sample], weights=log_radii, minlength=count)
-    borders = _measure_borders(unit, labels, tree, normals, side)
+    borders = _measure_borders(mesh, points, labels, tree, normals, side)
 
     # Only parts with a sample have a row: a shape may have thousands of fragments.
     present, members = np.unique(labels[sample], return_inverse=True)
@@ -231,17 +231,21 @@ def lines_of_sight(
 
 def _measure_borders(
     mesh: TriangleMesh,
+    points: Float[np.ndarray, "n 3"],
     labels: Int[np.ndarray, " f"],
     tree: KDTree,
     normals: Float[np.ndarray, "f 3"],
     side: float,
 ) -> list[dict[int, Float[np.ndarray, " 2"]]]:
-    """Return the neighbors of each part, with length and integrated turn of the boundary."""
+    """Return the neighbors of each part, with length and integrated turn of the boundary.
+
+    `points`, `tree` and `normals` are those of the mesh scaled to unit size.
+    """
     table = edge_table(mesh)
     pairs, edges = face_pairs(table)
     crossing = labels[pairs[:, 0]] != labels[pairs[:, 1]]
     pairs, edges = pairs[crossing], edges[crossing]
-    ends = mesh.vertices[table.edges[edges]]
+    ends = points[table.edges[edges]]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
 
     # Compare normals at a fixed distance from the boundary, because the angle between neighboring

@@ -20,7 +20,9 @@ from eigenshape.geometry.orientation import orient_closed_outward
 from eigenshape.geometry.repairs.repair_steps import fragment_vertices
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.topology import vertex_components
-from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_tensors
+from eigenshape.operators import elements
+from eigenshape.operators.anisotropic import curvature_tensors
+from eigenshape.operators.cotangent import linear_laplacian
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
@@ -258,6 +260,7 @@ def _solve_parts(
     _, labels = vertex_components(mesh)
     n_components = len(np.unique(np.delete(labels, fragments)))
     wanted = whole_number(n_modes, "n_modes", 2) + n_components
-    laplacian = anisotropic_laplacian(mesh, tensors)
+    # `anisotropic_laplacian`, without its checks of tensors and mesh, which have been made.
+    laplacian = linear_laplacian(mesh, elements.gradient_products(mesh, tensors), "lumped")
     n_pairs = min(wanted, mesh.n_vertices - len(fragments))
     return solve_spectrum(laplacian, n_pairs, fixed=fragments, progress=progress)

@@ -9,7 +9,7 @@ from eigenshape._arrays import record
 from eigenshape._text import html_repr
 from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.distances.geodesic import geodesic_waves
+from eigenshape.geometry.distances.geodesic import unchecked_waves
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_describable, require_oriented
@@ -157,8 +157,8 @@ def describe_views(mesh: TriangleMesh, points: Int[np.ndarray, " m"]) -> tuple[V
         places[sources] = np.arange(piece.n_vertices)
         seen = np.flatnonzero(places[points] >= 0)
         chosen = places[points[seen]]
-        wave, reach = geodesic_waves(piece), float(MATCHED_RADII[-1])
-        rows = np.array([wave(vertex, reach) for vertex in chosen.tolist()])
+        wave, reach = unchecked_waves(piece), float(MATCHED_RADII[-1])
+        rows = np.array([wave(vertex, reach) for vertex in chosen[:, None]])
         rows = rows.reshape(len(chosen), piece.n_vertices)
         normals, areas = mean_normals(piece), dual_volumes(piece)
         numbers = describe_discs(piece, chosen, rows, MATCHED_RADII, normals, areas)

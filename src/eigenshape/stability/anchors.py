@@ -9,7 +9,7 @@ from eigenshape._arrays import ReadOnly, positive_values, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.distances.closest import squared_distances
-from eigenshape.geometry.distances.geodesic import farthest_first, geodesic_waves
+from eigenshape.geometry.distances.geodesic import farthest_first, unchecked_waves
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.crouzeix_raviart import longest_edges
@@ -92,7 +92,7 @@ def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes
     positive_values(delta, "delta")
     least, chosen = np.full(mesh.n_points, np.inf), []
     first = whole_number(start, "start", 0, mesh.n_points - 1)
-    for vertex, row in farthest_first(geodesic_waves(mesh), mesh.n_points, first):
+    for vertex, row in farthest_first(unchecked_waves(mesh), mesh.n_points, first):
         if least[vertex] < delta:
             break
         chosen.append(vertex)

@@ -32,6 +32,7 @@ N_BASES = 150
 Fans = tuple[
     Int[np.ndarray, " n1"], Int[np.ndarray, " k"], Int[np.ndarray, " k"], Float[np.ndarray, "k 7"]
 ]
+Wave = Callable[..., Float[np.ndarray, " n"]]
 
 
 def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
@@ -154,9 +155,9 @@ def geodesic_distances(
     [[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]]
     """
     mesh = as_simplicial(mesh)
-    wave = geodesic_waves(mesh)
+    wave, radius = unchecked_waves(mesh), number_from_zero(reach, "reach")
     wanted = source_sets(sources, mesh.n_points)
-    return np.array([wave(source, reach) for source in wanted]).reshape(-1, mesh.n_points)
+    return np.array([wave(source, radius) for source in wanted]).reshape(-1, mesh.n_points)
 
 
 def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]]:
@@ -176,7 +177,7 @@ def source_points(source: ArrayLike, n_points: int) -> Int[np.ndarray, " s"]:
     return np.unique(whole_numbers(source, "A source", 0, n_points - 1))
 
 
-def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
+def geodesic_waves(mesh: MeshLike) -> Wave:
     """Return a function that computes geodesic distances on one mesh, many times.
 
     What `geodesic_distances` prepares at each call is prepared once. On 25,000 vertices that
@@ -212,14 +213,26 @@ def geodesic_waves(mesh: MeshLike) -> Callable[..., Float[np.ndarray, " n"]]:
     [0.0, 1.0, inf, 1.0, inf, inf, inf, inf, inf]
     """
     mesh = as_simplicial(mesh)
+    wave, n = unchecked_waves(mesh), mesh.n_points
+
+    def checked_wave(source: ArrayLike, reach: float = np.inf) -> Float[np.ndarray, " n"]:
+        return wave(source_points(source, n), number_from_zero(reach, "reach"))
+
+    return checked_wave
+
+
+def unchecked_waves(mesh: Mesh) -> Wave:
+    """Return what `geodesic_waves` does, for arrays of vertices that ascend, and a reach from zero on.
+
+    The checks of these cost as much as a short wave.
+    """
     (fans, scale), n = _fans(mesh), mesh.n_points
     # A wave leaves its scratch as it was, so that the next one need not fill it.
     memory = SpareMemory(lambda: (_scratch(fans, n), np.empty(n, dtype=np.int64), np.empty(n)))
 
-    def wave(source: ArrayLike, reach: float = np.inf) -> Float[np.ndarray, " n"]:
-        sources, radius = source_points(source, n), number_from_zero(reach, "reach") / scale
+    def wave(sources: Int[np.ndarray, " s"], reach: float = np.inf) -> Float[np.ndarray, " n"]:
         with memory.lend() as (scratch, reached, distances):
-            count = spread_wave(fans, radius, sources, scratch, reached, distances)
+            count = spread_wave(fans, reach / scale, sources, scratch, reached, distances)
             found = np.full(n, np.inf)
             found[reached[:count]] = in_length(distances[:count], scale, 1)
         return found
@@ -274,11 +287,11 @@ def farthest_points(
     [4.0, 0.0]
     """
     mesh = as_simplicial(mesh)
-    wave, n = geodesic_waves(mesh), mesh.n_points
+    wave, n = unchecked_waves(mesh), mesh.n_points
     count = whole_number(count, "count", 1, n)
     chosen, rows = np.empty(count, dtype=np.int64), np.empty((count, n))
     least, nearest = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
-    first = int(wave(0).argmax())
+    first = int(wave(np.array([0])).argmax())
     # Each choice waits for the wave before it. So where all distances are wanted, waves that only
     # reach what they come nearest to make the choices, and long ones follow, side by side. The short
     # ones add about a fiftieth.
@@ -294,14 +307,14 @@ def farthest_points(
     if everywhere:
 
         def fill_row(number: int) -> None:
-            rows[number] = wave(chosen[number])
+            rows[number] = wave(chosen[number : number + 1])
 
         map_in_threads(fill_row, range(count))
     return chosen, rows, nearest
 
 
 def farthest_first(
-    wave: Callable[..., Float[np.ndarray, " n"]], n: int, first: int, *, reach: float = 0.0
+    wave: Wave, n: int, first: int, *, reach: float = 0.0
 ) -> Iterator[tuple[int, Float[np.ndarray, " n"]]]:
     """Yield vertices without end, each as far as possible from those before, and their distances.
 
@@ -310,7 +323,7 @@ def farthest_first(
     """
     least, vertex = np.full(n, np.inf), first
     while True:
-        row = wave(vertex, max(reach, least.max()))
+        row = wave(np.array([vertex]), max(reach, least.max()))
         yield vertex, row
         np.minimum(least, row, out=least)
         vertex = int(least.argmax())
