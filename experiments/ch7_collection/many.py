@@ -12,7 +12,9 @@ import json
 import subprocess
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -35,20 +37,26 @@ FITS = ("first", "fits")  # folders with a file for each fit
 SECONDS_BETWEEN_LOOKS = 0.25
 
 
+def make_specimen(folder: Path, n_vertices: int, i: int) -> None:
+    """Write the hand of an individual, and landmarks of the first one."""
+    mesh = es.make_creature("hand", individual=i, n_vertices=n_vertices // 16)
+    for _ in range(2):  # each time four times the vertices
+        mesh = es.geometry.subdivide(mesh)
+    turn = Rotation.random(rng=np.random.default_rng(i)).as_matrix()
+    mesh = es.TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
+    es.write_mesh(mesh, folder / f"hand {i:03}.ply")
+    if i == 0:
+        rows = np.linspace(0, mesh.n_vertices - 1, N_MARKS).astype(int)
+        names = [f"mark {row}" for row in rows]
+        marks = es.morphometrics.Landmarks(names, mesh.vertices[rows])
+        es.morphometrics.write_landmarks(marks, folder / "hand 000.fcsv")
+
+
 def make_specimens(folder: Path, number: int, n_vertices: int) -> None:
-    """Write hands of different individuals, and landmarks of the first one."""
-    for i in track(range(number), "specimens"):
-        mesh = es.make_creature("hand", individual=i, n_vertices=n_vertices // 16)
-        for _ in range(2):  # each time four times the vertices
-            mesh = es.geometry.subdivide(mesh)
-        turn = Rotation.random(rng=np.random.default_rng(i)).as_matrix()
-        mesh = es.TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
-        es.write_mesh(mesh, folder / f"hand {i:03}.ply")
-        if i == 0:
-            rows = np.linspace(0, mesh.n_vertices - 1, N_MARKS).astype(int)
-            names = [f"mark {row}" for row in rows]
-            marks = es.morphometrics.Landmarks(names, mesh.vertices[rows])
-            es.morphometrics.write_landmarks(marks, folder / "hand 000.fcsv")
+    """Write hands of different individuals."""
+    with ProcessPoolExecutor(WORKERS) as pool:
+        made = pool.map(partial(make_specimen, folder, n_vertices), range(number))
+        list(track(made, "specimens", total=number))
 
 
 def fits_in(output: Path) -> dict[Path, int]:
