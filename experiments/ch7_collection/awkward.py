@@ -25,6 +25,9 @@ ON_PART = 0.3  # mm from what is left of a surface, up to which a landmark is no
 MIRROR = np.array([-1.0, 1, 1])
 METERS = 0.001  # of a millimeter
 BESIDE = np.array([9.0, 4, 0])  # mm from a skull to the piece of another one
+# The data have no lower jaws. The lowest millimeters of another skull, a sixth of its area, are about
+# as large; they are placed below.
+JAW, BELOW = 2.5, np.array([0, 0, -3.5])  # mm
 LENGTH = 24.0  # mm, of a skull
 # Words of the note that must be made on each kind
 NOTES = {
@@ -34,6 +37,7 @@ NOTES = {
     "a plane cuts 40 % off": "no counterpart in it",
     "holes take 40 %": "no counterpart in it",
     "half of another attached": "no counterpart in the mean",
+    "a piece like a lower jaw": "no counterpart in the mean",
 }
 KNOWN_BY_LANDMARKS = "mirrored, six landmarks known"
 QUICK = ("as it is", "mirrored", KNOWN_BY_LANDMARKS)
@@ -70,11 +74,13 @@ def variants(
             break
         keep &= np.linalg.norm(centers.T - place, axis=1) > HOLE
     yield "holes take 40 %", part(mesh, keep), none
-    half = part(
-        other, other.vertices[other.faces].mean(axis=1)[:, 1] < np.median(other.vertices[:, 1])
-    )
+    middles = other.vertices[other.faces].mean(axis=1)
+    half = part(other, middles[:, 1] < np.median(other.vertices[:, 1]))
     half = es.TriangleMesh(half.vertices + BESIDE, half.faces)
     yield "half of another attached", es.geometry.disjoint_union(mesh, half), none
+    jaw = part(other, middles[:, 2] < other.vertices[:, 2].min() + JAW)
+    jaw = es.TriangleMesh(jaw.vertices + BELOW, jaw.faces)
+    yield "a piece like a lower jaw", es.geometry.disjoint_union(mesh, jaw), none
 
 
 def other_things() -> dict[str, es.TriangleMesh]:
