@@ -39,8 +39,9 @@ NOTES = {
     "half of another attached": "no counterpart in the mean",
     "a piece like a lower jaw": "no counterpart in the mean",
 }
-KNOWN_BY_LANDMARKS = "mirrored, six landmarks known"
-QUICK = ("as it is", "mirrored", KNOWN_BY_LANDMARKS)
+AS_IT_IS, KNOWN_BY_LANDMARKS = "as it is", "mirrored, six landmarks known"
+KINDS = (AS_IT_IS, "mirrored", KNOWN_BY_LANDMARKS, *NOTES)
+QUICK = KINDS[:3]
 
 
 def part(mesh: es.TriangleMesh, keep: np.ndarray) -> es.TriangleMesh:
@@ -54,7 +55,7 @@ def variants(
 ) -> Iterator[tuple[str, es.TriangleMesh, np.ndarray]]:
     """Yield the kinds of awkward specimens of a skull, with the factors of its coordinates."""
     none = np.ones(3)
-    yield "as it is", mesh, none
+    yield AS_IT_IS, mesh, none
     mirrored = es.TriangleMesh(mesh.vertices * MIRROR, mesh.faces[:, ::-1])
     yield "mirrored", mirrored, MIRROR
     yield KNOWN_BY_LANDMARKS, mirrored, MIRROR
@@ -162,17 +163,22 @@ def outcome(
 
 def main() -> None:
     """Build one collection of all, and say what became of each kind."""
-    arguments = options_of(__doc__, quick="one skull, three kinds of it").parse_args()
+    parser = options_of(__doc__, quick="one skull, three kinds of it")
+    parser.add_argument(
+        "--kinds", nargs="+", choices=KINDS, help="only these, without other things"
+    )
+    arguments = parser.parse_args()
     require_data()
+    chosen = QUICK if arguments.quick else arguments.kinds or KINDS
     labelled, judged = strains("tuning")[LABELLED], strains("reporting")[JUDGED]
     if arguments.quick:
         labelled, judged = [TEMPLATE, labelled[0]], judged[:1]
-    others = {} if arguments.quick else other_things()
+    others = {} if arguments.quick or arguments.kinds else other_things()
     awkward = {
         f"{name}, {each.kind}": each
         for number, name in enumerate(judged)
         for each in specimens_of(name, judged[number - 1])
-        if not arguments.quick or each.kind in QUICK
+        if each.kind in chosen
     }
     given = {name: truth(name) for name in labelled}
     known = dict(given)
@@ -190,10 +196,11 @@ def main() -> None:
         carried = es.collections.carry_landmarks(collection, given)
     kinds = dict.fromkeys(each.kind for each in awkward.values())
     results = {kind: outcome(kind, awkward, collection, carried) for kind in kinds}
-    plain = results["as it is"]["mean"]
-    for result in results.values():
-        if "mean" in result:
-            result["times"] = result["mean"] / plain
+    if AS_IT_IS in results:
+        plain = results[AS_IT_IS]["mean"]
+        for result in results.values():
+            if "mean" in result:
+                result["times"] = result["mean"] / plain
     found = {
         "kinds": results,
         "other things": {name: {"refused": int(name in collection.failures)} for name in others},

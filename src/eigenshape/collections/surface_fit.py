@@ -197,7 +197,8 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
         fit = min([fit, *posed], key=lambda each: each.misfit)
     if fit.misfit > NOT_ALIKE or fit.missing > MOST_MISSING:
         raise InvalidShapeError(
-            "The target must have about the form of the source, and half of it at least; after "
+            "The target must have about the form of the source, which is the template in a "
+            "collection, and half of it at least; after "
             f"bending the misfit is {fit.misfit:.3f}, the most is {NOT_ALIKE}, and {fit.missing:.0%} "
             f"of the source is missing, the most is {MOST_MISSING:.0%}."
         )
