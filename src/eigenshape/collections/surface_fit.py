@@ -59,10 +59,10 @@ FOLDED = 0.3
 # which a form is of another kind: skulls of mice have 0.01 to 0.02, creatures in another pose 0.01
 # to 0.04, other kinds 0.25 to 0.55.
 POSES_DIFFER, NOT_ALIKE = 0.03, 0.15
-# Strain from which they may differ, too. A biped in another pose, placed back to front and bent until
-# it lay on the other one, had a misfit of 0.02 and a strain of 0.13; whole skulls have at most 0.06,
-# hands of other individuals 0.09.
-STRAINED = 0.1
+# Strain from which they may differ, too. Bipeds in another pose, placed back to front and bent until
+# they lay on the other one, had a misfit of 0.02 and a strain of 0.09 to 0.13; whole skulls have at
+# most 0.06, hands of other individuals 0.09. Too low a number only costs time.
+STRAINED = 0.09
 MOST_MISSING = 0.75  # of the source's area: front halves of skulls lack 0.64, misplaced skulls 0.9
 # Misfit of one side in another pose, as a share of that of the other one, that tells which it is
 CLEAR_MISFIT = 0.7
