@@ -12,7 +12,9 @@ import json
 import subprocess
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -25,7 +27,7 @@ import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 from frame import rounded
-from outputs import give_out, options_of
+from outputs import give_out, options_of, output_folder
 
 N_KILLS = 5
 MANY = 200  # specimens that the time is projected to
@@ -35,20 +37,28 @@ FITS = ("first", "fits")  # folders with a file for each fit
 SECONDS_BETWEEN_LOOKS = 0.25
 
 
+def make_specimen(folder: Path, n_vertices: int, i: int) -> None:
+    """Write the hand of an individual, and landmarks of the first one, unless it is there."""
+    if (path := folder / f"hand {i:03}.ply").exists():
+        return
+    mesh = es.make_creature("hand", individual=i, n_vertices=n_vertices // 16)
+    for _ in range(2):  # each time four times the vertices
+        mesh = es.geometry.subdivide(mesh)
+    turn = Rotation.random(rng=np.random.default_rng(i)).as_matrix()
+    mesh = es.TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
+    es.write_mesh(mesh, path)
+    if i == 0:
+        rows = np.linspace(0, mesh.n_vertices - 1, N_MARKS).astype(int)
+        names = [f"mark {row}" for row in rows]
+        marks = es.morphometrics.Landmarks(names, mesh.vertices[rows])
+        es.morphometrics.write_landmarks(marks, folder / "hand 000.fcsv")
+
+
 def make_specimens(folder: Path, number: int, n_vertices: int) -> None:
-    """Write hands of different individuals, and landmarks of the first one."""
-    for i in track(range(number), "specimens"):
-        mesh = es.make_creature("hand", individual=i, n_vertices=n_vertices // 16)
-        for _ in range(2):  # each time four times the vertices
-            mesh = es.geometry.subdivide(mesh)
-        turn = Rotation.random(rng=np.random.default_rng(i)).as_matrix()
-        mesh = es.TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
-        es.write_mesh(mesh, folder / f"hand {i:03}.ply")
-        if i == 0:
-            rows = np.linspace(0, mesh.n_vertices - 1, N_MARKS).astype(int)
-            names = [f"mark {row}" for row in rows]
-            marks = es.morphometrics.Landmarks(names, mesh.vertices[rows])
-            es.morphometrics.write_landmarks(marks, folder / "hand 000.fcsv")
+    """Write hands of different individuals."""
+    with ProcessPoolExecutor(WORKERS) as pool:
+        made = pool.map(partial(make_specimen, folder, n_vertices), range(number))
+        list(track(made, "specimens", total=number))
 
 
 def fits_in(output: Path) -> dict[Path, int]:
@@ -108,13 +118,14 @@ def main() -> None:
     parser = options_of(__doc__, quick="three small specimens, killed once")
     parser.add_argument("--number", type=int, default=MANY, help="specimens")
     parser.add_argument("--kills", type=int, default=N_KILLS, help="how often it is killed")
+    parser.add_argument("--scans", type=output_folder, help="keep specimens here, for another run")
     arguments = parser.parse_args()
     number, n_vertices, n_kills = arguments.number, 100_000, arguments.kills
     if arguments.quick:
         number, n_vertices, n_kills = 3, 8_000, 1
     with TemporaryDirectory() as place:
-        folder, output = Path(place, "scans"), Path(place, "out")
-        folder.mkdir()
+        folder, output = arguments.scans or Path(place, "scans"), Path(place, "out")
+        folder.mkdir(exist_ok=True)
         make_specimens(folder, number, n_vertices)
         begin = time.monotonic()
         runs, kept = [], {}

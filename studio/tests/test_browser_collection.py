@@ -15,12 +15,21 @@ def report(tmp_path_factory):
     note = "</script><b>a note</b>"
     collection = collection_of_balls(folder, ("a", "b", "<c>"), level=3, note=note)
     spread = np.full((3, 1), 0.1)
+    doubtful = np.array([[False], [False], [True]])
     carried = CarriedLandmarks(
-        collection.names, ("top",), collection.points[:, :1], spread, spread > 1
+        collection.names, ("top",), collection.points[:, :1], spread, doubtful
     )
     path = folder / "report.html"
     steps.write_collection_report(collection, carried, path, "balls", lambda share, name: None)
     return path
+
+
+def overlap(one, other):
+    """Return whether two boxes of the page overlap by a pixel or more."""
+    return all(
+        min(one[start] + one[size], other[start] + other[size]) - max(one[start], other[start]) > 1
+        for start, size in (("x", "width"), ("y", "height"))
+    )
 
 
 @pytest.mark.parametrize("width", [1280, 390])
@@ -36,6 +45,14 @@ def test_the_mean_bends_and_nothing_complains(browser, report, width):
     assert page.locator(".sheet img").count() == 3
     assert page.get_by_text("</script><b>a note</b>").count() == 1
     assert page.get_by_text("it could not be read").is_visible()
+    assert page.get_by_text("To look at: top.").is_visible()
+    # Names of specimens cover neither each other nor points, and are within the picture.
+    boxes = [each.bounding_box() for each in page.locator("svg .name, svg circle").all()]
+    picture = page.locator("#ordination svg").bounding_box()
+    for number, box in enumerate(boxes):
+        assert box["x"] > picture["x"] - 1
+        assert box["x"] + box["width"] < picture["x"] + picture["width"] + 1
+        assert not any(overlap(box, other) for other in boxes[:number])
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 
     page.locator("input[type=range]").first.fill("2")

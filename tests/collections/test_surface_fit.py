@@ -39,6 +39,22 @@ def test_another_pose_in_a_mirror_is_reached_by_intrinsic_evidence():
     assert np.linalg.norm(fit.vertices - posed.vertices, axis=1).mean() < 0.03
 
 
+def test_a_biped_that_is_placed_back_to_front_is_turned(monkeypatch):
+    from eigenshape.collections import surface_fit
+
+    rest, posed = (es.make_creature("biped", pose, n_vertices=600) for pose in (0, 1))
+    found = es.collections.align_surfaces(posed, rest)
+    turn = np.diag([-1.0, 1, -1])  # about the vertical axis, with little change of the front
+    middle = rest.vertices.mean(axis=0)
+    wrong = es.collections.Similarity(
+        found.scale, turn @ found.rotation, middle + turn @ (found.translation - middle), found.gap
+    )
+    monkeypatch.setattr(surface_fit, "align_surfaces", lambda *_, **__: wrong)
+    fit = es.collections.fit_surface(rest, posed)
+    assert fit.method == "intrinsic"
+    assert np.linalg.norm(fit.vertices - posed.vertices, axis=1).mean() < 0.03
+
+
 def test_a_form_of_another_kind_is_refused():
     with pytest.raises(es.InvalidShapeError, match="must have about the form of the source"):
         es.collections.fit_surface(make_specimen(0), es.make_creature("octopus", n_vertices=500))

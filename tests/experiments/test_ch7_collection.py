@@ -6,9 +6,16 @@ from pathlib import Path
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch7_collection"
-FULL, AWKWARD, NOISE = (
+FULL, AWKWARD, NOISE, JAW, MANY, BIPED = (
     json.loads((FOLDER / name).read_text())["full"]
-    for name in ("expected.json", "expected_awkward.json", "expected_noise.json")
+    for name in (
+        "expected.json",
+        "expected_awkward.json",
+        "expected_noise.json",
+        "expected_jaw.json",
+        "expected_many.json",
+        "expected_biped.json",
+    )
 )
 
 
@@ -48,3 +55,20 @@ def test_the_noise_of_labels_leaves_more_than_carried_landmarks_do():
     within = NOISE["0.2 mm, 4.0 mm"]
     assert within["component 3"] < carried["component 3"]
     assert carried["Procrustes distances"] < within["low"]
+
+
+def test_a_piece_like_a_lower_jaw_does_little_harm():
+    found = JAW["kinds"]["a piece like a lower jaw"]
+    assert found["refused"] == 0
+    assert found["times"] < 1.2
+
+
+def test_kills_lose_nothing_and_memory_stays_small():
+    assert MANY["killed"] == 5
+    assert MANY["lost"] == MANY["failed"] == MANY["mirrored"] == 0
+    assert MANY["in the collection"] == MANY["specimens"]
+    assert MANY["GiB of all"] < 4
+
+
+def test_no_pose_lies_back_to_front():
+    assert all(found["worst pose"] < 4 for found in BIPED.values())

@@ -59,7 +59,7 @@ SECOND_LEVELS = tuple((width, reach, stiffness, 4) for width, reach, stiffness, 
 # lacks more gives no evidence for the mean.
 NOTABLE = 0.1
 OTHER_UNIT = 3.0  # factor from the median size from which a unit is suspected
-RECIPE = "2"  # changes when fits of an older version must not be used again
+RECIPE = "3"  # changes when fits of an older version must not be used again
 SURE = 0.25  # confidence of a vertex that determines where the second round starts
 ROUNDS = 20  # of finding the place and the shape of a start in turn
 

@@ -59,6 +59,10 @@ FOLDED = 0.3
 # which a form is of another kind: skulls of mice have 0.01 to 0.02, creatures in another pose 0.01
 # to 0.04, other kinds 0.25 to 0.55.
 POSES_DIFFER, NOT_ALIKE = 0.03, 0.15
+# Strain from which they may differ, too. Bipeds in another pose, placed back to front and bent until
+# they lay on the other one, had a misfit of 0.02 and a strain of 0.09 to 0.13; whole skulls have at
+# most 0.06, hands of other individuals 0.09. Too low a number only costs time.
+STRAINED = 0.09
 MOST_MISSING = 0.75  # of the source's area: front halves of skulls lack 0.64, misplaced skulls 0.9
 # Misfit of one side in another pose, as a share of that of the other one, that tells which it is
 CLEAR_MISFIT = 0.7
@@ -182,7 +186,7 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
     source, target = as_mesh(source, "source"), as_mesh(target, "target")
     placing = align_surfaces(target, source, mirrored=mirrored)
     fit = replace(bend_placed(source, placing, target, LEVELS), side=placing.side)
-    if fit.misfit > POSES_DIFFER:
+    if fit.misfit > POSES_DIFFER or fit.strain > STRAINED:
         sides = (False, True) if mirrored is None else (mirrored,)
         posed = [found for side in sides if (found := _fit_posed(source, target, side))]
         if len(posed) == 2:
@@ -197,7 +201,8 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
         fit = min([fit, *posed], key=lambda each: each.misfit)
     if fit.misfit > NOT_ALIKE or fit.missing > MOST_MISSING:
         raise InvalidShapeError(
-            "The target must have about the form of the source, and half of it at least; after "
+            "The target must have about the form of the source, which is the template in a "
+            "collection, and half of it at least; after "
             f"bending the misfit is {fit.misfit:.3f}, the most is {NOT_ALIKE}, and {fit.missing:.0%} "
             f"of the source is missing, the most is {MOST_MISSING:.0%}."
         )
