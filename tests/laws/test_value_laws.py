@@ -153,6 +153,7 @@ def writable(value: Any) -> list[str]:
 @pytest.fixture(scope="module")
 def values(shared: Shared) -> dict[str, Any]:
     """Return one value of each public class, by its name."""
+    shared.reader.query(shared.by_patches[0])  # a reader keeps what it has read
     made = {name: make(shared) for name, make in MADE.items()}
     found: dict[str, Any] = {}
     for source in [*vars(shared).values(), *(CALLS[name](shared) for name in CALLED)]:

@@ -325,6 +325,7 @@ class _Scan:
                 found = np.zeros(len(columns))
                 if isinstance(recipe, PatchRecipe):
                     found = stored_isolations(self.snapshot, recipe, columns["rows_checksum"])
+                found.flags.writeable = False
                 self._isolations = found
             return self._isolations
 

@@ -318,7 +318,9 @@ class IndexState:
                 f"An index must hold descriptors of the requested recipe; {self.folder} holds "
                 f"{', '.join(names) or 'no shape'}, and {recipe} was requested."
             )
-        return Snapshot(self, recipe, rows if mask.all() else rows[mask])
+        columns = rows if mask.all() else rows[mask]
+        columns.flags.writeable = False  # any number of threads use it
+        return Snapshot(self, recipe, columns)
 
 
 @record
