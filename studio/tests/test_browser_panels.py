@@ -198,8 +198,8 @@ def test_nodal_lines_are_drawn_where_the_function_is_zero(still, mesh, spectrum)
         # A pixel where a leg covers the body is a mixture of both, so its neighbors count, too.
         steps = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
         places = [[columns[place] + 0.5 + right, rows[place] + 0.5 + down] for right, down in steps]
-        code = "(places) => places.map(([x, y]) => eigenshape.viewer.pick(x, y).face)"
-        corners = spectrum.eigenvectors[mesh.faces[still.evaluate(code, places)], 4]
+        code = "(places) => places.map(([x, y]) => eigenshape.viewer.pick(x, y).corners)"
+        corners = spectrum.eigenvectors[still.evaluate(code, places), 4]
         assert (np.abs(corners).min(axis=1) < np.ptp(corners, axis=1)).any()
 
 
@@ -294,8 +294,8 @@ def check_picture_of_parts(page, mesh):
     rows, columns = np.nonzero(inside & (jump.max(axis=2) < 12))
     chosen = np.linspace(0, len(rows) - 1, 300).astype(int)
     places = np.column_stack([columns[chosen], rows[chosen]]) + 0.5
-    code = "(places) => places.map(([x, y]) => eigenshape.viewer.pick(x, y).face)"
-    parts = vertex_labels(page)[mesh.faces[page.evaluate(code, places.tolist())]]
+    code = "(places) => places.map(([x, y]) => eigenshape.viewer.pick(x, y).corners)"
+    parts = vertex_labels(page)[page.evaluate(code, places.tolist())]
     n_inside, n_border = 0, 0
     for corners, pixel in zip(parts, image[rows[chosen], columns[chosen], :3], strict=True):
         if pixel.max() == 255:

@@ -4,8 +4,8 @@ import * as three from "three";
 import type { Vec3 } from "./backend";
 
 export interface Hit {
-  vertex: number; // the nearest corner of the face
-  face: number;
+  corners: Vec3; // the vertices of the face
+  vertex: number; // the nearest of them
   point: Vec3; // on the surface as it is shown
 }
 
@@ -39,8 +39,8 @@ export class Picker {
     camera.setViewOffset(seen.fullWidth, seen.fullHeight, 0, 0, seen.width, seen.height);
     if (!rest![3]) return null;
     const point = new three.Vector3().fromArray(rest!);
-    const { vertex, face } = this.findFace(rest![3] - 1, point);
-    return { vertex, face, point: [...place!.subarray(0, 3)] as Vec3 };
+    const found = this.findFace(rest![3] - 1, point);
+    return { ...found, point: [...place!.subarray(0, 3)] as Vec3 };
   }
 
   /** Return the positions of all vertices as the shader computes them. */
@@ -79,21 +79,22 @@ export class Picker {
     return pictures;
   }
 
-  /** Return the face with this last corner that is nearest to a point, and its nearest corner. */
-  private findFace(last: number, point: three.Vector3): { face: number; vertex: number } {
-    const corners = this.geometry.index!.array;
+  /** Return the nearest face to a point that has this last corner, and its nearest corner. */
+  private findFace(last: number, point: three.Vector3): Pick<Hit, "corners" | "vertex"> {
+    const drawn = this.geometry.index!.array;
     const points = this.geometry.getAttribute("position");
     const [triangle, nearest] = [new three.Triangle(), new three.Vector3()];
-    let [face, least] = [-1, Infinity];
-    for (let end = 2; end < corners.length; end += 3) {
-      if (corners[end] !== last) continue;
-      triangle.setFromAttributeAndIndices(points, corners[end - 2]!, corners[end - 1]!, last);
+    let corners: Vec3 = [last, last, last];
+    let least = Infinity;
+    for (let end = 2; end < drawn.length; end += 3) {
+      if (drawn[end] !== last) continue;
+      const [a, b] = [drawn[end - 2]!, drawn[end - 1]!];
+      triangle.setFromAttributeAndIndices(points, a, b, last);
       const away = triangle.closestPointToPoint(point, nearest).distanceTo(point);
-      if (away < least) [face, least] = [(end - 2) / 3, away];
+      if (away < least) [corners, least] = [[a, b, last], away];
     }
     const away = (vertex: number) => nearest.fromBufferAttribute(points, vertex).distanceTo(point);
-    const around = [...corners.slice(3 * face, 3 * face + 3)];
-    const vertex = around.reduce((best, other) => (away(other) < away(best) ? other : best));
-    return { face, vertex };
+    const vertex = corners.reduce((best, other) => (away(other) < away(best) ? other : best));
+    return { corners, vertex };
   }
 }

@@ -4,6 +4,7 @@ import * as three from "three";
 import { softenBorders } from "./borders";
 import { colorMap, findRange, rgbOf, type Scale } from "./colors";
 import { define, type Motion } from "./motion";
+import { orderFaces } from "./order";
 import { MAX_REGIONS } from "./regions";
 import surfaceFragment from "../shaders/surface.frag.glsl?raw";
 import surfaceVertex from "../shaders/surface.vert.glsl?raw";
@@ -14,6 +15,7 @@ const [UNCOLORED, BY_VALUE, BY_PAINT] = [0, 1, 2]; // COLORING of the shader
 export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMaterial> {
   vertices = new Float32Array(0);
   faces = new Uint32Array(0);
+  private corners = new Uint32Array(0); // of the faces, in the order in which they are drawn
   labels: Int32Array | null = null;
 
   constructor(motion: Motion, plain = PLAIN) {
@@ -53,7 +55,8 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
       ambient: [new Uint8Array(count).fill(255), 1],
     } as const;
     this.geometry.dispose();
-    this.geometry.setIndex(new three.BufferAttribute(faces, 1));
+    this.corners = orderFaces(faces, count);
+    this.geometry.setIndex(new three.BufferAttribute(this.corners, 1));
     for (const [name, [array, size]] of Object.entries(attributes)) {
       const normalized = array instanceof Uint8Array;
       this.geometry.setAttribute(name, new three.BufferAttribute(array, size, normalized));
@@ -102,10 +105,10 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
 
   /** Let each face end with a corner of its most frequent label: the shader takes that color. */
   private turnCorners(labels: Int32Array): void {
-    const { faces } = this;
-    for (let place = 0; place < faces.length; place += 3) {
-      const [a, b, c] = faces.subarray(place, place + 3) as unknown as [number, number, number];
-      if (labels[a] === labels[b] && labels[b] !== labels[c]) faces.set([c, a, b], place);
+    const { corners } = this;
+    for (let place = 0; place < corners.length; place += 3) {
+      const [a, b, c] = corners.subarray(place, place + 3) as unknown as [number, number, number];
+      if (labels[a] === labels[b] && labels[b] !== labels[c]) corners.set([c, a, b], place);
     }
     this.geometry.index!.needsUpdate = true;
   }
