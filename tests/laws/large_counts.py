@@ -76,11 +76,13 @@ CARRIED: dict[str, Callable[[], Any]] = {
 def count_names(code: Callable[..., Any]) -> list[str]:
     """Return the arguments that are counts."""
     hints = get_type_hints(code)
-    return [
-        name
-        for name in inspect.signature(code).parameters
-        if {int, SupportsIndex} & set(kinds(hints.get(name))) and name not in NO_COUNTS
-    ]
+    found = []
+    for name in inspect.signature(code).parameters:
+        types = set(kinds(hints.get(name)))
+        # NumPy 1 lists all numbers, complex ones too, as what an array can be made of.
+        if {int, SupportsIndex} & types and complex not in types and name not in NO_COUNTS:
+            found.append(name)
+    return found
 
 
 def arguments_of(

@@ -23,7 +23,6 @@ import scipy.sparse as sp
 from describers import keep
 from matplotlib.figure import Figure
 from public_names import public_things
-from typing_extensions import TypeAliasType
 
 import eigenshape as es
 from eigenshape.plot import render
@@ -448,7 +447,7 @@ MESHES = {es.TriangleMesh, es.SimplicialMesh, es.PointCloud}
 
 def kinds(annotation: Any) -> Iterator[Any]:
     """Yield the types that a union is of, and what its lists and mappings are of."""
-    if isinstance(annotation, TypeAliasType):
+    if hasattr(annotation, "__value__"):  # an alias of typing_extensions, or of Python since 3.12
         yield from kinds(annotation.__value__)
     elif get_origin(annotation) in (Union, UnionType, Sequence, Iterable, Mapping, tuple):
         for part in get_args(annotation):

@@ -113,8 +113,8 @@ class Edit(ReadOnly):
 
     >>> import eigenshape as es
     >>> mesh = es.icosphere(2)
-    >>> top = es.deformation.Move(mesh.vertices[:, 2] > 0.5, es.Translation([0, 0, 0.5]))
-    >>> bottom = es.deformation.Move(mesh.vertices[:, 2] < -0.5, es.Translation([0, 0, -0.5]))
+    >>> top = es.deformation.Move(mesh.vertices[:, 2] > 0.6, es.Translation([0, 0, 0.5]))
+    >>> bottom = es.deformation.Move(mesh.vertices[:, 2] < -0.6, es.Translation([0, 0, -0.5]))
     >>> edit = es.deformation.Edit((top, bottom))
     >>> heights = es.deformation.replay(es.rig_shape(mesh), [edit]).mesh.vertices[:, 2]
     >>> heights.max().round(1).item(), heights.min().round(1).item()
