@@ -153,7 +153,10 @@ def measure_drag(browser: Browser, folder: Path, n_vertices: int, repeats: int) 
     path = folder / "drag.ply"
     mesh = es.make_creature(BEAST, n_vertices=n_vertices)
     es.write_mesh(mesh, path)
-    with studio.serve_studio(path) as url, studio.open_page(browser, url) as page:
+    with (
+        studio.serve_studio(path) as url,
+        studio.open_page(browser, url, size=studio.LAPTOP) as page,
+    ):
         wait_until_ready(page)
         stroke_box(page, 0.5)  # loads and compiles
         ready = [stroke_box(page, 0.6 + 0.02 * number) for number in range(repeats)]
@@ -205,7 +208,10 @@ def measure_opening(browser: Browser, folder: Path, n_vertices: int) -> list[Row
     mesh = es.make_creature(BEAST, n_vertices=n_vertices)
     es.write_mesh(mesh, path)
     since = "performance.now() / 1000"  # since the address was opened
-    with studio.serve_studio(path) as url, studio.open_page(browser, url) as page:
+    with (
+        studio.serve_studio(path) as url,
+        studio.open_page(browser, url, size=studio.LAPTOP) as page,
+    ):
         drawn = f"eigenshape.viewer.renderer.info.render.triangles >= {len(mesh.faces)}"
         studio.wait_until(page, drawn)
         picture = page.evaluate(since)
@@ -233,7 +239,7 @@ def measure_size(browser: Browser, folder: Path, n_vertices: int) -> list[Row]:
     before = browser_cpu()
     with (
         studio.start_server(path) as (url, number),
-        studio.open_page(browser, url, ready="true") as page,
+        studio.open_page(browser, url, ready="true", size=studio.LAPTOP) as page,
     ):
         drawn = f"window.eigenshape?.viewer.renderer.info.render.triangles >= {len(mesh.faces)}"
         studio.wait_until(page, drawn, 300)
@@ -282,7 +288,7 @@ def work_for(browser: Browser, folder: Path, minutes: float) -> list[Row]:
     path = folder / "quadruped.ply"
     with (
         studio.start_server(path, folder / "index") as (url, number),
-        studio.open_page(browser, url) as page,
+        studio.open_page(browser, url, size=studio.LAPTOP) as page,
     ):
         wait_until_ready(page)
         server, begin = psutil.Process(number), monotonic()

@@ -48,6 +48,8 @@ serve(
 """
 # Tests wait for states. Only one that fails waits this long, so a machine with much else to do fails none.
 PATIENCE = 300.0  # seconds
+LAPTOP = (1280, 800)
+WINDOW = (960, 600)  # of tests: half as many pixels to draw in software
 # The panel in which shapes are bent, in the code of the page.
 PANEL = "eigenshape.panels.find((panel) => panel.id === 'deform')"
 # Opens all that the page hides at first; there are panels soon after the shape.
@@ -122,10 +124,10 @@ def open_page(
     dark: bool = False,
     ready: str = HAS_SHAPE,
     more: bool = True,
-    size: tuple[int, int] = (1280, 800),
+    size: tuple[int, int] = WINDOW,
     expected: tuple[str, ...] = (),
 ) -> Iterator[Page]:
-    """Open the studio as on a laptop, and wait until it shows a shape, or another condition.
+    """Open the studio in a window of its own, and wait until it shows a shape, or another condition.
 
     With `more`, what the page hides at first is opened.
 

@@ -15,6 +15,7 @@ from io import BytesIO
 from pathlib import Path
 
 from browser import (
+    LAPTOP,
     PANEL,
     find,
     move_slider,
@@ -68,7 +69,7 @@ def draw_shape(browser, folder, work, title, mesh, steps):
     """Open a shape, and draw a picture after each step."""
     paths = []
     es.write_mesh(mesh, work / f"{title}.ply")
-    with serve_studio(work / f"{title}.ply") as url, open_page(browser, url) as page:
+    with serve_studio(work / f"{title}.ply") as url, open_page(browser, url, size=LAPTOP) as page:
         wait_until(page, "eigenshape.state.deformation.status === 'ready'")
         for name, act in steps.items():
             act(page)

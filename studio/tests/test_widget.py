@@ -134,13 +134,17 @@ def run_cell(page):
     """Run the only cell, and wait until it has run.
 
     A page that has just opened may lose a key, or send a cell to a kernel that does not hear it. So the
-    key is pressed again, but never while the kernel works.
+    key is pressed again, but never while the kernel works. On a busy machine JupyterLab asks which
+    kernel to take, before it has heard that there is one.
     """
     idle = page.locator(".jp-Notebook-ExecutionIndicator[data-status=idle]")
     idle.wait_for()
     cell = page.locator(".jp-Notebook .jp-CodeCell").first
     count = cell.locator(".jp-InputPrompt").filter(has_text=re.compile(r"\[\d+\]"))
+    question = page.locator(".jp-Dialog .jp-mod-accept")
     for _ in range(8):
+        if question.count():
+            question.click()
         if idle.count():
             cell.locator(".cm-content").click()
             page.keyboard.press("Control+Enter")
