@@ -22,6 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 from describers import keep
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 from public_names import public_things
 
 import eigenshape as es
@@ -447,7 +448,9 @@ MESHES = {es.TriangleMesh, es.SimplicialMesh, es.PointCloud}
 
 def kinds(annotation: Any) -> Iterator[Any]:
     """Yield the types that a union is of, and what its lists and mappings are of."""
-    if hasattr(annotation, "__value__"):  # an alias of typing_extensions, or of Python since 3.12
+    if annotation is ArrayLike:
+        yield complex  # the widest of the numbers that it is made of; NumPy 2.5 hides them in variables
+    elif hasattr(annotation, "__value__"):  # an alias of typing_extensions, or of Python since 3.12
         yield from kinds(annotation.__value__)
     elif get_origin(annotation) in (Union, UnionType, Sequence, Iterable, Mapping, tuple):
         for part in get_args(annotation):
