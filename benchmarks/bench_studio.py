@@ -176,7 +176,8 @@ def measure_drag(browser: Browser, folder: Path, n_vertices: int, repeats: int) 
         page.evaluate(KEEP_MOVING.replace("MOVE", move))
         n_calls = len(calls)
         with serve_plain(json.dumps(page.evaluate(VIEW))) as address:
-            context = browser.new_context(viewport={"width": 1280, "height": 800})
+            width, height = studio.LAPTOP
+            context = browser.new_context(viewport={"width": width, "height": height})
             plain = context.new_page()
             plain.goto(address)
             studio.wait_until(plain, "window.step !== undefined")

@@ -15,7 +15,6 @@ const [UNCOLORED, BY_VALUE, BY_PAINT] = [0, 1, 2]; // COLORING of the shader
 export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMaterial> {
   vertices = new Float32Array(0);
   faces = new Uint32Array(0);
-  private corners = new Uint32Array(0); // of the faces, in the order in which they are drawn
   labels: Int32Array | null = null;
 
   constructor(motion: Motion, plain = PLAIN) {
@@ -55,8 +54,7 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
       ambient: [new Uint8Array(count).fill(255), 1],
     } as const;
     this.geometry.dispose();
-    this.corners = orderFaces(faces, count);
-    this.geometry.setIndex(new three.BufferAttribute(this.corners, 1));
+    this.geometry.setIndex(new three.BufferAttribute(orderFaces(faces, count), 1));
     for (const [name, [array, size]] of Object.entries(attributes)) {
       const normalized = array instanceof Uint8Array;
       this.geometry.setAttribute(name, new three.BufferAttribute(array, size, normalized));
@@ -105,12 +103,13 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
 
   /** Let each face end with a corner of its most frequent label: the shader takes that color. */
   private turnCorners(labels: Int32Array): void {
-    const { corners } = this;
+    const drawn = this.geometry.index!;
+    const corners = drawn.array as Uint32Array;
     for (let place = 0; place < corners.length; place += 3) {
       const [a, b, c] = corners.subarray(place, place + 3) as unknown as [number, number, number];
       if (labels[a] === labels[b] && labels[b] !== labels[c]) corners.set([c, a, b], place);
     }
-    this.geometry.index!.needsUpdate = true;
+    drawn.needsUpdate = true;
   }
 
   /** Tint vertices: red, green, blue and strength of each, in bytes. */
