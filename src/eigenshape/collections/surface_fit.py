@@ -1,7 +1,7 @@
 """One surface bent onto another by stiff, smooth displacements, from coarse to fine."""
 
 from dataclasses import replace
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -34,16 +34,25 @@ from eigenshape.matching.match import match_shapes
 
 # Lengths are in units of the root mean square distance of the placed source from its middle. All
 # numbers were chosen on the tuning half of experiments/ch7_collection.
-N_POINTS = 6000  # of each surface
 NORMAL_WEIGHT = 0.15  # length of a normal beside a place
-Levels: TypeAlias = tuple[tuple[float, float, float, int], ...]
-# Width of the displacements, distance at which a pair counts a quarter, stiffness per pair, and
-# rounds of pairs and displacements. A looser surface falls into pores and onto inner walls.
+
+
+class Level(NamedTuple):
+    """One step from coarse to fine."""
+
+    width: float  # of the displacements
+    reach: float  # distance at which a pair counts a quarter
+    stiffness: float  # per pair; a looser surface falls into pores and onto inner walls
+    n_rounds: int = 6  # of pairs and displacements
+    n_points: int = 6000  # of each surface
+
+
+Levels: TypeAlias = tuple[Level, ...]
 LEVELS: Levels = (
-    (0.90, 0.45, 0.0042, 6),
-    (0.60, 0.30, 0.0021, 6),
-    (0.37, 0.18, 0.00125, 6),
-    (0.24, 0.12, 0.00125, 6),
+    Level(0.90, 0.45, 0.0042),
+    Level(0.60, 0.30, 0.0021),
+    Level(0.37, 0.18, 0.00125),
+    Level(0.24, 0.12, 0.00125),
 )
 # Share of a gap along the surface that counts: nearest points slide wrongly more often than rightly.
 SLIDE = 0.2
@@ -236,17 +245,19 @@ def bend_onto(
 ) -> SurfaceFit:
     """Bend a source onto a target, from where its vertices lie nearly on it."""
     placed = TriangleMesh(start, source.faces)
-    ours = spread_points(placed, N_POINTS)
-    middle = ours.points.mean(axis=0)
-    size = mean_radius(ours.points)
-    theirs = spread_points(target, N_POINTS)
-    ends, end_normals = (theirs.points - middle) / size, theirs.normals
-    ends_with_normals = join_normals(ends, end_normals, NORMAL_WEIGHT)
-    tree = cKDTree(ends_with_normals)
-
+    samples = {
+        n: (spread_points(placed, n).places, spread_points(target, n))
+        for n in {level.n_points for level in levels}
+    }
+    rough = samples[levels[0].n_points][0].points
+    middle, size = rough.mean(axis=0), mean_radius(rough)
     vertices = (placed.vertices - middle) / size
-    faces, shares = placed.faces[ours.places.simplices], ours.places.weights
-    for width, reach, stiffness, n_rounds in levels:
+    for width, reach, stiffness, n_rounds, n_points in levels:
+        places, theirs = samples[n_points]
+        faces, shares = placed.faces[places.simplices], places.weights
+        ends, end_normals = (theirs.points - middle) / size, theirs.normals
+        ends_with_normals = join_normals(ends, end_normals, NORMAL_WEIGHT)
+        tree = cKDTree(ends_with_normals)
         points = np.einsum("pc,pcd->pd", shares, vertices[faces])
         # One center in each cell of a grid, at the first of the points in it
         cells = np.floor(points / (SPACING * width)).astype(np.int64)
@@ -262,12 +273,13 @@ def bend_onto(
             along = np.einsum("pi,pi->p", gaps, facing)[:, None] * facing
             wanted = weights[:, None] * (along + SLIDE * (gaps - along))
             # Pairs of one point are summed before the kernels are multiplied.
-            total = np.bincount(start, weights, N_POINTS)
-            pull = np.column_stack([np.bincount(start, wanted[:, i], N_POINTS) for i in range(3)])
+            total = np.bincount(start, weights, n_points)
+            pull = np.column_stack([np.bincount(start, wanted[:, i], n_points) for i in range(3)])
             at_points = _kernel(points, centers, width)
             at_centers = _kernel(centers, centers, width)
             energy = stiffness * len(start) * at_centers
-            system = at_points.T @ (at_points * total[:, None]) + energy
+            weighted = at_points * np.sqrt(total)[:, None]
+            system = weighted.T @ weighted + energy  # NumPy computes half of such a product
             system[np.diag_indices_from(system)] += 1e-6
             shifts = solve(system, at_points.T @ pull, assume_a="pos", overwrite_a=True)
             vertices = vertices + _kernel(vertices, centers, width) @ shifts
@@ -328,6 +340,10 @@ def _stretches(
 def _kernel(
     points: Float[np.ndarray, "k 3"], centers: Float[np.ndarray, "m 3"], width: float
 ) -> Float[np.ndarray, "k m"]:
-    squares = np.sum(points**2, axis=1)[:, None] + np.sum(centers**2, axis=1)
-    squares -= 2 * points @ centers.T
-    return np.exp(np.maximum(squares, 0) / (-2 * width**2))
+    # All exponents by one product: (2 p·c - |p|² - |c|²) / 2 width²
+    ones = [np.ones((len(each), 1)) for each in (points, centers)]
+    squares = [np.sum(each**2, axis=1, keepdims=True) for each in (points, centers)]
+    left = np.hstack([2 * points, -squares[0], ones[0]]) / (2 * width**2)
+    exponents = left @ np.hstack([centers, ones[1], -squares[1]]).T
+    np.minimum(exponents, 0, out=exponents)
+    return np.exp(exponents, out=exponents)
