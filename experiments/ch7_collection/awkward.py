@@ -77,11 +77,15 @@ def variants(
     yield "holes take 40 %", part(mesh, keep), none
     middles = other.vertices[other.faces].mean(axis=1)
     half = part(other, middles[:, 1] < np.median(other.vertices[:, 1]))
-    half = es.TriangleMesh(half.vertices + BESIDE, half.faces)
-    yield "half of another attached", es.geometry.disjoint_union(mesh, half), none
+    yield "half of another attached", with_piece(mesh, half, BESIDE), none
     jaw = part(other, middles[:, 2] < other.vertices[:, 2].min() + JAW)
-    jaw = es.TriangleMesh(jaw.vertices + BELOW, jaw.faces)
-    yield "a piece like a lower jaw", es.geometry.disjoint_union(mesh, jaw), none
+    yield "a piece like a lower jaw", with_piece(mesh, jaw, BELOW), none
+
+
+def with_piece(mesh: es.TriangleMesh, piece: es.TriangleMesh, shift: np.ndarray) -> es.TriangleMesh:
+    """Return a mesh together with a piece that is moved."""
+    moved = es.TriangleMesh(piece.vertices + shift, piece.faces)
+    return es.geometry.disjoint_union(mesh, moved)
 
 
 def other_things() -> dict[str, es.TriangleMesh]:

@@ -5,6 +5,7 @@ import pytest
 from specimens import half, make_specimen, mirror, move
 
 import eigenshape as es
+from eigenshape.collections import surface_fit
 
 
 def test_a_specimen_is_bent_onto_another_in_place():
@@ -16,6 +17,21 @@ def test_a_specimen_is_bent_onto_another_in_place():
     assert np.median(fit.confidence) > 0.9
     assert (fit.method, fit.side) == ("position", "same")
     assert fit.missing == fit.excess == 0
+
+
+def test_more_points_in_the_last_level_bring_a_surface_nearer():
+    source, truth = make_specimen(0), make_specimen(1)
+    placing = es.collections.align_surfaces(truth, source)
+    *coarse, fine = (level._replace(n_points=500) for level in surface_fit.LEVELS)
+    few, many = (
+        surface_fit.bend_placed(source, placing, truth, (*coarse, fine._replace(n_points=n_points)))
+        for n_points in (500, 4000)
+    )
+    assert many.gaps.mean() < 0.8 * few.gaps.mean()
+    error, error_of_few = (
+        np.linalg.norm(fit.vertices - truth.vertices, axis=1).mean() for fit in (many, few)
+    )
+    assert error < 0.95 * error_of_few
 
 
 def test_the_mirror_image_of_half_a_specimen_is_fitted_and_its_missing_half_is_not_sure():
@@ -40,8 +56,6 @@ def test_another_pose_in_a_mirror_is_reached_by_intrinsic_evidence():
 
 
 def test_a_biped_that_is_placed_back_to_front_is_turned(monkeypatch):
-    from eigenshape.collections import surface_fit
-
     rest, posed = (es.make_creature("biped", pose, n_vertices=600) for pose in (0, 1))
     found = es.collections.align_surfaces(posed, rest)
     turn = np.diag([-1.0, 1, -1])  # about the vertical axis, with little change of the front
