@@ -82,7 +82,8 @@ def build_collection(
     1. A template is bent onto each specimen (`fit_surface`), from the surfaces alone.
     2. All fits are superimposed (generalized Procrustes analysis). Their mean is the template of a
        second round, so that the choice of the first one hardly matters. Each specimen starts from
-       its first fit in the 8 largest modes of the collection.
+       its first fit in the 8 largest modes of the collection. The last step compares as many points
+       as the template has faces.
 
     What is done is kept in the folder. After Ctrl-C or a crash the same call goes on where it
     stopped; files that have not changed are not fitted again. A specimen that cannot be read or
