@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from thread_calls import Shared
 
-from eigenshape.collections import alignment, surface_fit
+from eigenshape.collections import alignment, building, surface_fit
 from eigenshape.matching import match, target
 
 
@@ -16,7 +16,9 @@ def few_points():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(alignment, "N_TURNS", 4)
         patch.setattr(alignment, "FINE_REACH", np.geomspace(0.2, 0.05, 8))
-        patch.setattr(surface_fit, "N_POINTS", 1000)
+        for module, name in ((surface_fit, "LEVELS"), (building, "SECOND_LEVELS")):
+            few = tuple(level._replace(n_points=1000) for level in getattr(module, name))
+            patch.setattr(module, name, few)
         patch.setattr(match, "N_PART", 100)
         patch.setattr(target, "N_WHOLE", 160)
         yield

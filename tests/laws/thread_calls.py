@@ -193,7 +193,7 @@ class Shared:
         self.halves = es.features.Parcellation((self.animal.vertices[:, 1] > 0).astype(int))
         es.io.write_parcellation(self.animal, self.folder / "halves.annot", self.halves)
         es.io.write_fields(self.animal, self.folder / "heat.mgh", {"heat": self.heat[:, 0]})
-        self.labels = np.arange(1000).reshape(10, 10, 10) % 7
+        self.label_image = np.arange(1000).reshape(10, 10, 10) % 7
         self.attributes = es.read_mesh(self.folder / "ball.ply", attributes=True)[1]
 
 
@@ -342,8 +342,8 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "parcellate": lambda v: es.features.parcellate(v.animal, v.heat, v.halves),
     "read_parcellation": lambda v: es.io.read_parcellation(v.folder / "halves.annot", v.animal),
     "read_volume": lambda v: es.io.read_volume(v.folder / "heat.mgh"),
-    "structure_surfaces": lambda v: es.modes.structure_surfaces(v.labels, structures={"a": 3}),
-    "voxel_surface": lambda v: es.calculus.voxel_surface(v.labels == 2),
+    "structure_surfaces": lambda v: es.modes.structure_surfaces(v.label_image, structures={"a": 3}),
+    "voxel_surface": lambda v: es.calculus.voxel_surface(v.label_image == 2),
     "unmask": lambda v: es.geometry.unmask(v.heat, np.arange(v.animal.n_vertices), 900),
     "unparcellate": lambda v: es.features.unparcellate([1.0, 2.0], v.halves),
     "write_parcellation": lambda v: written(
