@@ -35,12 +35,16 @@ def describe(packages: list[str]) -> dict[str, object]:
 
 
 def command(output: str) -> str:
-    """Return the command that runs, without the option that says where it writes."""
+    """Return the command that runs, without options for places of this machine: output and absolute paths."""
     program, *words = sys.argv
-    if output in words:
-        place = words.index(output)
-        del words[place : place + 2]
-    return shlex.join(["python", Path(program).resolve().relative_to(ROOT).as_posix(), *words])
+    kept: list[str] = []
+    for word in words:
+        option = kept[-1] if kept else ""
+        if option == output or (option.startswith("--") and Path(word).is_absolute()):
+            kept.pop()
+        else:
+            kept.append(word)
+    return shlex.join(["python", Path(program).resolve().relative_to(ROOT).as_posix(), *kept])
 
 
 def commit() -> str:

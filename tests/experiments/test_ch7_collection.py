@@ -49,8 +49,9 @@ def test_other_things_are_refused():
 def test_the_noise_of_labels_leaves_more_than_carried_landmarks_do():
     labels = NOISE["0.153 mm, 0.0 mm"]
     carried = FULL["statistics"]["landmarks"]
-    for name in ("Procrustes distances", "component 1", "component 2", "component 3"):
-        assert labels[name] > carried[name] + 0.01
+    for name in ("Procrustes distances", "component 2", "component 3"):
+        assert labels[name] > carried[name] + 0.02
+    assert labels["component 1"] > carried["component 1"]  # which reaches its aim
     within = NOISE["0.196 mm, 4.0 mm"]
     assert within["component 3"] < carried["component 3"]
     assert within["low"] < carried["Procrustes distances"] < within["Procrustes distances"]

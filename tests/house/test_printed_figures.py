@@ -42,6 +42,7 @@ def test_each_experiment_says_how_it_was_run(path):
     # of files older than November 2026 the machine is not known
     assert source.keys() == {"command", "date", "commit", "machine"}
     assert source["command"].startswith(f"python experiments/{path.parent.name}/")
+    assert " /" not in source["command"], "a place of the machine that measured"
 
 
 @pytest.fixture
