@@ -91,7 +91,7 @@ def target(quick: bool) -> Work:
 
 def match(quick: bool) -> Work:
     """Return the match of what a scanner sees to a prepared whole in another pose."""
-    n = 200 if quick else 5_000
+    n = 600 if quick else 5_000
     whole = es.matching.prepare_target(es.make_creature("quadruped", 1, n_vertices=n))
     scan = es.partial_scan(es.make_creature("quadruped", 2, n_vertices=n), [0.9, 0.25, 0.45])
 
