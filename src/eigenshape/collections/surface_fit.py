@@ -1,5 +1,7 @@
 """One surface bent onto another by stiff, smooth displacements, from coarse to fine."""
 
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -31,6 +33,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, edge_table
 from eigenshape.matching.match import match_shapes
+from eigenshape.matching.target import prepare_target
 
 # Lengths are in units of the root mean square distance of the placed source from its middle. All
 # numbers were chosen on the tuning half of experiments/ch7_collection.
@@ -197,7 +200,7 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
     fit = replace(bend_placed(source, placing, target, LEVELS), side=placing.side)
     if fit.misfit > POSES_DIFFER or fit.strain > STRAINED:
         sides = (False, True) if mirrored is None else (mirrored,)
-        posed = [found for side in sides if (found := _fit_posed(source, target, side))]
+        posed = _posed_fits(source, target, sides)
         if len(posed) == 2:
             upright, reflected = (each.misfit for each in posed)
             is_clear = min(upright, reflected) < CLEAR_MISFIT * max(upright, reflected)
@@ -218,16 +221,21 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
     return fit
 
 
-def _fit_posed(source: TriangleMesh, target: TriangleMesh, mirrored: bool) -> SurfaceFit | None:
+def _posed_fits(
+    source: TriangleMesh, target: TriangleMesh, sides: Sequence[bool]
+) -> list[SurfaceFit]:
     """Bend a source, or its mirror image, onto a target in another pose, from where `match_shapes` puts it."""
-    if mirrored:
-        source = TriangleMesh(source.vertices @ MIRROR, source.faces[:, ::-1])
-    try:
-        image = match_shapes(source, target).pull(target.vertices)
-    except EigenshapeError:  # what it refuses, such as needles, is no fault here
-        return None
-    fit = bend_onto(source, image, target, LEVELS)
-    return replace(fit, method="intrinsic", side="mirrored" if mirrored else "same")
+    fits = []
+    with suppress(EigenshapeError):  # what it refuses, such as needles, is no fault here
+        whole = prepare_target(target)
+        for mirrored in sides:
+            if mirrored:
+                source = TriangleMesh(source.vertices @ MIRROR, source.faces[:, ::-1])
+            image = match_shapes(source, whole).pull(target.vertices)
+            fit = bend_onto(source, image, target, LEVELS)
+            side: Side = "mirrored" if mirrored else "same"
+            fits.append(replace(fit, method="intrinsic", side=side))
+    return fits
 
 
 def bend_placed(
