@@ -98,6 +98,24 @@ def test_walks_on_the_sphere_are_great_circles_and_undo_logarithms():
     assert np.linalg.norm(reached - ball.vertices[target]) < 0.01
 
 
+def test_at_a_corner_angles_are_shares_of_the_angle_around_it():
+    """Between two edges of an octahedron, whose corners have 240 degrees, a path meets the middle of the side."""
+    corners = np.vstack([np.eye(3), -np.eye(3)])
+    faces = [
+        [x, y, z] if x + y + z in (3, 7, 9, 11) else [y, x, z]
+        for x in (0, 3)
+        for y in (1, 4)
+        for z in (2, 5)
+    ]
+    octahedron = TriangleMesh(corners, faces)
+    height = np.sqrt(1.5)  # of a face
+    for angle in np.pi / 4 + np.pi / 2 * np.arange(4):
+        end = trace_geodesic(
+            octahedron, 2, [height * np.cos(angle), height * np.sin(angle)]
+        ).points[-1]
+        np.testing.assert_allclose(np.abs(end), [0.5, 0.5, 0], atol=1e-12)
+
+
 def test_bad_input_is_named(monkeypatch):
     ball = icosphere(1)
     with pytest.raises(InvalidParameterError, match="differ from the one before; vertex 3"):

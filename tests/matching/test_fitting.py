@@ -21,6 +21,15 @@ def surfaces():
     return describe_poses()
 
 
+def test_a_misfit_is_a_mean_over_the_area_that_is_compared(surfaces):
+    part, whole = surfaces
+    for plan in (plan_fit(part, whole), plan_rough_fit(part, whole)):
+        assert plan.shares.sum() == pytest.approx(1)
+        assert plan.pull.sum() == pytest.approx(1)
+        gaps = fit_part(plan, plan.frames).gaps
+        assert len(gaps) == len(plan.compared) == len(plan.shares)
+
+
 def test_a_part_that_is_bent_by_the_true_map_comes_to_lie_there(surfaces):
     part, whole = surfaces
     fit = fit_part(plan_fit(part, whole), part.points)

@@ -333,6 +333,14 @@ def _plain(function):
     return getattr(function, "__wrapped__", function)
 
 
+def test_a_literal_graph_laplacian_records_the_volume_that_its_kernel_sees():
+    points = 3 * es.shapes.fibonacci_sphere(600).vertices
+    literal = es.operators.gaussian_laplacian(points, 0.5, 2)
+    assert literal.kernel.volume == pytest.approx(4 * np.pi * 9, rel=0.03)
+    walk = es.operators.gaussian_laplacian(points, 0.5, 2, form="random-walk")
+    assert walk.kernel.volume == 1  # of weights 1/n, by which nothing is divided
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("size", [1e-30, 1.0, 1e30])
 def test_graph_laplacians_know_the_volume_that_their_eigenvalues_are_over(size):

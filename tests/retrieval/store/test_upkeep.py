@@ -174,6 +174,18 @@ def test_export_writes_what_numpy_and_json_read(index, tmp_path):
         index.export(tmp_path / "two", ["x"])
 
 
+def test_a_report_counts_the_bytes_of_numbers_and_pictures(tmp_path):
+    counts = []
+    for name, picture in (("without", None), ("with", b"picture")):
+        index = es.ShapeIndex.create(tmp_path / name)
+        fill(index, range(3), thumbnail=picture)
+        report = index.verify()
+        assert (report.n_shapes, report.damages) == (3, ())
+        counts.append(report.n_bytes)
+    assert counts[0] > 0
+    assert counts[1] - counts[0] == 3 * len(b"picture")
+
+
 def test_thumbnails_are_small_pictures_of_the_shape(index):
     index.add("hand", es.make_creature("hand", n_vertices=500), n_views=0)
     picture = index.thumbnail("hand")

@@ -157,6 +157,15 @@ def test_another_blas_kernel_reads_the_same_mesh(tmp_path, kernel):
         assert np.abs(np.load(tmp_path / "there.npy") - here).max() < 1e-3 * step
 
 
+def test_a_front_has_no_side_at_a_vertex_whose_sides_are_closed():
+    front = connectivity.Front()
+    assert (front.previous(1), front.next(1), front.take()) == (-1, -1, None)
+    front.add_face((0, 1, 2))
+    assert (front.previous(1), front.next(1), front.take()) == (0, 2, (2, 0))
+    front.close(0, 1)
+    assert (front.previous(1), front.next(1), front.next(0)) == (-1, 2, -1)
+
+
 def sealed(body):
     return body + sha256(body).digest()[:16]
 
