@@ -13,6 +13,7 @@ from store_trials import FILES, LONG, SHARED
 import eigenshape as es
 from eigenshape.retrieval import DescribedShape
 from eigenshape.retrieval.store import database as store
+from eigenshape.retrieval.store.state import read_state
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +109,15 @@ def test_a_damaged_recipe_is_named(index):
         assert index.query(descriptor(3), n_matches=1)[0].score == 0
     with pytest.raises(es.StoreError, match="An index must be whole to be changed; "):
         keep(index, "new", [descriptor(1)])
+
+
+def test_integers_of_a_descriptor_are_checked_where_it_is_used(index):
+    """A flipped bit may lie in the table alone, and not in the list of integers that is read first."""
+    spoil(index.folder, "UPDATE descriptor SET view = 7 WHERE id = 6")
+    state = read_state(index.folder)
+    assert [len(each.rows) > 0 for each in state.stored([5, 7])] == [True, True]
+    with pytest.raises(es.StoreError, match="its row differs from its checksum"):
+        state.stored([6])
 
 
 def described_again(seed):
