@@ -11,6 +11,8 @@ from running import run, run_json
 import eigenshape as es
 from eigenshape.cli import steps
 
+pytestmark = pytest.mark.long
+
 CHOSEN = [100, 200, 300, 400]
 NAMES = [f"point {i}" for i in CHOSEN]
 ODD = "hand <3>"

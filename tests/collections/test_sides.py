@@ -46,6 +46,7 @@ def test_flat_and_few_landmarks_tell_nothing():
     assert sides_of_landmarks({}, "one") == {}
 
 
+@pytest.mark.long
 def test_a_mirrored_specimen_with_two_equal_sides_is_found_by_its_landmarks(tmp_path):
     fish = es.make_creature("fish", n_vertices=500)
     other = mirror(es.TriangleMesh(fish.vertices * [1.1, 1, 0.95], fish.faces))

@@ -34,6 +34,7 @@ def test_more_points_in_the_last_level_bring_a_surface_nearer():
     assert error < 0.95 * error_of_few
 
 
+@pytest.mark.long
 def test_the_mirror_image_of_half_a_specimen_is_fitted_and_its_missing_half_is_not_sure():
     source, whole = make_specimen(0), make_specimen(1)
     target = mirror(half(whole))
@@ -47,6 +48,7 @@ def test_the_mirror_image_of_half_a_specimen_is_fitted_and_its_missing_half_is_n
     assert fit.confidence[whole.vertices[:, 2] < -0.3].max() < 0.25
 
 
+@pytest.mark.long
 def test_another_pose_in_a_mirror_is_reached_by_intrinsic_evidence():
     rest, posed = (es.make_creature("hand", pose, n_vertices=600) for pose in (0, 3))
     posed = mirror(posed)
@@ -55,6 +57,7 @@ def test_another_pose_in_a_mirror_is_reached_by_intrinsic_evidence():
     assert np.linalg.norm(fit.vertices - posed.vertices, axis=1).mean() < 0.03
 
 
+@pytest.mark.long
 def test_a_biped_that_is_placed_back_to_front_is_turned(monkeypatch):
     rest, posed = (es.make_creature("biped", pose, n_vertices=600) for pose in (0, 1))
     found = es.collections.align_surfaces(posed, rest)
@@ -69,6 +72,7 @@ def test_a_biped_that_is_placed_back_to_front_is_turned(monkeypatch):
     assert np.linalg.norm(fit.vertices - posed.vertices, axis=1).mean() < 0.03
 
 
+@pytest.mark.long
 def test_a_form_of_another_kind_is_refused():
     with pytest.raises(es.InvalidShapeError, match="must have about the form of the source"):
         es.collections.fit_surface(make_specimen(0), es.make_creature("octopus", n_vertices=500))

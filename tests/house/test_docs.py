@@ -64,6 +64,8 @@ def test_the_page_of_modes_runs():
     assert len(names["modes"])
 
 
+@pytest.mark.long
+@pytest.mark.sweep
 def test_the_page_from_a_cortex_to_a_figure_runs(tmp_path, monkeypatch):
     pytest.importorskip("neuromodes", reason="the cortices of neuromodes are missing")
     monkeypatch.chdir(tmp_path)
@@ -81,6 +83,8 @@ def test_the_page_from_a_cortex_to_a_figure_runs(tmp_path, monkeypatch):
     np.testing.assert_array_equal(read, names["modes"].astype(np.float32))
 
 
+@pytest.mark.long
+@pytest.mark.sweep
 def test_the_page_from_scans_to_figures_runs(tmp_path, monkeypatch):
     """Its blocks follow one another, with the command between them, in an empty folder."""
     monkeypatch.chdir(tmp_path)

@@ -199,6 +199,7 @@ def test_a_whole_of_two_pieces_is_matched_piece_by_piece(target):
     assert "piece 0 of the part was placed on piece 0 of the whole" in match.report
 
 
+@pytest.mark.long
 def test_a_part_fits_both_of_two_equal_pieces():
     fish = es.make_creature("fish", n_vertices=500)
     beside = es.TriangleMesh(fish.vertices + 3.0, fish.faces)

@@ -430,6 +430,7 @@ def names_for_collections(folder: Path) -> dict[str, Any]:
     }
 
 
+@pytest.mark.sweep
 def test_every_row_beside_alpaca_and_shapeworks_runs(tmp_path):
     names = names_for_collections(tmp_path)
     # The collection of the first page is that of the second.

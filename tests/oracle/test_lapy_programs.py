@@ -17,6 +17,7 @@ raise SystemExit(pytest.main(["tests", "-q", "-p", "no:cacheprovider"]))
 """
 
 
+@pytest.mark.sweep
 @pytest.mark.skipif(not PEER.is_dir(), reason=f"LaPy's own tests are absent: {PEER} is no folder")
 def test_lapys_own_tests_pass():
     """All 112, in 8 s: the slowest, of tetrahedra, take 0.8 s each."""
