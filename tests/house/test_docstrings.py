@@ -28,7 +28,12 @@ def examples(name):
 
 
 WITH_EXAMPLES = [name for name in THINGS if examples(name)]
-SLOW_ROOMS = ("eigenshape.collections", "eigenshape.matching", "eigenshape.plot", "eigenshape.retrieval")
+SLOW_ROOMS = (
+    "eigenshape.collections",
+    "eigenshape.matching",
+    "eigenshape.plot",
+    "eigenshape.retrieval",
+)
 
 
 def marked(name):
