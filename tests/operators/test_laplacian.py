@@ -75,3 +75,13 @@ def test_matrices_are_copied_and_read_only():
         for part in (matrix.data, matrix.indices, matrix.indptr):
             with pytest.raises(ValueError, match="read-only"):
                 part[0] = 0
+
+
+@pytest.mark.parametrize("size", [2.0**-80, 1.0, 2.0**80])
+def test_asymmetry_is_a_share_of_the_largest_entry(size):
+    rounding, fault = 1 + 2.0**-44, 1 + 2.0**-36
+    Laplacian(size * matrix([1, -1], [-rounding, 1]), EYE)
+    with pytest.raises(
+        InvalidParameterError, match=r"stiffness must be symmetric; entry \(0, 1\) is -"
+    ):
+        Laplacian(size * matrix([1, -1], [-fault, 1]), EYE)
