@@ -27,7 +27,9 @@ ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("operators", "spectral", "features", "matching", "retrieval", "calculus", "deformation")
 NOT_COPIED = (".git", "studio", ".mypy_cache", ".ruff_cache", ".pytest_cache", ".hypothesis")
 FIRST_FILES = 4  # that are asked first
-LONGEST = 1800  # seconds that the tests of one mutant may take; fewer would count slow tests as failures
+LONGEST = (
+    1800  # seconds that the tests of one mutant may take; fewer would count slow tests as failures
+)
 SWAPS: dict[type[ast.AST], str] = {
     ast.Lt: ">=",
     ast.LtE: ">",

@@ -8,8 +8,10 @@ import eigenshape as es
 from eigenshape.matching.assignment import (
     APART,
     DIFFERENT,
+    N_ALIKE,
     N_ASSIGNMENTS,
     N_FAR,
+    _best_of_kinds,
     assign_far_points,
 )
 from eigenshape.matching.pairs import descriptor_costs, patch_differences
@@ -60,3 +62,15 @@ def test_patches_break_ties(surfaces):
 def test_a_part_of_few_points_is_not_assigned(surfaces):
     grid = describe_surface(es.shapes.grid(1, 1), 1.2, 300)
     assert assign_far_points(grid, surfaces[1], np.ones((4, N_POINTS))) == []
+
+
+def test_of_each_kind_the_best_few_stay():
+    rng = np.random.default_rng(0)
+    worth, kinds = rng.random(60), rng.integers(0, 7, 60)
+    wanted = [
+        number
+        for kind in range(7)
+        for number in sorted(np.flatnonzero(kinds == kind), key=lambda each: -worth[each])[:N_ALIKE]
+    ]
+    found = _best_of_kinds(worth, kinds)
+    assert found.tolist() == sorted(wanted, key=lambda each: -worth[each])

@@ -98,3 +98,26 @@ def test_the_nearest_point_of_a_fan_is_that_of_many_samples():
     gaps = np.linalg.norm(points - placed, axis=1)
     assert (gaps <= best + 1e-9).all()
     assert (gaps >= best - 0.15).all()
+
+
+def test_the_nearest_point_may_lie_on_each_side_and_each_corner():
+    """Around a triangle in its plane, where the nearest point is known."""
+    corners = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
+    places = {
+        (1.0, -2.0): (1.0, 0.0),
+        (-2.0, 1.0): (0.0, 1.0),
+        (2.0 + 3.0, 1.5 + 4.0): (2.0, 1.5),
+        (-1.0, -2.0): (0.0, 0.0),
+        (6.0, -1.0): (4.0, 0.0),
+        (-1.0, 7.0): (0.0, 3.0),
+        (1.0, 1.0): (1.0, 1.0),
+    }
+    points = np.array([[*point, 0.7] for point in places])
+    for turn in range(3):
+        faces = np.roll([[0, 1, 2]], turn, axis=1)
+        found, weights = nearest_face_points(
+            points, corners, faces, np.array([0, 1]), np.array([0]), np.zeros(len(points), int)
+        )
+        assert (found == 0).all()
+        nearest = weights @ corners[faces[0]]
+        np.testing.assert_allclose(nearest[:, :2], list(places.values()), atol=1e-12)
