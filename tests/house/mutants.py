@@ -6,7 +6,8 @@
 A mutant is one place of a central room whose comparison, arithmetic, sign, boolean, order of arguments or named
 argument is changed. It is made in a copy of the tree. First the tests run once to record which files call which
 function. Then each mutant is given to the files that call its function, those that call it most first, until one fails.
-Loops that are compiled take the files of the modules that import them. A run without an end counts as a failure.
+Loops that are compiled take the files of the modules that import them, and of tests that do. A run without an end
+counts as a failure.
 """
 
 import argparse
@@ -14,6 +15,7 @@ import ast
 import json
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -196,7 +198,7 @@ def record_calls(tree: Path, chosen: list[str]) -> dict[str, Counter[str]]:
 
 
 def files_for(mutant: Mutant, calls: dict[str, Counter[str]]) -> list[str]:
-    """Return the test files that call the mutant's function, those of its own module and those that call most first."""
+    """Return the test files that import the mutant's module or call its function, those of its own name first."""
     module = "eigenshape." + mutant.module.removesuffix(".py").replace("/", ".")
     found = calls.get(f"{module}:{mutant.function}", Counter())
     if (
@@ -211,8 +213,17 @@ def files_for(mutant: Mutant, calls: dict[str, Counter[str]]) -> list[str]:
         for function, files in calls.items():
             if function.split(":")[0] in users | {module}:
                 found += files
+    # Tests that import the module are asked first: what they call of compiled loops nothing records.
+    importing = {
+        str(path.relative_to(ROOT))
+        for path in (ROOT / "tests").rglob("test_*.py")
+        if re.search(rf"\b{module}\b", path.read_text())
+    }
     own = f"test_{Path(mutant.module).stem.removesuffix('_loops')}.py"
-    return sorted(found, key=lambda file: (not file.endswith(own), -found[file], file))
+    return sorted(
+        {*found, *importing},
+        key=lambda file: (not file.endswith(own), file not in importing, -found[file], file),
+    )
 
 
 def main() -> None:
