@@ -204,6 +204,21 @@ def test_a_second_zero_is_found_though_the_graph_is_whole():
     assert broken(check_laplacian(flat)) == {"kernel"}
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_kernel_that_cannot_be_counted_is_no_kernel(monkeypatch, side):
+    """Where no factor is found on one side of zero, nothing is known to lie between both."""
+    count = laplacian_laws._count
+    monkeypatch.setattr(
+        laplacian_laws,
+        "_count",
+        lambda pencil, share: None if side * share > 0 else count(pencil, share),
+    )
+    report = check_laplacian(cotangent_laplacian(icosphere(1)))
+    kernel = next(law for law in report.laws if law.name == "kernel")
+    assert not kernel.holds
+    assert "of zero lie 0 of the eigenvalues" in kernel.explanation
+
+
 def test_a_link_between_components_is_found_at_its_place():
     laplacian = cotangent_laplacian(PAIR)
     report = check_laplacian(
