@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
+from eigenshape.retrieval.patches import verification
 from eigenshape.retrieval.patches.distance import packed_distances, patch_distances
 from eigenshape.retrieval.patches.matching import patch_agreement
 from eigenshape.retrieval.patches.packing import pack_codes
@@ -42,6 +43,13 @@ def known(mesh, book):
     return es.retrieval.patch_descriptor(
         es.retrieval.extract_patches(mesh, n_views=3), es.retrieval.PatchRecipe(book)
     )
+
+
+def test_agreement_lowers_a_distance(monkeypatch):
+    descriptor = es.describe(es.make_creature("fish", n_vertices=500))
+    monkeypatch.setattr(verification, "shape_agreement", lambda *_: 0.25)
+    found = verified_scores(descriptor, lambda _: descriptor, np.array([0.9, 0.3]), n_verified=1)
+    assert found == pytest.approx([0.9, 0.3 * np.exp(-0.25 * AGREEMENT_WEIGHT)])
 
 
 @pytest.mark.long
