@@ -92,6 +92,20 @@ def test_the_harmonic_field_of_an_annulus():
 SHAPES = {**SURFACES, "box": box(3, 3, 3), "ring": ring_of_tetrahedra()}
 
 
+@pytest.mark.parametrize("mesh", [grid(4, 3), box(2, 3, 2)], ids=["grid", "box"])
+def test_the_mass_of_a_constant_form_is_its_square_times_the_volume(mesh):
+    """The form a·dx is a·(end - start) on an edge, and Whitney forms hold it exactly."""
+    rng = np.random.default_rng(0)
+    edges = one_form_edges(mesh)
+    mass = one_forms._whitney_mass(mesh, edges)
+    points = mesh.points if hasattr(mesh, "points") else mesh.vertices
+    a, b = rng.standard_normal((2, points.shape[1]))
+    if mesh.dim == 2:
+        a[2] = b[2] = 0  # along the grid
+    one, two = ((points[edges[:, 1]] - points[edges[:, 0]]) @ each for each in (a, b))
+    assert one @ mass @ two == pytest.approx(a @ b)  # both have the volume 1
+
+
 @pytest.mark.parametrize("boundary", ["tangential", "normal"])
 @pytest.mark.parametrize("name", SHAPES)
 def test_parts_of_a_one_form_are_orthogonal_and_harmonic_ones_counted(name, boundary):
