@@ -5,6 +5,7 @@ import os
 import struct
 import subprocess
 import sys
+import tracemalloc
 from hashlib import sha256
 
 import numpy as np
@@ -164,6 +165,17 @@ def test_a_front_has_no_side_at_a_vertex_whose_sides_are_closed():
     assert (front.previous(1), front.next(1), front.take()) == (0, 2, (2, 0))
     front.close(0, 1)
     assert (front.previous(1), front.next(1), front.next(0)) == (-1, 2, -1)
+
+
+def test_a_stream_that_would_fill_the_memory_is_given_up_at_once():
+    bomb = compression.pack(bytes(20_000_000))
+    tracemalloc.start()
+    try:
+        with pytest.raises(es.FileFormatError, match="must unpack to at most 10 bytes"):
+            compression.unpack(bomb, 10, "symbols")
+        assert tracemalloc.get_traced_memory()[1] < 8_000_000  # 4 MiB are the dictionary
+    finally:
+        tracemalloc.stop()
 
 
 def sealed(body):
