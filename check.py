@@ -1,6 +1,6 @@
 """Run the checks: format, lint, types, layers, tests. CI runs this same file.
 
-python check.py            all of it but the long tests; two minutes on two cores
+python check.py            all of it but the long tests; two to five minutes on two cores
 python check.py --all      the long tests, the docs site and the studio in a browser, too
 python check.py --nightly  as --all, with every part of the broad sweeps; a commit runs a tenth of these
 python check.py --fast     without the tests
