@@ -3,6 +3,7 @@
 import json
 import struct
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -172,6 +173,21 @@ def test_export_writes_what_numpy_and_json_read(index, tmp_path):
         index.export(tmp_path / "one")
     with pytest.raises(es.StoreError, match="must be in the index to be exported; 'x' is not"):
         index.export(tmp_path / "two", ["x"])
+
+
+def test_all_that_is_known_of_a_shape_is_changed_and_nothing_else(index):
+    fill(index, range(3))
+    before = {record.name: record for record in index.records()}
+    new = replace(
+        before["s1"],
+        label="cat",
+        source="elsewhere.ply",
+        digest="d",
+        tags=("new",),
+        attributes={"height": 2.0},
+    )
+    index.update([new])
+    assert {record.name: record for record in index.records()} == before | {"s1": new}
 
 
 def test_a_report_counts_the_bytes_of_numbers_and_pictures(tmp_path):

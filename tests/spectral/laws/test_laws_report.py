@@ -219,6 +219,16 @@ def test_a_kernel_that_cannot_be_counted_is_no_kernel(monkeypatch, side):
     assert "of zero lie 0 of the eigenvalues" in kernel.explanation
 
 
+@pytest.mark.parametrize("size", [2.0**-40, 1.0, 2.0**40])
+def test_a_link_is_measured_beside_the_diagonal(size):
+    laplacian = cotangent_laplacian(PAIR)
+    W = laplacian.stiffness.toarray()
+    linked = extra_entry(laplacian, 3, 60, 1e-3)
+    scaled = replace(linked, stiffness=size * linked.stiffness)
+    share = law(check_laplacian(scaled, PAIR), "components").measured
+    assert share == pytest.approx(1e-3 / np.sqrt(W[3, 3] * W[60, 60]), rel=0.01)
+
+
 def test_a_link_between_components_is_found_at_its_place():
     laplacian = cotangent_laplacian(PAIR)
     report = check_laplacian(
