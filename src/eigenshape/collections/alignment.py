@@ -38,8 +38,8 @@ N_EARLY, N_LAST = 10, 3  # fine rounds of all places, and how many of these the 
 LEAF = 32  # points in a leaf of the tree: with six coordinates a sixth faster than 16
 ON_SURFACE = 0.1  # distance at which a point counts half in a gap
 # Gap below which the random turns are not tried. On the tuning half of experiments/ch7_collection and
-# for creatures, whole or half, random turns lower a gap of 0.2 by at most 0.015 and one of 0.34 by
-# nothing; where they find another place, the gap was 0.39 or more.
+# for creatures, whole or half, random turns lower a smaller gap by at most 0.015; where they find
+# another place, the gap was 0.39 or more.
 PLACED = 0.35
 # The gap of a surface, as a share of that of its mirror image, below which it is no mirror image, or
 # the other way round. On the tuning half of experiments/ch7_collection, skulls of others, whole or
