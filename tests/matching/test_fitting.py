@@ -136,9 +136,15 @@ def test_more_starts_fit_no_worse_and_are_sorted(grown):
     assert misfits[0] <= maps[0].fit.misfit
 
 
-def test_a_search_ends_early_if_no_first_map_fits_well(grown):
-    plan, differences, every = grown
-    few = grow_maps(plan, differences, wanted=0.0)
+def test_a_search_ends_early_if_no_rough_bend_fits_well(grown):
+    plan, differences, _ = grown
+    assert grow_maps(plan, differences, wanted=0.0) == []
+
+
+def test_a_search_ends_early_if_the_first_maps_are_the_known_one(surfaces):
+    plan, differences = plan_fit(*surfaces), patch_differences(*surfaces)
+    every = grow_maps(plan, differences, wanted=1.0)
+    few = grow_maps(plan, differences, wanted=1.0, known=every[0])
     assert 0 < len(few) <= N_FIRST_GROWN < len(every)
     misfits = [one.fit.misfit for one in few]
     assert misfits == sorted(misfits)

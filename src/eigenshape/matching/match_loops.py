@@ -73,14 +73,15 @@ def place_by_distances(rows, partners, theirs, near, starts, softness, cap, long
     Row i of `rows` holds distances from the point of pair i to the points that are placed, and row
     p of `theirs` those from the point of the whole that `partners` number to its vertices. Squared
     errors to the pairs `near` are capped, weigh 1 / (distance + softness)², and count `longer`
-    times where the distance on the part is the longer one. `starts` are first guesses: a good one
-    ends most sums early. Mean squared errors go to `misfits`.
+    times where the distance on the part is the longer one. `starts` are first guesses: with a good
+    one few vertices are left to try. Mean squared errors go to `misfits`.
     """
     n_points, count = near.shape
+    n_vertices = theirs.shape[1]
     found = np.empty(n_points, dtype=np.int64)
     lengths, weights = np.empty(count), np.empty(count)
     ends = np.empty(count, dtype=np.int64)
-    firsts = np.empty(theirs.shape[1])
+    tried = np.empty(n_vertices, dtype=np.int64)
     for v in range(n_points):
         k, total = 0, 0.0
         for place in range(count):
@@ -90,30 +91,32 @@ def place_by_distances(rows, partners, theirs, near, starts, softness, cap, long
                 weights[k] = 1 / (lengths[k] + softness) ** 2
                 total += weights[k]
                 k += 1
-        best, at = np.inf, starts[v]
-        # The errors to the first pair, all in a row, end most sums.
-        for w in range(len(firsts)):
-            error = theirs[ends[0], w] - lengths[0] if k > 0 else 0.0
-            if error < 0:
-                error *= longer
-            firsts[w] = weights[0] * min(error * error, cap) if k > 0 else 0.0
-        # The first guess comes first, then every vertex.
-        for number in range(-1, len(firsts)):
-            w = starts[v] if number < 0 else number
-            value = firsts[w]
-            if value >= best:
-                continue
-            for j in range(1, k):
-                error = theirs[ends[j], w] - lengths[j]
-                if error < 0:
-                    error *= longer
-                value += weights[j] * min(error * error, cap)
-                if value >= best:
-                    break
-            if value < best:
-                best, at = value, w
-        found[v] = at
-        misfits[v] = best / total if k > 0 else np.inf
+        found[v], misfits[v], best = starts[v], np.inf, np.inf
+        if k == 0:
+            continue
+        tried[0], n_tried = starts[v], 1
+        for is_guess in (True, False):
+            for number in range(n_tried):
+                w, value = tried[number], 0.0
+                for j in range(k):
+                    error = theirs[ends[j], w] - lengths[j]
+                    if error < 0:
+                        error *= longer
+                    value += weights[j] * min(error * error, cap)
+                    if value >= best:
+                        break
+                if value < best:
+                    best, found[v] = value, w
+            if is_guess:
+                # A vertex is no better if its error to the first pair alone is as large, give or
+                # take rounding.
+                reach = np.sqrt(best / weights[0]) if best < weights[0] * cap else np.inf
+                low, high = lengths[0] - 1.0001 * reach / longer, lengths[0] + 1.0001 * reach
+                firsts, n_tried = theirs[ends[0]], 0
+                for w in range(n_vertices):
+                    tried[n_tried] = w
+                    n_tried += (low <= firsts[w]) & (firsts[w] <= high)
+        misfits[v] = best / total
     return found
 
 
