@@ -147,7 +147,7 @@ SMALL_WORK = {
     "eigenshape.sparse.tasks.FEWEST_ENTRIES": 500,
     "eigenshape.sparse.basis.FEWEST_MULTIPLICATIONS": 1,
     "eigenshape.sparse.basis.COMBINED_ROWS": 64,
-    "eigenshape.sparse.symmetric_factor.SHARED_HEIGHT": 48,
+    "eigenshape.spectral.multilevel.aggregation.ROWS_A_THREAD": 64,
     "eigenshape.spectral.multilevel.vcycle.ROWS_A_THREAD": 64,
     "eigenshape.spectral.multilevel.residuals.CHUNK_ROWS": 64,
 }

@@ -19,7 +19,6 @@ from eigenshape.sparse.symmetric_factor import factorize_symmetric
 def small_work(monkeypatch):
     monkeypatch.setattr("eigenshape.sparse.tasks.FEWEST_ENTRIES", 1)
     monkeypatch.setattr("eigenshape.sparse.dissection.WORTH_A_THREAD", 60)
-    monkeypatch.setattr("eigenshape.sparse.symmetric_factor.SHARED_HEIGHT", 48)
     yield
     es.set_threads(None)
 

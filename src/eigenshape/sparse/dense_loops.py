@@ -38,17 +38,16 @@ def eliminate_plain(front, height, width, pivots, low):
 
 
 @njit
-def eliminate_blocked(front, height, width, pivots, low, times, begin, stop, alone, blas):
-    """Eliminate columns begin to stop - 1 by recursive halving, so that most work is in matrix products.
+def eliminate_blocked(front, height, width, pivots, low, times, blas):
+    """Eliminate the first columns by recursive halving, so that most work is in matrix products.
 
     The left half of a block of columns is eliminated, then updates the right half by a product.
     This loop does so in the order of the recursion: after every NARROW columns, the largest block
     of 2^k NARROW columns that is complete updates as many columns after it. At the end all columns
-    update the rest of the front. Where this thread is not alone, the caller updates after every
-    NARROW columns. L D is written to `times`, row by row. The other arguments, and what is
+    update the rest of the front. L D is written to `times`, row by row. The other arguments, and what is
     returned, are those of `eliminate_plain`.
     """
-    for start in range(begin, stop, NARROW):
+    for start in range(0, width, NARROW):
         end = min(start + NARROW, width)
         # The triangular block on the diagonal, column by column.
         for j in range(start, end):
@@ -74,28 +73,18 @@ def eliminate_blocked(front, height, width, pivots, low, times, begin, stop, alo
         for i in range(end, height):
             for j in range(start, end):
                 front[i * height + j] = times[i * width + j] / pivots[low + j]
-        if alone:
-            update_rows(front, height, width, times, end, end, height, blas)
+        first, last = 0, height
+        if end < width:
+            done = (end + NARROW - 1) // NARROW
+            span = (done & -done) * NARROW
+            first, last = max(end - span, 0), min(end + span, width)
+        for top in range(end, height, TALL):
+            bottom = min(top + TALL, height)
+            for term in range(first, end, LONG):
+                # On and below the diagonal.
+                size = (bottom - top, min(bottom, last) - end, min(term + LONG, end) - term)
+                left, right, taken = top * width + term, end * height + term, top * height + end
+                subtract_product(
+                    blas[0], size, times, left, width, front, right, height, front, taken, height
+                )
     return True
-
-
-@njit
-def update_rows(front, height, width, times, end, begin, stop, blas):
-    """Update rows begin to stop - 1 to the right of the columns before `end`, which are eliminated.
-
-    Rows are updated TALL at a time, from `end` on; `begin` is `end` plus a multiple of TALL.
-    """
-    first, last = 0, height
-    if end < width:
-        done = (end + NARROW - 1) // NARROW
-        span = (done & -done) * NARROW
-        first, last = max(end - span, 0), min(end + span, width)
-    for top in range(begin, stop, TALL):
-        bottom = min(top + TALL, stop)
-        for term in range(first, end, LONG):
-            # On and below the diagonal.
-            size = (bottom - top, min(bottom, last) - end, min(term + LONG, end) - term)
-            left, right, taken = top * width + term, end * height + term, top * height + end
-            subtract_product(
-                blas[0], size, times, left, width, front, right, height, front, taken, height
-            )

@@ -20,27 +20,22 @@ from eigenshape.sparse.lane_loops import (
 
 WIDE = 64  # columns in a panel of L: 32 of its rows are 16 KiB, half of the first-level cache
 SMALL = 40  # rows of a front up to which plain loops are faster (measured)
-WHOLE, GATHER, KEEP = 0, 1, 2  # stages of `factor_fronts`
 NEAR = 32  # rows of a panel that fit into the first-level cache
 SOON = 64  # cache lines of the next panel that are asked for ahead (measured)
 
 
 @njit
-def factor_fronts(
-    tree, lower, panels, pivots, updates, room, task_begin, begin, end, top, stage, blas
-):
-    """Fill panels and pivots with L and D of the fronts begin to end - 1 of one task.
+def factor_fronts(tree, lower, panels, pivots, updates, room, begin, end, top, blas):
+    """Fill panels and pivots with L and D of the fronts begin to end - 1, which are one task.
 
     This is the multifrontal method (Duff and Reid 1983) without pivoting: a front gathers the
     entries of its columns and the updates of its children, eliminates its columns, and passes the
-    rest to its parent as an update. `stage` is WHOLE, or GATHER or KEEP for what comes before or
-    after an elimination that several threads share; one loop for all compiles in half the time of
-    three.
+    rest to its parent as an update.
 
     `tree` is the elimination, `lower` the matrix by the columns of its lower triangle, `updates`
     memory for updates and the place of each, `room` memory for two fronts and a number for each
-    row. The updates of a task are a stack of lower triangles, row by row. Returns its new top, or
-    -1 where a pivot is zero or not finite.
+    row. The updates of a task are a stack of lower triangles, row by row, from `top` on. Returns
+    whether all pivots are finite and not zero.
     """
     first, begins, rows, last_child, older, panel_places = tree
     lower_ptr, lower_rows, values = lower
@@ -48,51 +43,46 @@ def factor_fronts(
     front, times, local = room
     for s in range(begin, end):
         height, width = begins[s + 1] - begins[s], first[s + 1] - first[s]
-        if stage != KEEP:
-            for i in range(height * height):
-                front[i] = 0.0
-            for i in range(height):
-                local[rows[begins[s] + i]] = i
-            for j in range(first[s], first[s + 1]):
-                for at in range(lower_ptr[j], lower_ptr[j + 1]):
-                    front[local[lower_rows[at]] * height + j - first[s]] += values[at]
-            child = last_child[s]
-            while child >= 0:
-                skip = begins[child] + first[child + 1] - first[child]
-                count = begins[child + 1] - skip
-                for i in range(count):
-                    target = local[rows[skip + i]] * height
-                    given = places[child] + i * (i + 1) // 2
-                    for j in range(i + 1):
-                        front[target + local[rows[skip + j]]] += stack[given + j]
-                if child >= task_begin:
-                    top -= count * (count + 1) // 2
-                child = older[child]
-        if stage == WHOLE:
-            if height <= SMALL:
-                sound = eliminate_plain(front, height, width, pivots, first[s])
-            else:
-                sound = eliminate_blocked(
-                    front, height, width, pivots, first[s], times, 0, width, True, blas
-                )
-            if not sound:
-                return -1
-        if stage != GATHER:
-            at = panel_places[s]
-            for block in range(0, width, WIDE):
-                stop = min(block + WIDE, width)
-                for i in range(block, height):
-                    for j in range(block, stop):
-                        panels[at] = front[i * height + j]
-                        at += 1
-            count = height - width
-            places[s] = top
+        for i in range(height * height):
+            front[i] = 0.0
+        for i in range(height):
+            local[rows[begins[s] + i]] = i
+        for j in range(first[s], first[s + 1]):
+            for at in range(lower_ptr[j], lower_ptr[j + 1]):
+                front[local[lower_rows[at]] * height + j - first[s]] += values[at]
+        child = last_child[s]
+        while child >= 0:
+            skip = begins[child] + first[child + 1] - first[child]
+            count = begins[child + 1] - skip
             for i in range(count):
-                given, to = (width + i) * height + width, top + i * (i + 1) // 2
+                target = local[rows[skip + i]] * height
+                given = places[child] + i * (i + 1) // 2
                 for j in range(i + 1):
-                    stack[to + j] = front[given + j]
-            top += count * (count + 1) // 2
-    return top
+                    front[target + local[rows[skip + j]]] += stack[given + j]
+            if child >= begin:
+                top -= count * (count + 1) // 2
+            child = older[child]
+        if height <= SMALL:
+            sound = eliminate_plain(front, height, width, pivots, first[s])
+        else:
+            sound = eliminate_blocked(front, height, width, pivots, first[s], times, blas)
+        if not sound:
+            return False
+        at = panel_places[s]
+        for block in range(0, width, WIDE):
+            stop = min(block + WIDE, width)
+            for i in range(block, height):
+                for j in range(block, stop):
+                    panels[at] = front[i * height + j]
+                    at += 1
+        count = height - width
+        places[s] = top
+        for i in range(count):
+            given, to = (width + i) * height + width, top + i * (i + 1) // 2
+            for j in range(i + 1):
+                stack[to + j] = front[given + j]
+        top += count * (count + 1) // 2
+    return True
 
 
 @njit

@@ -10,18 +10,13 @@ from eigenshape._threads import (
     free_threads,
     map_in_threads,
     one_blas_thread,
-    share_units,
 )
-from eigenshape.sparse import dense_loops as dense
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse.blas_loops import addresses
 from eigenshape.sparse.elimination import Elimination, analyze_pattern
 from eigenshape.sparse.lane_loops import LANES
 
 EPS = float(np.finfo(np.float64).eps)
-# Rows from which on several threads update one front: below, starting them costs more. Always more
-# than `SMALL`, below which fronts are eliminated in another order.
-SHARED_HEIGHT = 400
 
 Indices = Int[np.ndarray, " ..."]
 # Two fronts, and a number for each row.
@@ -179,56 +174,15 @@ def factorize_symmetric(
     def factor_task(task: int) -> bool:
         """Factor the fronts of a task; return whether all pivots are usable."""
         begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
-        # Tall fronts, if there are threads to share them.
-        shared: list[int] = []
-        if free_threads() > 1:
-            heights = np.diff(e.begins[begin : end + 1])
-            shared = (begin + np.flatnonzero(heights >= SHARED_HEIGHT)).tolist()
         with memory.rooms.lend() as room:
-            given = tree, lower, panels, pivots, updates, room, begin
-
-            def run(low: int, high: int, top: int, stage: int = fronts.WHOLE) -> int:
-                return int(fronts.factor_fronts(*given, low, high, top, stage, addresses()))
-
-            low, top = begin, int(e.stacks[task])
-            for tall in [*shared, end]:
-                top = run(low, tall, top)
-                if top < 0:
-                    return False
-                if tall < end:
-                    top = run(tall, tall + 1, top, fronts.GATHER)
-                    if not _eliminate_together(e, pivots, tall, room):
-                        return False
-                    top = run(tall, tall + 1, top, fronts.KEEP)
-                low = tall + 1
-        return True
+            given = tree, lower, panels, pivots, updates, room
+            return bool(fronts.factor_fronts(*given, begin, end, int(e.stacks[task]), addresses()))
 
     with memory.updates.lend() as updates:
         for tasks in e.tasks.rounds:
             if not all(map_in_threads(factor_task, tasks.tolist())):
                 return None
     return SymmetricFactor(e, panels, pivots)
-
-
-def _eliminate_together(
-    e: Elimination, pivots: Float[np.ndarray, " n"], s: int, room: Room
-) -> bool:
-    """Eliminate the columns of a front whose rows several threads update."""
-    blas = addresses()
-    front, times, _ = room
-    height, width = int(e.begins[s + 1] - e.begins[s]), int(e.first[s + 1] - e.first[s])
-    shape = front, height, width
-    for start in range(0, width, dense.NARROW):
-        end = min(start + dense.NARROW, width)
-        given = pivots, int(e.first[s]), times, start, end, False
-        if not dense.eliminate_blocked(*shape, *given, blas):
-            return False
-
-        def update(share: tuple[int, int], end: int = end) -> None:
-            dense.update_rows(*shape, times, end, end + share[0], end + share[1], blas)
-
-        map_in_threads(update, share_units(height - end, dense.TALL, free_threads()))
-    return True
 
 
 def factor_matrix(

@@ -5,7 +5,8 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from eigenshape._arrays import record
-from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, smooth_columns
+from eigenshape._threads import free_threads, map_in_threads, share_units
+from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, multiply_sparse
 from eigenshape.spectral.solver.chebyshev import largest_ritz_value
 
 LARGEST = 256  # most points in an aggregate, on average
@@ -23,6 +24,7 @@ ENERGY_ROUNDING = 1e-12  # share of the summed energies below which an energy co
 # Smoothing damps the eigenvalues above top / (SMOOTHED × points of an aggregate).
 SMOOTHED = 0.6
 LEAST_SPREADS = (6.0, 20.0)  # smallest spread of operators with long rows, and of a triangle mesh
+ROWS_A_THREAD = 4096  # rows of a product that are worth a thread
 
 
 @record
@@ -136,18 +138,39 @@ def _smooth(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.cs
     row = stiffness.nnz / stiffness.shape[0]
     degree = max(round(DEGREE * np.sqrt(size * MESH_ROW / row)), 1)
     low = top / max(size / PASSED, LEAST_RATIO)
-    matrix = stiffness.indptr, stiffness.indices, stiffness.data
+    # The rows of 1 - step diag(A)⁻¹ A: the entry of the 1 comes first, then those of A.
+    starts = stiffness.indptr + np.arange(len(stiffness.indptr), dtype=np.int32)
+    ones, is_one = starts[:-1], np.zeros(starts[-1], dtype=bool)
+    is_one[ones] = True
+    indices, entries = np.empty(len(is_one), dtype=np.int32), np.ones(len(is_one))
+    indices[ones], indices[~is_one] = np.arange(len(ones)), stiffness.indices
     inverse = 1 / _positive(stiffness.diagonal())
-    rows = columns.indptr, columns.indices, columns.data
+    lengths = np.diff(stiffness.indptr)
     for node in np.cos(np.pi * (2 * np.arange(degree) + 1) / (2 * degree)):
         step = 2 / (top + low + (top - low) * node)
-        rows = smooth_columns(matrix, step * inverse, rows, columns.shape[1])
-    return _by_rows(sp.csr_array((rows[2], rows[1], rows[0]), shape=columns.shape))
+        entries[~is_one] = -np.repeat(step * inverse, lengths) * stiffness.data
+        filtered = sp.csr_array((entries, indices, starts), shape=stiffness.shape)
+        columns = _multiply(filtered, columns)
+    return _by_rows(columns)
 
 
 def _project(up: sp.csr_array, matrix: sp.csr_array, down: sp.csr_array) -> sp.csr_array:
-    product = up @ (matrix @ down)
+    product = _multiply(up, _multiply(matrix, down))
     return _by_rows((product + product.T) * 0.5)
+
+
+def _multiply(left: sp.csr_array, right: sp.csr_array) -> sp.csr_array:
+    """Return the product of two matrices by rows, whose rows threads share; SciPy counts its entries first, alone."""
+    parts = [(each.indptr, each.indices, each.data) for each in (left, right)]
+    shape = left.shape[0], right.shape[1]
+
+    def fill(share: tuple[int, int]) -> tuple[np.ndarray, ...]:
+        return multiply_sparse(*parts, shape[1], *share)
+
+    found = map_in_threads(fill, share_units(shape[0], ROWS_A_THREAD, free_threads()))
+    lengths, columns, values = (np.concatenate(each) for each in zip(*found, strict=True))
+    starts = np.append(0, np.cumsum(lengths)).astype(np.int32)
+    return sp.csr_array((values, columns, starts), shape=shape)
 
 
 def _by_rows(matrix: sp.sparray, dtype: type = np.float64) -> sp.csr_array:

@@ -1,4 +1,4 @@
-"""Compiled loops of `aggregation` and `vcycle`: aggregates, smoothing, and sparse products."""
+"""Compiled loops of `aggregation` and `vcycle`: aggregates, sparse products, and smoothing."""
 
 import numpy as np
 
@@ -69,46 +69,38 @@ def _join_fragments(starts, columns, values, labels, counts, least):
 
 
 @njit
-def smooth_columns(matrix, factors, sparse, n_columns):
-    """Return P - diag(factors) A P for matrices by rows; rows of the result are not sorted."""
-    (starts, columns, values), (old_starts, old_columns, old_values) = matrix, sparse
-    n = len(starts) - 1
-    new_starts = np.zeros(n + 1, dtype=np.int32)
-    new_columns, new_values = (
-        np.empty(2 * len(old_values), dtype=np.int32),
-        np.empty(2 * len(old_values)),
-    )
+def multiply_sparse(left, right, n_columns, begin, end):
+    """Return rows begin to end - 1 of the product of two matrices by rows: their lengths, columns and values.
+
+    Columns of a row come in any order, and in a row of `left` several times if need be.
+    """
+    (starts, columns, values), (right_starts, right_columns, right_values) = left, right
+    lengths = np.empty(end - begin, dtype=np.int32)
+    room = 2 * len(right_values) * (end - begin) // (len(starts) - 1)
+    new_columns, new_values = np.empty(room, dtype=np.int32), np.empty(room)
     places, height = np.full(n_columns, -1, dtype=np.int64), 0
-    for i in range(n):
+    for i in range(begin, end):
         first = height
         if height + n_columns > len(new_values):
-            room = _row_bound(starts, columns, old_starts, i)
+            room = 0
+            for entry in range(starts[i], starts[i + 1]):
+                room += right_starts[columns[entry] + 1] - right_starts[columns[entry]]
             if height + room > len(new_values):
                 new_columns, new_values = (
                     _double_array(new_columns, room),
                     _double_array(new_values, room),
                 )
-        for entry in range(starts[i] - 1, starts[i + 1]):
-            itself = entry < starts[i]
-            j = i if itself else columns[entry]
-            share = 1.0 if itself else -factors[i] * values[entry]
-            for old in range(old_starts[j], old_starts[j + 1]):
-                c = old_columns[old]
+        for entry in range(starts[i], starts[i + 1]):
+            j, share = columns[entry], values[entry]
+            for place in range(right_starts[j], right_starts[j + 1]):
+                c = right_columns[place]
                 if places[c] < first:
                     places[c] = height
                     new_columns[height], new_values[height] = c, 0.0
                     height += 1
-                new_values[places[c]] += share * old_values[old]
-        new_starts[i + 1] = height
-    return new_starts, new_columns[:height].copy(), new_values[:height].copy()
-
-
-@njit
-def _row_bound(starts, columns, old_starts, i):
-    bound = old_starts[i + 1] - old_starts[i]
-    for entry in range(starts[i], starts[i + 1]):
-        bound += old_starts[columns[entry] + 1] - old_starts[columns[entry]]
-    return bound
+                new_values[places[c]] += share * right_values[place]
+        lengths[i - begin] = height - first
+    return lengths, new_columns[:height], new_values[:height]
 
 
 @njit

@@ -8,13 +8,11 @@ from jaxtyping import Float
 
 from eigenshape._arrays import record
 from eigenshape._threads import free_threads, map_in_threads, share_units
-from eigenshape.spectral.multilevel.aggregation import Level
+from eigenshape.spectral.multilevel.aggregation import ROWS_A_THREAD, Level
 from eigenshape.spectral.multilevel.multilevel_loops import multiply_rows, smoothing_step
 from eigenshape.spectral.solver.factor import Factor
 from eigenshape.spectral.solver.pencil import Pencil
 
-# Rows that are worth a thread.
-ROWS_A_THREAD = 4096
 INNER_STEPS = 8  # smoothing steps on the levels between the finest and the coarsest
 
 
