@@ -12,9 +12,10 @@ from eigenshape.retrieval.patches.matching import (
     N_LANDMARKS,
     distances_by_landmarks,
     nearest_lengths,
+    nearest_of_each_other,
     patch_points,
 )
-from eigenshape.retrieval.patches.matching_loops import leading, nearest_of_each_other
+from eigenshape.retrieval.patches.matching_loops import leading
 from eigenshape.retrieval.patches.packing import pack_points, unpack_points
 from eigenshape.retrieval.patches.patches import surface_patches
 
@@ -127,7 +128,9 @@ def test_larger_lengths_are_a_step(hand, monkeypatch):
 
 @pytest.mark.long
 def test_agreement_by_hand():
-    rows, columns = nearest_of_each_other(np.array([[1.0, 5, 2], [0.5, 3, 4], [9, 2, 8]]))
+    rows, columns = nearest_of_each_other(
+        np.array([[1.0, 5, 2], [0.5, 3, 4], [9, 2, 8]], dtype=np.float32)
+    )
     assert rows.tolist() == [1, 2]
     assert columns.tolist() == [0, 1]
     ours = np.array([[0.0, 1, 2], [1, 0, 2], [2, 2, 0]])
@@ -138,7 +141,7 @@ def test_agreement_by_hand():
 
 
 def test_equally_near_points_are_paired_in_order():
-    alike = np.array([[0.0, 7, 0, 9], [7, 7, 7, 1], [0, 7, 0, 9]])
+    alike = np.array([[0.0, 7, 0, 9], [7, 7, 7, 1], [0, 7, 0, 9]], dtype=np.float32)
     rows, columns = nearest_of_each_other(alike)
     assert rows.tolist() == [0, 1, 2]
     assert columns.tolist() == [0, 3, 2]

@@ -8,11 +8,7 @@ from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whiten_numbers
-from eigenshape.retrieval.patches.matching_loops import (
-    between_landmarks,
-    leading,
-    nearest_of_each_other,
-)
+from eigenshape.retrieval.patches.matching_loops import between_landmarks, leading
 from eigenshape.retrieval.patches.patches import RADII, Patches
 
 # Whitened numbers are rounded to sixteenths and clipped at 127 of them, so that one is a byte. With
@@ -158,6 +154,24 @@ def distances_by_landmarks(lengths: Float32[np.ndarray, "m a"]) -> Float32[np.nd
     distances[:, :n_landmarks] = lengths
     distances[:n_landmarks] = lengths.T
     return distances
+
+
+def nearest_of_each_other(
+    apart: Float32[np.ndarray, "m n"],
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """Return the rows and columns of entries that are least in both, each row and column once.
+
+    Where several are equally near, as on a sphere, they are paired in their order. So a shape is
+    matched with itself point by point, whatever its symmetry.
+    """
+    is_least = (apart == apart.min(axis=0)) & (apart == apart.min(axis=1)[:, None])
+    pairs: dict[int, int] = {}  # the row of each column
+    latest = -1
+    for place in np.flatnonzero(is_least).tolist():
+        row, column = divmod(place, apart.shape[1])
+        if row != latest and column not in pairs:
+            pairs[column] = latest = row
+    return np.array(list(pairs.values()), dtype=np.int64), np.array(list(pairs), dtype=np.int64)
 
 
 @one_blas_thread()

@@ -1,36 +1,10 @@
-"""Compiled loops of `matching`: mutual nearest neighbors, consistent sets of matches."""
+"""Compiled loops of `matching`: matches that agree, and distances by landmarks."""
 
 import numpy as np
 
 from eigenshape._compile import njit
 
 ROUNDS = 20  # of the power method
-
-
-@njit
-def nearest_of_each_other(apart):
-    """Return the rows and columns of entries that are least in both, each row and column once.
-
-    Where several are equally near, as on a sphere, they are paired in their order. So a shape is
-    matched with itself point by point, whatever its symmetry.
-    """
-    n_rows, n_columns = apart.shape
-    least = apart[0].copy()
-    for row in range(1, n_rows):
-        least = np.minimum(least, apart[row])
-    free = np.ones(n_columns, dtype=np.bool_)
-    rows, columns = np.empty(n_rows, dtype=np.int64), np.empty(n_rows, dtype=np.int64)
-    count = 0
-    for row in range(n_rows):
-        first = apart[row].argmin()
-        nearest = apart[row, first]
-        for column in range(first, n_columns):
-            if free[column] and apart[row, column] == nearest and nearest == least[column]:
-                rows[count], columns[count] = row, column
-                free[column] = False
-                count += 1
-                break
-    return rows[:count], columns[:count]
 
 
 @njit
