@@ -134,7 +134,8 @@ def match_shapes(
     Nothing is found where part and whole have nothing in common, but a map is returned all the
     same: look at `confidence`. If the shape can be turned into itself, there are several maps:
     look at `n_equally_good`. A piece of more than 16,000 vertices or with needles is matched by way
-    of a copy with fewer vertices, and the map is carried over. A part of 5,000 vertices takes about 4 s on one core.
+    of a copy with fewer vertices, and the map is carried over. A part of 5,000 vertices takes 2 to 4 s on one
+    core, by the machine.
 
     Examples
     --------
