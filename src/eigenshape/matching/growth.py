@@ -36,7 +36,8 @@ from eigenshape.matching.surface import Surface
 # few once more
 N_GROWN, N_FIRST_GROWN, N_GROWN_AGAIN = 9, 4, 4
 # Rough bends by the best assignments, which tell whether a search for equally good maps is worth it: where there
-# are such maps, one of the first two shows it (44 creatures and round shapes).
+# are such maps, one of the first two shows it (44 creatures and round shapes). Where all vertices are points, they
+# do not: of three crossed beams with 75 and 257 vertices they all stay far away, and with 945 not.
 N_TRIED = 10
 # Modes that make a map smooth before the part is bent again: 30 and 100 lower the misfit less.
 N_LOW_MODES = 60
@@ -135,8 +136,9 @@ def grow_maps(
     A fit from the true places leaves about half of the misfit of the best of nine sets of
     pairs, so that starts are what is missing. Far points are therefore assigned in many more ways,
     the part is bent roughly by each, and maps are grown from where the best of these bends place
-    it, then once more from the best maps. The search ends early if the misfits of the first rough bends
-    are all above the wanted one, or those of the first few maps that are other than the known one.
+    it, then once more from the best maps. The search ends early if the misfits of the first few of
+    these maps that are other than the known one are all above the wanted one, or, of a part with
+    more vertices than points, those of the first rough bends.
     """
     part, whole = plan.part, plan.whole
     costs = descriptor_costs(differences)
@@ -148,7 +150,8 @@ def grow_maps(
     # Step 3 of `match_shapes`: assignments of far points, and those whose rough bends fit best
     assigned = assign_far_points(part, whole, costs)
     fits = map_in_threads(fit_roughly, assigned[:N_TRIED])
-    if fits and min(fit.misfit for fit in fits) > wanted:
+    is_fine = part.mesh.n_vertices > len(part.points)
+    if is_fine and fits and min(fit.misfit for fit in fits) > wanted:
         return []
     fits += map_in_threads(fit_roughly, assigned[N_TRIED:])
     fits = sorted(fits, key=lambda fit: fit.misfit)[:N_GROWN]
@@ -209,12 +212,12 @@ def equally_good_maps(
 
 
 def _differ(plan: FitPlan, one: FittedMap, other: FittedMap) -> bool:
-    """Return whether two maps place most of the part elsewhere."""
+    """Return whether two maps place most of the part at different places."""
     return bool(plan.shares @ _placed_apart(plan, one, other) > MOST_OF_AREA)
 
 
 def _placed_apart(plan: FitPlan, one: FittedMap, other: FittedMap) -> Bool[np.ndarray, " n"]:
-    """Return which vertices two maps place at different places."""
+    """Return which vertices two maps place apart from each other."""
     vertices = plan.whole.mesh.vertices
     gaps = np.linalg.norm(vertices[one.fit.places] - vertices[other.fit.places], axis=1)
     return gaps > OTHER_PLACE

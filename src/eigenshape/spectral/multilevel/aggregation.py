@@ -160,7 +160,10 @@ def _project(up: sp.csr_array, matrix: sp.csr_array, down: sp.csr_array) -> sp.c
 
 
 def _multiply(left: sp.csr_array, right: sp.csr_array) -> sp.csr_array:
-    """Return the product of two matrices by rows, whose rows threads share; SciPy counts its entries first, alone."""
+    """Return the product of two matrices by rows; its rows are not sorted.
+
+    Threads share them. SciPy's product takes one thread, and a pass before it that counts entries.
+    """
     parts = [(each.indptr, each.indices, each.data) for each in (left, right)]
     shape = left.shape[0], right.shape[1]
 
