@@ -36,7 +36,7 @@ from eigenshape.matching.surface import Surface
 # few once more
 N_GROWN, N_FIRST_GROWN, N_GROWN_AGAIN = 9, 4, 4
 # Rough bends by the best assignments, which tell whether a search for equally good maps is worth it: where there
-# are such maps, one of the first two shows it (44 creatures and round shapes). Where all vertices are points, they
+# are such maps, one of the first two shows it (41 creatures and 15 round shapes). Where all vertices are points, they
 # do not: of three crossed beams with 75 and 257 vertices they all stay far away, and with 945 not.
 N_TRIED = 10
 # Modes that make a map smooth before the part is bent again: 30 and 100 lower the misfit less.
@@ -52,8 +52,8 @@ EQUALLY_GOOD, EQUALLY_GOOD_IN_EDGES = 4.5e-3, 0.12
 # A search for such maps ends early if the first rough bends, or the first other maps, all have more than so
 # many times that misfit. Later maps lower the least by 2 and 8 % for pairs of animals, and by 16 % for an
 # ellipsoid that is matched to one with other triangles. Of 40 real shapes with 2,500 vertices, matched to
-# copies with 1,500, and of eight beams, crosses and jacks, the whole search finds the same numbers; of 44
-# creatures in other poses and round shapes, it finds a second map of one hand.
+# copies with 1,500, and of eight beams, crosses and jacks, the whole search finds the same numbers; of 41
+# creatures, whole or scanned, and 15 round shapes, it finds a second map of one hand.
 NEARLY_AS_GOOD = 1.2
 # Two places differ if they are farther apart, in units: 0.05 √area, as in the confidence.
 OTHER_PLACE = 0.06
