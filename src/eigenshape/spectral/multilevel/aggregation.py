@@ -139,16 +139,13 @@ def _smooth(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.cs
     degree = max(round(DEGREE * np.sqrt(size * MESH_ROW / row)), 1)
     low = top / max(size / PASSED, LEAST_RATIO)
     # The rows of 1 - step diag(A)⁻¹ A: the entry of the 1 comes first, then those of A.
-    starts = stiffness.indptr + np.arange(len(stiffness.indptr), dtype=np.int32)
-    ones, is_one = starts[:-1], np.zeros(starts[-1], dtype=bool)
-    is_one[ones] = True
-    indices, entries = np.empty(len(is_one), dtype=np.int32), np.ones(len(is_one))
-    indices[ones], indices[~is_one] = np.arange(len(ones)), stiffness.indices
-    inverse = 1 / _positive(stiffness.diagonal())
-    lengths = np.diff(stiffness.indptr)
+    n, firsts = len(stiffness.indptr) - 1, stiffness.indptr[:-1]
+    starts = stiffness.indptr + np.arange(n + 1, dtype=np.int32)
+    indices = np.insert(stiffness.indices, firsts, np.arange(n))
+    inverse, lengths = 1 / _positive(stiffness.diagonal()), np.diff(stiffness.indptr)
     for node in np.cos(np.pi * (2 * np.arange(degree) + 1) / (2 * degree)):
         step = 2 / (top + low + (top - low) * node)
-        entries[~is_one] = -np.repeat(step * inverse, lengths) * stiffness.data
+        entries = np.insert(-np.repeat(step * inverse, lengths) * stiffness.data, firsts, 1.0)
         filtered = sp.csr_array((entries, indices, starts), shape=stiffness.shape)
         columns = _multiply(filtered, columns)
     return _by_rows(columns)
