@@ -141,6 +141,20 @@ def test_a_search_ends_early_if_no_rough_bend_fits_well(grown):
     assert grow_maps(plan, differences, wanted=0.0) == []
 
 
+def test_a_search_in_a_coarse_part_ends_early_if_no_first_map_fits_well(surfaces):
+    """All vertices are points: there rough bends say nothing."""
+    pose, whole = surfaces
+    scan = es.partial_scan(pose.mesh, [0.3, 0.2, 1])
+    part = describe_surface(scan.mesh, 1.0, scan.mesh.n_vertices)
+    plan, differences = plan_fit(part, whole), patch_differences(part, whole)
+    every = grow_maps(plan, differences)
+    few = grow_maps(plan, differences, wanted=0.0)
+    assert 0 < len(few) <= N_FIRST_GROWN < len(every)
+    misfits = [one.fit.misfit for one in few]
+    assert misfits == sorted(misfits)
+    assert set(misfits) <= {one.fit.misfit for one in every}
+
+
 def test_a_search_ends_early_if_the_first_maps_are_the_known_one(surfaces):
     plan, differences = plan_fit(*surfaces), patch_differences(*surfaces)
     every = grow_maps(plan, differences, wanted=1.0)
