@@ -139,13 +139,16 @@ def _smooth(stiffness: sp.csr_array, top: float, columns: sp.csr_array) -> sp.cs
     degree = max(round(DEGREE * np.sqrt(size * MESH_ROW / row)), 1)
     low = top / max(size / PASSED, LEAST_RATIO)
     # The rows of 1 - step diag(A)⁻¹ A: the entry of the 1 comes first, then those of A.
-    n, firsts = len(stiffness.indptr) - 1, stiffness.indptr[:-1]
+    n = stiffness.shape[0]
+    rows = np.repeat(np.arange(n), np.diff(stiffness.indptr))
+    places = np.arange(len(rows)) + rows + 1
     starts = stiffness.indptr + np.arange(n + 1, dtype=np.int32)
-    indices = np.insert(stiffness.indices, firsts, np.arange(n))
-    inverse, lengths = 1 / _positive(stiffness.diagonal()), np.diff(stiffness.indptr)
+    indices = np.insert(stiffness.indices, stiffness.indptr[:-1], np.arange(n))
+    entries = np.ones(len(indices))
+    inverse = 1 / _positive(stiffness.diagonal())
     for node in np.cos(np.pi * (2 * np.arange(degree) + 1) / (2 * degree)):
         step = 2 / (top + low + (top - low) * node)
-        entries = np.insert(-np.repeat(step * inverse, lengths) * stiffness.data, firsts, 1.0)
+        entries[places] = -(step * inverse)[rows] * stiffness.data
         filtered = sp.csr_array((entries, indices, starts), shape=stiffness.shape)
         columns = _multiply(filtered, columns)
     return _by_rows(columns)
