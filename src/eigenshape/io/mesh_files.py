@@ -171,15 +171,17 @@ def parse_file(
     Warns
     -----
     UserWarning
-        If hexahedra, wedges or pyramids were split.
+        If hexahedra, wedges or pyramids were split, or the format's `parse` returned notes.
     """
     known = format_of(source.suffix)
     folder = (source.path.parent,) if "beside" in known.traits else ()
-    points, found = known.load().parse(source.data, *folder)
+    points, found, *notes = known.load().parse(source.data, *folder)
     blocks = found if isinstance(found, dict) else {KINDS[found.shape[1]]: found}
     simplices = select_cells(points, blocks, cells)
     if simplices.shape[1] == 4 and (sentence := split_sentence(blocks)):
-        warnings.warn(f"{source.path}: {sentence}", stacklevel=4)
+        notes.append(sentence)
+    for note in notes:
+        warnings.warn(f"{source.path}: {note}", stacklevel=4)
     return points, simplices
 
 

@@ -43,7 +43,8 @@ class Format:
         The module of `eigenshape.io.formats` with the functions that the traits name.
     traits : tuple of str
         - "cells": `parse(data)` returns the points, and the cells: the triangles or segments as an
-          array, or a dictionary of arrays by kind.
+          array, or a dictionary of arrays by kind. Further values are notes: sentences that say what
+          the file holds and the shape does not, or what was made of it.
         - "points": `parse(data)` does so, and there are never cells.
         - "text": `format_text(mesh)` writes a mesh.
         - "binary": `format_binary(mesh)` does so.
