@@ -1,6 +1,7 @@
 """Annotations that `help` shows by their names, where it would show unions or protocols."""
 
-from typing import SupportsIndex
+from pathlib import Path
+from typing import Protocol, SupportsIndex, runtime_checkable
 
 import numpy.typing as npt
 from typing_extensions import TypeAliasType
@@ -8,3 +9,14 @@ from typing_extensions import TypeAliasType
 ArrayLike = TypeAliasType("ArrayLike", npt.ArrayLike)
 # int and the integers of NumPy.
 Integer = TypeAliasType("Integer", SupportsIndex)
+
+
+@runtime_checkable
+class BinaryFile(Protocol):
+    """A file that is open for reading bytes, as `open(path, "rb")` and `io.BytesIO` return."""
+
+    def read(self) -> bytes:
+        """Return the rest of the file."""
+
+
+FileLike = TypeAliasType("FileLike", str | Path | bytes | BinaryFile)

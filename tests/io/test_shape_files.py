@@ -14,9 +14,9 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.io.attributes import SourceFile
 from eigenshape.io.formats.pcd import decompress
 from eigenshape.io.mesh_files import parse_file, read_mesh
+from eigenshape.io.opening import SourceFile
 from eigenshape.io.shape_files import read_points, read_shape, write_points
 from eigenshape.shapes.domains import box, disc
 

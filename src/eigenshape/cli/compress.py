@@ -29,7 +29,7 @@ def compress(
         of the bounding box.
     """
     steps.require_output(output, (".esz",), "A compressed mesh")
-    surface = steps.load_mesh(mesh, repair)
+    surface = steps.load_surface(mesh, repair)
     with progress_bar("compress") as progress:
         packed = es.spectral.compress_mesh(surface, bits, progress=progress)
     replace_file(output, packed.data)

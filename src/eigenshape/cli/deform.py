@@ -94,10 +94,10 @@ def deform(
         raise InvalidParameterError(
             f"--edits-mesh is used together with --edits; it is {edits_mesh}, and --edits is missing."
         )
-    surface = steps.load_mesh(mesh, repair)
+    surface = steps.load_surface(mesh, repair)
     with progress_bar("modes") as progress:
         rig = es.rig_shape(surface, progress=progress)
-        source = steps.load_mesh(edits_mesh, repair) if edits_mesh else None
+        source = steps.load_surface(edits_mesh, repair) if edits_mesh else None
         try:
             done = es.io.read_edits(edits, source or surface) if edits else []
         except InvalidParameterError as error:

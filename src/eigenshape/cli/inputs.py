@@ -29,6 +29,8 @@ repair : NAMES
     needs repair is refused.
 cells
     Kind of cells to read, if the file holds several kinds or does not name the kind.
+scene : NAME
+    Scene to read of a glTF file that holds several. By default the one that the file names.
 dim
     Dimension of the shape that a point cloud samples: 1 curve, 2 surface, 3 volume.
 view : SIDE

@@ -140,7 +140,7 @@ def pose(
     """
     side = steps.picture_side(view, up, picture)
     steps.require_mesh_path(output)
-    target = steps.load_mesh(mesh, repair)
+    target = steps.load_surface(mesh, repair)
     source, posed = steps.load_poses(rest or like, like, repair)
     factor = sqrt(es.geometry.surface_area(source) / es.geometry.surface_area(target))
     with progress_bar("match") as progress:

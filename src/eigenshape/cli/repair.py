@@ -23,10 +23,11 @@ def info(
     repair: str = "none",
     dim: int = 2,
     cells: CellKind | None = None,
+    scene: str | None = None,
     as_json: bool = False,
 ) -> None:
     """Show the size, topology and faults of a shape, and which repairs would help."""
-    found = steps.load_shape(shape, repair, dim, cells)
+    found = steps.load_shape(shape, repair, dim, cells, scene)
     facts = steps.shape_facts(found)
     if as_json:
         print_json({"path": shape, **facts})
@@ -57,6 +58,7 @@ def repair(
     output: Path,
     repair: str = "auto",
     cells: CellKind | None = None,
+    scene: str | None = None,
     as_json: bool = False,
 ) -> None:
     """Repair a mesh and write it, and report what was done. All else that the file holds stays, or is named.
@@ -74,12 +76,12 @@ def repair(
         auto.
     """
     steps.require_mesh_path(output)
-    before, done = steps.load_repaired(mesh, repair, cells)
+    before, done = steps.load_repaired(mesh, repair, cells, scene)
     if not isinstance(done.mesh, es.TriangleMesh):
         steps.require_output(output, (".vtu",), "A mesh of tetrahedra or segments")
     print_repairs(done.report)
     if isinstance(done.mesh, es.TriangleMesh):
-        steps.save_like(mesh, done.mesh, output)
+        steps.save_like(mesh, done.mesh, output, scene=scene)
     else:
         es.io.write_fields(done.mesh, output, {})
         print_written(output)

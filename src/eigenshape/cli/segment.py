@@ -85,7 +85,7 @@ def segment(
         persistence = contrast_at(level)
     side = steps.picture_side(view, up, picture)
     steps.require_mesh_path(output, labels=True)
-    surface = steps.load_mesh(mesh, repair)
+    surface = steps.load_surface(mesh, repair)
     with progress_bar("parts") as progress:
         tree, usual, smooth_parts = steps.find_tree(surface, method, progress)
     rule = {"n_regions": n_parts, "persistence": persistence, "largest_gap": largest_gap}

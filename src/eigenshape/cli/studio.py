@@ -153,7 +153,7 @@ def report(
     steps.require_output(output, (".html",), "A report")
     side = steps.picture_side(view, up)
     writer = import_extra("eigenshape_studio.report", "eigenshape-studio")
-    surface = steps.load_mesh(mesh, repair)
+    surface = steps.load_surface(mesh, repair)
     with progress_bar("report") as progress:
         writer.write_report(
             surface, output, name=mesh.name, n_modes=n_modes, **side, progress=progress

@@ -1,7 +1,6 @@
 """Mesh files as they were read, and what they hold besides positions and faces."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -10,44 +9,10 @@ from jaxtyping import Bool, Float, Int, UInt8
 from scipy.sparse import csr_array, eye_array
 
 from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import FileFormatError, InvalidShapeError
-from eigenshape._files import as_path, read_regular
 from eigenshape._text import html_repr
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.registry import suffix_of
-
-
-@record
-class SourceFile:
-    """A file as it was read, of which a file of the same format is made again."""
-
-    path: Path
-    suffix: str
-    data: bytes = field(repr=False)
-
-
-def open_file(path: str | Path, file_format: str | None, known: tuple[str, ...]) -> SourceFile:
-    """Read the bytes of a file of one of the known suffixes."""
-    path = as_path(path)
-    suffix = suffix_of(path, file_format, known)
-    return SourceFile(path, suffix, read_regular(path))
-
-
-@contextmanager
-def naming(path: Path) -> Iterator[None]:
-    """Put the path before the message of an error. Overflow is found when the shape is checked."""
-    try:
-        with np.errstate(all="ignore"):
-            yield
-    except (FileFormatError, InvalidShapeError) as err:
-        name = "" if str(err).startswith(str(path)) else f"{path}: "
-        raise type(err)(f"{name}{err}") from err
-    except MemoryError as err:
-        raise FileFormatError(
-            f"{path} must fit into memory; there is too little to read it."
-        ) from err
-
+from eigenshape.io.opening import SourceFile
 
 SAME_NORMAL = 1000  # steps from 0 to 1; normals that agree to a step are one
 

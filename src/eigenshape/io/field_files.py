@@ -13,14 +13,15 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.io.attributes import MeshAttributes, SourceFile, naming, open_file, plain_attributes
+from eigenshape.io.attributes import MeshAttributes, plain_attributes
 from eigenshape.io.formats.neuro.shared import side_of_file
 from eigenshape.io.formats.registry import (
     FIELD_FORMATS,
     MAP_FORMATS,
     format_of,
-    suffix_of,
+    written_suffix,
 )
+from eigenshape.io.opening import SourceFile, naming, open_file
 
 WRITABLE = ("f8", "f4", "i8", "i4", "u1")  # numpy's types of fields that are written as they are
 Fields = dict[str, np.ndarray]
@@ -74,7 +75,7 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     (80,)
     """
     mesh, path = as_simplicial(mesh), as_path(path)
-    suffix = suffix_of(path, None, FIELD_FORMATS)
+    suffix = written_suffix(path, FIELD_FORMATS)
     replace_file(path, format_fields(mesh, suffix, fields, structure_named(mesh, path, suffix)))
 
 

@@ -16,6 +16,7 @@ from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._typing import Integer
 from eigenshape._workers import Item
 from eigenshape.io.formats.registry import (
+    GZ,
     HEMISPHERES,
     POINT_FORMATS,
     SHAPE_FORMATS,
@@ -116,26 +117,32 @@ def _items_of(source: Path) -> Iterator[Item]:
         # raises OSError for a folder that is misspelled, before anything is described
         source.stat()
         known = suffix_in(source.name) in SHAPE_FORMATS
-        yield Item(source.stem if known else source.name, source)
+        yield Item(_stem(source).name if known else source.name, source)
         return
     # The whole name of a surface of FreeSurfer, such as lh.pial, says what it is.
     stem_of = {
-        path: path.with_suffix("") if suffix_in(path.name) in SHAPE_FORMATS else path
+        path: _stem(path) if suffix_in(path.name) in SHAPE_FORMATS else path
         for path in sorted(_files_below(source))
         if suffix_in(path.name) in SHAPE_FORMATS
         or (path.name.startswith(HEMISPHERES) and signed_suffix(path) in SHAPE_FORMATS)
     }
-    meshes = {stem for path, stem in stem_of.items() if path.suffix.lower() not in POINT_FORMATS}
+    meshes = {stem for path, stem in stem_of.items() if suffix_in(path.name) not in POINT_FORMATS}
     paths = [
         path
         for path, stem in stem_of.items()
-        if path.suffix.lower() not in POINT_FORMATS or stem not in meshes
+        if suffix_in(path.name) not in POINT_FORMATS or stem not in meshes
     ]
     stems = Counter(stem_of[path] for path in paths)
     for path in paths:
         named = path if stems[stem_of[path]] > 1 else stem_of[path]
         below = named.relative_to(source)
         yield Item(below.as_posix(), path, below.parent.name or None)
+
+
+def _stem(path: Path) -> Path:
+    """Return the path of a file without the suffix of its format, and without that of a packed one."""
+    packed = path.name.lower().endswith(GZ)
+    return (path.with_suffix("") if packed else path).with_suffix("")
 
 
 def _files_below(folder: Path) -> Iterator[Path]:

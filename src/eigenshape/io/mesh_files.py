@@ -3,7 +3,7 @@
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -11,16 +11,16 @@ from jaxtyping import Float, Int, UInt8
 from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidShapeError
 from eigenshape._files import as_path, replace_file
+from eigenshape._typing import FileLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import PLURALS, count_nouns
+from eigenshape.geometry.simplices import size_one
 from eigenshape.io.attributes import (
     MeshAttributes,
-    SourceFile,
     WriteJob,
     label_attributes,
-    naming,
-    open_file,
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
@@ -32,36 +32,43 @@ from eigenshape.io.formats.registry import (
     WRITTEN,
     CellKind,
     format_of,
-    suffix_of,
     suffixes_with,
+    written_suffix,
 )
+from eigenshape.io.opening import SourceFile, naming, open_file
 
+# Largest share of the shortest side of a face by which rounding may move its corners without a word,
+# and of the area by which it may change the whole at all.
+ROUNDING, MOST_CHANGE = 0.01, 0.01
 KINDS = {2: SEGMENTS, 3: "triangles"}  # of cells, by their number of corners
 
 
 @overload
 def read_mesh(
-    path: str | Path,
+    path: FileLike,
     *,
     file_format: str | None = None,
     cells: CellKind | None = None,
+    scene: str | int | None = None,
     drop_missing: bool = False,
     attributes: Literal[False] = False,
 ) -> TriangleMesh: ...
 @overload
 def read_mesh(
-    path: str | Path,
+    path: FileLike,
     *,
     file_format: str | None = None,
     cells: CellKind | None = None,
+    scene: str | int | None = None,
     drop_missing: bool = False,
     attributes: Literal[True],
 ) -> tuple[TriangleMesh, MeshAttributes]: ...
 def read_mesh(
-    path: str | Path,
+    path: FileLike,
     *,
     file_format: str | None = None,
     cells: CellKind | None = None,
+    scene: str | int | None = None,
     drop_missing: bool = False,
     attributes: bool = False,
 ) -> TriangleMesh | tuple[TriangleMesh, MeshAttributes]:
@@ -74,14 +81,18 @@ def read_mesh(
 
     Parameters
     ----------
-    path : str or Path
-        A file of a format in `eigenshape.io.MESH_FORMATS`, such as .off, .obj, .ply, .stl or .glb.
-        A surface of FreeSurfer, such as lh.pial, is recognized by its first bytes.
+    path : str, Path, bytes or binary file
+        A file of a format in `eigenshape.io.MESH_FORMATS`, such as .off, .obj, .ply, .stl or .glb,
+        also packed by gzip; its content; or the file, open for reading bytes. A surface of
+        FreeSurfer, such as lh.pial, is recognized by its first bytes.
     file_format : str, optional
-        Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
+        Suffix of the format, such as "ply" or ".ply". By default the suffix of the path. Bytes that
+        do not begin with the name of their format need it.
     cells : {"triangles", "quads", "tetrahedra"}, optional
         Kind of cells to read, if the file holds several kinds or does not name the kind; see
         `read_shape`.
+    scene : str or int, optional
+        Name or number of the scene of a glTF file. By default the one that the file names.
     drop_missing : bool
         Whether to leave out vertices that are not finite, and the faces at them. By default they
         raise an error.
@@ -124,16 +135,20 @@ def read_mesh(
     >>> mesh.faces.tolist()
     [[0, 1, 2], [0, 2, 3]]
     """
-    source, mesh, left_out = _load(path, file_format, cells, drop_missing)
-    if not attributes:
-        return mesh
+    require_kind(cells)
+    source = open_file(path, file_format, MESH_FORMATS, scene)
     with naming(source.path):
+        points, simplices = parse_file(source, cells)
+        require_surface(points, simplices)
+        kept, faces, _, left_out = require_finite(points, simplices, drop_missing=drop_missing)
+        mesh = TriangleMesh(kept, faces)
+        if not attributes:
+            return mesh
         try:
             if not left_out:
                 return mesh, _read_attributes(source, mesh)
             # Attributes are listed by the faces of the file, so they are read with all of them.
-            points, faces = parse_file(source, cells)
-            whole = TriangleMesh(np.where(np.isfinite(points), points, 0.0), faces)
+            whole = TriangleMesh(np.where(np.isfinite(points), points, 0.0), simplices)
             return mesh, carry_attributes(_read_attributes(source, whole), mesh)
         except FileFormatError:
             raise
@@ -142,25 +157,6 @@ def read_mesh(
                 f"Materials and other attributes must be whole; these are not: {err!r}. "
                 "Without attributes=True the file can be read."
             ) from err
-
-
-def load_mesh(
-    path: str | Path, *, cells: CellKind | None = None, drop_missing: bool = False
-) -> tuple[TriangleMesh, tuple[str, ...]]:
-    """Read a mesh as `read_mesh` does, and report what was left out."""
-    return _load(path, None, cells, drop_missing)[1:]
-
-
-def _load(
-    path: str | Path, file_format: str | None, cells: CellKind | None, drop_missing: bool
-) -> tuple[SourceFile, TriangleMesh, tuple[str, ...]]:
-    require_kind(cells)
-    source = open_file(path, file_format, MESH_FORMATS)
-    with naming(source.path):
-        points, simplices = parse_file(source, cells)
-        require_surface(points, simplices)
-        points, simplices, _, report = require_finite(points, simplices, drop_missing=drop_missing)
-        return source, TriangleMesh(points, simplices), report
 
 
 def parse_file(
@@ -174,8 +170,14 @@ def parse_file(
         If hexahedra, wedges or pyramids were split, or the format's `parse` returned notes.
     """
     known = format_of(source.suffix)
-    folder = (source.path.parent,) if "beside" in known.traits else ()
-    points, found, *notes = known.load().parse(source.data, *folder)
+    options: dict[str, Any] = {"folder": source.folder} if "beside" in known.traits else {}
+    if "scenes" in known.traits:
+        options["scene"] = source.scene
+    elif source.scene is not None:
+        raise InvalidParameterError(
+            f"scene is for {', '.join(suffixes_with('scenes'))}; the suffix is {source.suffix}."
+        )
+    points, found, *notes = known.load().parse(source.data, **options)
     blocks = found if isinstance(found, dict) else {KINDS[found.shape[1]]: found}
     simplices = select_cells(points, blocks, cells)
     if simplices.shape[1] == 4 and (sentence := split_sentence(blocks)):
@@ -349,7 +351,7 @@ def save_mesh(
     attributes: MeshAttributes | None = None,
 ) -> str:
     """Write a mesh as `write_mesh` does, and return a sentence that names what is lost, or none."""
-    suffix = suffix_of(path, None, WRITTEN)
+    suffix = written_suffix(path, WRITTEN)
     known = format_of(suffix)
     held = attributes or plain_attributes(mesh)
     if not np.array_equal(held.mesh.faces, mesh.faces):
@@ -391,9 +393,36 @@ def save_mesh(
             files = {path: (module.format_binary if is_binary else module.format_text)(mesh)}
     except FileFormatError as err:
         raise FileFormatError(f"{path} cannot hold the mesh. {err}") from err
+    lost += rounding_loss(mesh) if is_binary and "single" in known.traits else []
     for place, data in files.items():
         replace_file(place, data)
     return f"{path.name} does not keep: {', '.join(dict.fromkeys(lost))}." if lost else ""
+
+
+def rounding_loss(mesh: TriangleMesh) -> list[str]:
+    """Name what single precision takes from a shape; nothing while sides are much longer than it.
+
+    Raise FileFormatError if the area changes by more than `MOST_CHANGE`.
+    """
+    rounded = mesh.vertices.astype(np.float32).astype(np.float64)
+    corners, scale = size_one((mesh.vertices - mesh.vertices[0])[mesh.faces])
+    single = (rounded - mesh.vertices[0])[mesh.faces] / scale
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    moved = np.linalg.norm(single - corners, axis=2)
+    before, after = triangle_areas(corners), triangle_areas(single)
+    damaged = (moved.max(axis=1) > ROUNDING * sides.min(axis=1)) & (before > 0)
+    if not damaged.any():
+        return []
+    n_flat = int(((after == 0) & (before > 0)).sum())
+    change = abs(after.sum() - before.sum()) / before.sum()
+    faces = f"{count_nouns(int(damaged.sum()), 'face')}, of which {n_flat} lose their area"
+    remedy = "Write .ply or .glb, or subtract mesh.vertices.mean(axis=0) from the vertices before."
+    if change > MOST_CHANGE:
+        raise FileFormatError(
+            f"Single precision must keep the area to {MOST_CHANGE:.0%}; rounding changes it by "
+            f"{change:.2g}, and {faces}. {remedy}"
+        )
+    return [f"the shape of {faces}: coordinates are rounded to single precision. {remedy}"]
 
 
 def _replaced_by_parts(held: MeshAttributes, has_part_materials: bool) -> list[str]:

@@ -6,10 +6,10 @@ from eigenshape._errors import FileFormatError
 from eigenshape._files import as_path, replace_file
 from eigenshape.features.parcellation import Parcellation, require_parcels
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.io.attributes import naming, open_file
 from eigenshape.io.field_files import structure_named
 from eigenshape.io.formats.neuro.shared import side_of_file
-from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, suffix_of
+from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, written_suffix
+from eigenshape.io.opening import naming, open_file
 
 
 def read_parcellation(path: str | Path, mesh: MeshLike) -> Parcellation:
@@ -114,7 +114,7 @@ def write_parcellation(mesh: MeshLike, path: str | Path, parcellation: Parcellat
     """
     mesh, path = as_mesh(mesh), as_path(path)
     require_parcels(parcellation, mesh.n_vertices)
-    suffix = suffix_of(path, None, PARCEL_FORMATS)
+    suffix = written_suffix(path, PARCEL_FORMATS)
     structure = structure_named(mesh, path, ".gii")
     named = {"structure": structure} if suffix.endswith(".gii") else {}
     module = format_of(suffix).load()

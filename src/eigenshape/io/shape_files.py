@@ -1,27 +1,31 @@
 """Read and write shapes of any kind. The content of a file is checked before a shape is returned."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape._files import as_path, replace_file
-from eigenshape._typing import Integer
+from eigenshape._typing import FileLike, Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.io.attributes import naming, open_file
+from eigenshape.geometry.repairs.repair import repair
+from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
+from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.io.formats.cells import require_kind
 from eigenshape.io.formats.registry import SHAPE_FORMATS, WRITTEN_CLOUDS, CellKind, format_of
 from eigenshape.io.mesh_files import parse_file, require_finite
+from eigenshape.io.opening import naming, open_file
 
 
 def read_shape(
-    path: str | Path,
+    path: FileLike,
     *,
     file_format: str | None = None,
     dim: Integer = 2,
     drop_missing: bool = False,
     cells: CellKind | None = None,
+    scene: str | int | None = None,
 ) -> Shape:
     r"""Read a shape of any kind from a file.
 
@@ -38,10 +42,12 @@ def read_shape(
 
     Parameters
     ----------
-    path : str or Path
-        A file of a format in `eigenshape.io.SHAPE_FORMATS`, such as .ply, .msh, .vtu or .xyz.
+    path : str, Path, bytes or binary file
+        A file of a format in `eigenshape.io.SHAPE_FORMATS`, such as .ply, .msh, .vtu or .xyz, also
+        packed by gzip; its content; or the file, open for reading bytes.
     file_format : str, optional
-        Suffix of the format, such as "ply" or ".ply". By default the suffix of the path.
+        Suffix of the format, such as "ply" or ".ply". By default the suffix of the path. Bytes that
+        do not begin with the name of their format need it.
     dim : int
         Dimension of the manifold that a point cloud samples.
     drop_missing : bool
@@ -51,6 +57,8 @@ def read_shape(
         Kind of cells to read, such as the boundary triangles of a tetrahedral mesh. Quads become
         two triangles each, and triangles between them are read too. By default the cells of the
         highest dimension.
+    scene : str or int, optional
+        Name or number of the scene of a glTF file. By default the one that the file names.
 
     Returns
     -------
@@ -84,35 +92,47 @@ def read_shape(
     >>> curve.dim, curve.simplices.tolist()
     (1, [[0, 1], [1, 2]])
     """
-    return load_shape(
-        path, file_format=file_format, dim=dim, drop_missing=drop_missing, cells=cells
-    )[0]
+    found = load_shape(
+        path,
+        ("drop_missing",) if drop_missing else (),
+        file_format=file_format,
+        dim=dim,
+        cells=cells,
+        scene=scene,
+    )
+    return found.cloud if isinstance(found, RepairedCloud) else found.mesh
 
 
 def load_shape(
-    path: str | Path,
+    path: FileLike,
+    repairs: Sequence[str] = (),
     *,
     file_format: str | None = None,
     dim: Integer = 2,
-    drop_missing: bool = False,
     cells: CellKind | None = None,
-) -> tuple[Shape, tuple[str, ...]]:
-    """Read a shape as `read_shape` does, and report what was left out."""
+    scene: str | int | None = None,
+) -> RepairedMesh[Mesh] | RepairedCloud:
+    """Read a shape as `read_shape` does, repair it, and report what was left out and done."""
     require_kind(cells)
-    source = open_file(path, file_format, SHAPE_FORMATS)
+    source = open_file(path, file_format, SHAPE_FORMATS, scene)
+    drop_missing = "drop_missing" in repairs or "auto" in repairs
     with naming(source.path):
         points, simplices = parse_file(source, cells)
         n_cells, n_corners = simplices.shape
-        points, simplices, _, report = require_finite(points, simplices, drop_missing=drop_missing)
+        points, simplices, kept, left_out = require_finite(
+            points, simplices, drop_missing=drop_missing
+        )
         if not n_cells:
-            return PointCloud(points, dim), report
-        if n_corners == points.shape[1] == 3:
-            return TriangleMesh(points, simplices), report
-        return SimplicialMesh(points, simplices), report
+            cloud = repair(PointCloud(points, dim), repairs)
+            return RepairedCloud(cloud.cloud, left_out + cloud.report, kept[cloud.source_points])
+        in_space = n_corners == points.shape[1] == 3
+        mesh = (TriangleMesh if in_space else SimplicialMesh)(points, simplices)
+        done = repair(mesh, repairs)
+        return RepairedMesh(done.mesh, left_out + done.report, kept[done.source_vertices])
 
 
 def read_points(
-    path: str | Path,
+    path: FileLike,
     *,
     file_format: str | None = None,
     dim: Integer = 2,
@@ -122,7 +142,7 @@ def read_points(
 
     Parameters
     ----------
-    path : str or Path
+    path : str, Path, bytes or binary file
         A file of any format of `read_shape`.
     file_format : str, optional
         Suffix of the format. By default the suffix of the path.

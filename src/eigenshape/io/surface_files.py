@@ -1,26 +1,34 @@
 """Read a surface from a file of any kind: a mesh as it is, one made of points, or the boundary of tetrahedra."""
 
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 
+from eigenshape._typing import FileLike
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.repair import repair, suggest_repairs
+from eigenshape.geometry.repairs.repair import repair as apply_repairs
+from eigenshape.geometry.repairs.repair import suggest_repairs
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices
-from eigenshape.io.attributes import naming, open_file
 from eigenshape.io.formats import pcd
 from eigenshape.io.formats.registry import SHAPE_FORMATS
 from eigenshape.io.mesh_files import parse_file, require_finite, require_surface
+from eigenshape.io.opening import SourceFile, naming, open_file
 from eigenshape.scans.frames import triangulate_frame
 from eigenshape.scans.reconstruction import reconstruct_surface
 
 
-def read_surface(path: str | Path, *, file_format: str | None = None) -> RepairedMesh[TriangleMesh]:
-    r"""Read a mesh, or make a surface of tetrahedra, a point cloud or a frame of a depth camera.
+def read_surface(
+    path: FileLike,
+    *,
+    repair: Sequence[str] = (),
+    file_format: str | None = None,
+    scene: str | int | None = None,
+) -> RepairedMesh[TriangleMesh]:
+    r"""Read a mesh, or make a surface of tetrahedra, points or a frame of a depth camera; repair it.
 
     A frame is a PCD file with more than one row: pixels that are neighbors on its grid and in space
     are joined, as a camera at the origin sees them, and the surface faces the camera. Points
@@ -32,21 +40,26 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
 
     Parameters
     ----------
-    path : str or Path
+    path : str, Path, bytes or binary file
         A file of any format of `read_shape`.
+    repair : sequence of str
+        Names of repairs, as `es.repair` takes them, such as ["auto"].
     file_format : str, optional
         Suffix of the format. By default the suffix of the path.
+    scene : str or int, optional
+        Name or number of the scene of a glTF file. By default the one that the file names.
 
     Returns
     -------
     RepairedMesh
-        The surface, with a report that says what it was made of and is empty for a mesh. The
-        source of a vertex is its point in the file, or the nearest one.
+        The surface, with a report that says what it was made of and what was repaired. It is empty
+        for a mesh without repairs. The source of a vertex is its point in the file, or the nearest
+        one.
 
     Raises
     ------
-    FileFormatError, InvalidShapeError, OSError
-        As in `read_mesh`, or if no surface can be made of the points: there are fewer than 100, or
+    FileFormatError, InvalidShapeError, InvalidParameterError, OSError
+        As in `read_mesh` and `repair`, or if no surface can be made of the points: there are fewer than 100, or
         it would miss more than a tenth of them.
 
     See Also
@@ -66,32 +79,40 @@ def read_surface(path: str | Path, *, file_format: str | None = None) -> Repaire
     >>> ball.report
     ('reconstruct_surface made 2,000 vertices and 3,996 faces of 642 points',)
     """
-    source = open_file(path, file_format, SHAPE_FORMATS)
+    source = open_file(path, file_format, SHAPE_FORMATS, scene)
     with naming(source.path):
-        points, simplices = parse_file(source, None)
-        if len(simplices):
-            points, simplices, kept, report = require_finite(points, simplices, drop_missing=True)
-            if simplices.shape[1] == 4:
-                solid = SimplicialMesh(points, simplices)
-                surface = boundary_surface(solid)
-                taken = (
-                    f"boundary_surface took the {surface.n_faces:,} triangles around "
-                    f"{solid.n_simplices:,} tetrahedra"
-                )
-                return RepairedMesh(surface, (*report, taken), kept[boundary_vertices(solid)])
-            if simplices.shape[1] == 3 and points.shape[1] == 2:
-                points = np.column_stack([points, np.zeros(len(points))])
-                report = (*report, "a mesh in the plane was taken at z = 0")
-            require_surface(points, simplices)
-            return RepairedMesh(TriangleMesh(points, simplices), report, kept)
-        n_rows = pcd.n_rows(source.data) if source.suffix == ".pcd" else 1
-        if n_rows > 1:
-            return triangulate_frame(points.reshape(n_rows, -1, 3))
-        points, _, finite, lost = require_finite(
-            points, np.empty((0, 3), dtype=np.int64), drop_missing=True
-        )
-        cloud = PointCloud(points)
-        different = repair(cloud, suggest_repairs(cloud))
-        made = reconstruct_surface(different.cloud)
-        sources = finite[different.source_points[made.source_vertices]]
-        return RepairedMesh(made.mesh, (*lost, *different.report, *made.report), sources)
+        made = _surface_of(source)
+        done = apply_repairs(made.mesh, repair)
+    return RepairedMesh(
+        done.mesh, made.report + done.report, made.source_vertices[done.source_vertices]
+    )
+
+
+def _surface_of(source: SourceFile) -> RepairedMesh[TriangleMesh]:
+    points, simplices = parse_file(source, None)
+    if len(simplices):
+        points, simplices, kept, report = require_finite(points, simplices, drop_missing=True)
+        if simplices.shape[1] == 4:
+            solid = SimplicialMesh(points, simplices)
+            surface = boundary_surface(solid)
+            taken = (
+                f"boundary_surface took the {surface.n_faces:,} triangles around "
+                f"{solid.n_simplices:,} tetrahedra"
+            )
+            return RepairedMesh(surface, (*report, taken), kept[boundary_vertices(solid)])
+        if simplices.shape[1] == 3 and points.shape[1] == 2:
+            points = np.column_stack([points, np.zeros(len(points))])
+            report = (*report, "a mesh in the plane was taken at z = 0")
+        require_surface(points, simplices)
+        return RepairedMesh(TriangleMesh(points, simplices), report, kept)
+    n_rows = pcd.n_rows(source.data) if source.suffix == ".pcd" else 1
+    if n_rows > 1:
+        return triangulate_frame(points.reshape(n_rows, -1, 3))
+    points, _, finite, lost = require_finite(
+        points, np.empty((0, 3), dtype=np.int64), drop_missing=True
+    )
+    cloud = PointCloud(points)
+    different = apply_repairs(cloud, suggest_repairs(cloud))
+    made = reconstruct_surface(different.cloud)
+    sources = finite[different.source_points[made.source_vertices]]
+    return RepairedMesh(made.mesh, (*lost, *different.report, *made.report), sources)

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float, Shaped
 
 from eigenshape._arrays import freeze
-from eigenshape.io.attributes import naming, open_file
 from eigenshape.io.formats.registry import VOLUME_FORMATS, format_of
+from eigenshape.io.opening import naming, open_file
 
 
 def read_volume(

@@ -12,11 +12,9 @@ import numpy as np
 from eigenshape._extras import import_extra
 from eigenshape._files import replace_file
 from eigenshape._workers import run_in_workers
-from eigenshape.cli.inputs import drops_missing
 from eigenshape.cli.steps.writing import require_output
 from eigenshape.features.condensed import condense
-from eigenshape.geometry.repairs.repair import repair
-from eigenshape.io import mesh_files
+from eigenshape.io.surface_files import read_surface
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.signatures.approximate_heat import LARGE, approximate_heat_signature
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
@@ -44,9 +42,8 @@ def condense_file(
     times: Sequence[float], n_modes: int, tolerance: float, repairs: Sequence[str], path: Path
 ) -> RegionTable:
     """Average the heat of a file over regions."""
-    mesh, notes = mesh_files.load_mesh(path, drop_missing=drops_missing(repairs))
-    done = repair(mesh, repairs)
-    mesh, notes = done.mesh, (*notes, *done.report)
+    done = read_surface(path, repair=repairs)
+    mesh, notes = done.mesh, done.report
     laplacian = cotangent_laplacian(mesh)
     k = min(n_modes, mesh.n_vertices)
     if mesh.n_vertices > LARGE:

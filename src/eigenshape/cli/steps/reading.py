@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from scipy.spatial import cKDTree
 
@@ -10,74 +11,61 @@ from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_repairs
 from eigenshape.cli.inputs import drops_missing, repair_names
 from eigenshape.deformation.distortion import require_poses
-from eigenshape.geometry.cloud import PointCloud, Shape
+from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.io import mesh_files, shape_files
+from eigenshape.io import shape_files
 from eigenshape.io.formats.registry import CellKind
 from eigenshape.io.labeled_shapes import (
     find_labeled_shapes,
     read_labeled_shape,
     read_map,
 )
+from eigenshape.io.mesh_files import read_mesh
 from eigenshape.io.surface_files import read_surface
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 
 __all__ = ["read_map"]  # for the verbs, as it is, beside what is defined here
 
 
-def load_mesh(path: Path, repairs: str) -> TriangleMesh:
-    """Read a mesh, apply the requested repairs, and print on stderr what they did."""
-    names = repair_names(repairs)
-    mesh, left_out = mesh_files.load_mesh(path, drop_missing=drops_missing(names))
-    return _repaired(mesh, names, left_out)
-
-
 def load_surface(path: Path, repairs: str) -> TriangleMesh:
-    """Read a mesh, or make a surface of points; repair it, and print on stderr what was done."""
-    names = repair_names(repairs)
-    made = read_surface(path)
-    return _repaired(made.mesh, names, made.report)
-
-
-def _repaired(mesh: TriangleMesh, names: tuple[str, ...], before: tuple[str, ...]) -> TriangleMesh:
-    done = repair(mesh, names)
-    print_repairs(before + done.report)
+    """Read a surface, as `es.io.read_surface`, and print on stderr what was made of it or repaired."""
+    done = read_surface(path, repair=repair_names(repairs))
+    print_repairs(done.report)
     return done.mesh
 
 
-def load_shape(path: Path, repairs: str, dim: int, cells: CellKind | None = None) -> Shape:
+def load_shape(
+    path: Path,
+    repairs: str,
+    dim: int,
+    cells: CellKind | None = None,
+    scene: str | int | None = None,
+) -> Shape:
     """Read a shape of any kind, apply the requested repairs, and print on stderr what they did."""
-    names = repair_names(repairs)
-    shape, left_out = shape_files.load_shape(
-        path, dim=dim, drop_missing=drops_missing(names), cells=cells
-    )
-    done = repair(shape, names)
-    print_repairs(left_out + done.report)
+    done = shape_files.load_shape(path, repair_names(repairs), dim=dim, cells=cells, scene=scene)
+    print_repairs(done.report)
     return done.cloud if isinstance(done, RepairedCloud) else done.mesh
 
 
 def load_repaired(
-    path: Path, repairs: str, cells: CellKind | None
+    path: Path, repairs: str, cells: CellKind | None, scene: str | int | None
 ) -> tuple[Mesh, RepairedMesh[Mesh]]:
     """Read a mesh of any dimension and repair it; return it as it was read and as it is now."""
     names = repair_names(repairs)
-    found, left_out = shape_files.load_shape(path, drop_missing=drops_missing(names), cells=cells)
-    if isinstance(found, PointCloud):  # for the error that says what reads points
-        found, left_out = mesh_files.load_mesh(path)
-    elif found.dim == 2 and not isinstance(found, TriangleMesh):  # in the plane
-        made = read_surface(path)
-        found, left_out = made.mesh, made.report
-    mesh: Mesh = found
-    done = repair(mesh, names)
-    return mesh, replace(done, report=left_out + done.report)
+    at_once = ["drop_missing"] if drops_missing(names) else []
+    found: Any = shape_files.load_shape(path, at_once, cells=cells, scene=scene)
+    if isinstance(found, RepairedCloud) or found.mesh.dim == found.mesh.points.shape[1] == 2:
+        found = read_surface(path, scene=scene)
+    done = repair(found.mesh, names)
+    return found.mesh, replace(done, report=found.report + done.report)
 
 
 def load_poses(before: Path, after: Path, repairs: str) -> tuple[TriangleMesh, TriangleMesh]:
     """Read two poses of one mesh; repair the first, and do the same to the faces of the second."""
-    first, second = mesh_files.read_mesh(before), mesh_files.read_mesh(after)
+    first, second = read_mesh(before), read_mesh(after)
     require_poses(first, second)
     done = repair(first, repair_names(repairs))
     print_repairs(done.report)

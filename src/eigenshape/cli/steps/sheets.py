@@ -1,7 +1,6 @@
 """A query beside its matches, with corresponding parts in one color."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Int
@@ -15,7 +14,6 @@ from eigenshape.cli.steps.writing import Side
 from eigenshape.geometry.distances.geodesic import geodesic_distances
 from eigenshape.geometry.measure import nearest_rotations, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.simplices import size_one
 from eigenshape.io.surface_files import read_surface
 from eigenshape.plot.camera import aim_camera
@@ -184,7 +182,7 @@ def _read_match(match: Match, repairs: tuple[str, ...]) -> TriangleMesh:
         raise StoreError(
             "A match is drawn from its mesh file; it was added to the index without one."
         )
-    mesh = repair(read_surface(Path(match.source)).mesh, repairs).mesh
+    mesh = read_surface(match.source, repair=repairs).mesh
     last = int(match.vertices.max(initial=-1))
     if last >= mesh.n_vertices:
         raise StoreError(

@@ -15,7 +15,13 @@ from eigenshape.cli.console import err, escape_text, print_written
 from eigenshape.cli.inputs import numbers_of
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.formats.registry import HEMISPHERES, WITH_COLORS, WITH_MORE, WRITTEN
+from eigenshape.io.formats.registry import (
+    HEMISPHERES,
+    WITH_COLORS,
+    WITH_MORE,
+    WRITTEN,
+    suffix_in,
+)
 from eigenshape.io.labeled_shapes import write_labels
 from eigenshape.io.mesh_files import read_mesh, save_mesh, write_mesh
 from eigenshape.matching.shape_match import ShapeMatch
@@ -94,6 +100,7 @@ def save_like(
     *,
     colors: UInt8[np.ndarray, "n 3"] | None = None,
     face_labels: Int[np.ndarray, " f"] | None = None,
+    scene: str | None = None,
 ) -> None:
     """Write a mesh with all else that its file holds, and print so, and what is lost, on stderr.
 
@@ -108,11 +115,13 @@ def save_like(
         Where its vertices are to be written.
     colors, face_labels : optional
         Colors and labels to write, as in `write_mesh`.
+    scene : str, optional
+        The scene that was read.
     """
     attributes = None
-    if source.suffix.lower() in WITH_MORE:
+    if suffix_in(source.name) in WITH_MORE:
         try:
-            found = read_mesh(source, attributes=True, drop_missing=True)[1]
+            found = read_mesh(source, attributes=True, drop_missing=True, scene=scene)[1]
             attributes = carry_attributes(found, mesh)
         except FileFormatError as error:  # the shape was read; only the rest is broken
             err.print(f"[yellow]lost:[/] all but the shape. {escape_text(error)}")

@@ -109,7 +109,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
 
 
 def _open(source: SourceFile) -> tuple[Gltf, Scene]:
-    gltf = read_gltf(source.data, source.path.parent if source.suffix == ".gltf" else None)
+    gltf = read_gltf(source.data, source.folder if source.suffix == ".gltf" else None)
     return gltf, read_scene(gltf)
 
 
@@ -175,7 +175,7 @@ def _image(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> tuple[bytes
             0
         ] or kind
     try:
-        return read_regular(file_beside(0, uri, source.path.parent), "an image"), kind
+        return read_regular(file_beside(0, uri, source.folder), "an image"), kind
     except (OSError, FileFormatError):
         return None, kind
 

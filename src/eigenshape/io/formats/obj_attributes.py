@@ -127,9 +127,9 @@ def _material_files(sheet: ObjSheet, source: SourceFile) -> tuple[str, list[str]
     text, missing = "", []
     for row in _rows(sheet, "mtllib"):
         rest = _unicode(row.split(None, 1)[1])
-        whole = find_beside(rest, source.path.parent)
+        whole = find_beside(rest, source.folder)
         for name in [rest] if whole else rest.split():
-            path = find_beside(name, source.path.parent)
+            path = find_beside(name, source.folder)
             if path is None:
                 missing.append(f"the materials of {name!r}, which is not in the folder of the file")
             elif path.stat().st_size:
@@ -159,7 +159,7 @@ def _read_materials(sheet: ObjSheet, source: SourceFile) -> tuple[dict[str, Mate
             alpha = 1.0 - float(values.get("tr", "0").split()[-1])
         image, image_name = None, ""
         if "map_kd" in values:
-            path = _image_of(values["map_kd"], source.path.parent)
+            path = _image_of(values["map_kd"], source.folder)
             if path is None:
                 lost.append(
                     f"the image {values['map_kd'][:80]!r}, which is not in the folder of the file"
@@ -179,7 +179,7 @@ def write(job: WriteJob) -> Files:
     sheet = read_sheet(source.data)
     data = format_sheet(sheet, held, job.mesh)
     job.lost.extend(sheet.dropped)
-    if job.path.absolute().parent.resolve() == source.path.absolute().parent.resolve():
+    if job.path.absolute().parent.resolve() == source.folder.resolve():
         return {job.path: data}
     text, missing = _material_files(sheet, source)
     job.lost.extend(missing)
@@ -188,7 +188,7 @@ def write(job: WriteJob) -> Files:
     files: Files = {}
 
     def link(match: re.Match[str]) -> str:
-        image = _image_of(match[2], source.path.parent)
+        image = _image_of(match[2], source.folder)
         if image is None:
             job.lost.append(f"the image {match[2][:80]!r}, which is not in the folder of the file")
             return match[0]

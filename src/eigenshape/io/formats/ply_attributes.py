@@ -113,7 +113,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
 def _read_images(source: SourceFile, end: int) -> tuple[tuple[Material, ...], list[str]]:
     """Return a material with the image that a comment names; if there is no such one, its name."""
     names = [name.decode("latin-1") for name in IMAGE.findall(source.data[:end])]
-    path = find_beside(names[0], source.path.parent) if len(names) == 1 else None
+    path = find_beside(names[0], source.folder) if len(names) == 1 else None
     if path is None:
         return (), [f"the image {name[:80]!r}, which a comment names" for name in names]
     return (Material(path.stem, image=read_regular(path, "an image"), image_name=path.name),), []

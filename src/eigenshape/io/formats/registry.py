@@ -29,6 +29,8 @@ Trait = Literal[
     "parcels",
     "volume",
     "beside",
+    "scenes",
+    "single",
 ]
 
 
@@ -63,6 +65,8 @@ class Format:
         - "colors": colors of vertices can be written.
         - "labels": labels of faces can be written. Other formats with colors get a material for each.
         - "beside": parts of the file lie in its folder, which `parse` takes as well.
+        - "scenes": the file may hold several scenes; `parse` takes the name or number of one.
+        - "single": the binary form stores coordinates in single precision.
     """
 
     suffix: str
@@ -78,14 +82,14 @@ FORMATS = (
     Format(".off", "off", ("cells", "text")),
     Format(".obj", "obj", ("cells", "text", "colors", "attributes")),
     Format(".ply", "ply", ("cells", "text", "binary", "cloud", "colors", "labels", "attributes")),
-    Format(".stl", "stl", ("cells", "text", "binary")),
+    Format(".stl", "stl", ("cells", "text", "binary", "single")),
     Format(".glb", "gltf", ("cells", "binary", "colors", "attributes")),
     Format(".gltf", "gltf", ("cells", "attributes", "beside")),
     Format(".vtu", "vtu", ("cells", "binary", "fields")),
     Format(".vtk", "vtk", ("cells", "binary", "fields")),
     Format(".npz", "npz", ("cells", "binary", "fields")),
-    Format(".gii", "neuro.gifti", ("cells", "binary", "fields")),
-    Format(".surf", "neuro.freesurfer", ("cells", "binary")),
+    Format(".gii", "neuro.gifti", ("cells", "binary", "fields", "single")),
+    Format(".surf", "neuro.freesurfer", ("cells", "binary", "single")),
     Format(".mesh", "medit", ("cells",)),
     Format(".meshb", "medit", ("cells",)),
     Format(".msh", "gmsh", ("cells",)),
@@ -111,6 +115,7 @@ FORMATS = (
 # recognized by their first bytes, and named by the hemisphere if they are yet to be written.
 SIGNATURES = {b"\xff\xff\xfe": ".surf", b"\xff\xff\xff": ".curv"}
 HEMISPHERES = ("lh.", "rh.")
+GZ = ".gz"  # after the suffix of any format: the file is unpacked when it is read
 
 
 def suffixes_with(*traits: Trait) -> tuple[str, ...]:
@@ -137,9 +142,14 @@ def format_of(suffix: str) -> Format:
 
 
 def suffix_in(name: str) -> str:
-    """Return the longest known suffix of the name of a file, otherwise what follows its last dot."""
+    """Return the longest known suffix of the name of a file, otherwise what follows its last dot.
+
+    A file that is packed, such as lh.surf.gii.gz, has the suffix of what is in it.
+    """
     name = name.lower()
     fitting = [known.suffix for known in FORMATS if name.endswith(known.suffix) and name[0] != "."]
+    if not fitting and name.endswith(GZ):
+        return suffix_in(name.removesuffix(GZ)) or GZ
     return max(fitting, key=len, default=Path(name).suffix)
 
 
@@ -147,6 +157,17 @@ def signed_suffix(path: Path) -> str:
     """Return the suffix of a file that is known by its first bytes, otherwise an empty text."""
     with path.open("rb") as file:
         return SIGNATURES.get(file.read(3), "")
+
+
+def written_suffix(path: Path, known: tuple[str, ...]) -> str:
+    """Return the suffix that names the format of a file that is to be written; see `suffix_of`."""
+    suffix = suffix_of(path, None, known)
+    if path.name.lower().endswith(GZ) and not suffix.endswith(GZ):
+        raise FileFormatError(
+            f"A file must be written unpacked; {path} ends in {GZ}. Write {path.stem}, and pack it by "
+            "gzip: packed files are read as they are."
+        )
+    return suffix
 
 
 def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> str:

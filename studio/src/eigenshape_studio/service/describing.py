@@ -92,26 +92,22 @@ Describe = Callable[[Recipe, bool, Path], Described]
 
 def describe_upload(recipe: Recipe, with_picture: bool, path: Path) -> Described:
     """Read an uploaded file, repair what is needed, and describe it."""
-    surface = read_upload(path, Limits().n_faces)
-    repaired = es.repair(surface.mesh, REPAIRS)
-    mesh = repaired.mesh
+    surface = read_upload(path, Limits().n_faces, REPAIRS)
+    mesh = surface.mesh
     descriptor = es.describe(mesh, recipe)
     picture = _picture_of_query(mesh, descriptor.vertices) if with_picture else None
-    return Described(
-        descriptor, mesh.n_vertices, mesh.n_faces, (*surface.report, *repaired.report), picture
-    )
+    return Described(descriptor, mesh.n_vertices, mesh.n_faces, surface.report, picture)
 
 
 def describe_shape(
     recipe: Recipe, name: str, facts: dict[str, Any], path: Path
 ) -> es.retrieval.DescribedShape:
     """Describe an uploaded file as an index keeps it: whole, from several sides, and as a picture."""
-    surface = read_upload(path, Limits().n_faces)
-    repaired = es.repair(surface.mesh, REPAIRS)
-    done = (*surface.report, *repaired.report)
-    attributes = facts["attributes"] | ({"repairs": "; ".join(done)} if done else {})
-    descriptors = describe_to_store(repaired.mesh, recipe)
-    picture = es.retrieval.draw_thumbnail(repaired.mesh)
+    surface = read_upload(path, Limits().n_faces, REPAIRS)
+    done = {"repairs": "; ".join(surface.report)} if surface.report else {}
+    attributes = facts["attributes"] | done
+    descriptors = describe_to_store(surface.mesh, recipe)
+    picture = es.retrieval.draw_thumbnail(surface.mesh)
     facts = facts | {"attributes": attributes, "thumbnail": picture}
     return es.retrieval.DescribedShape(name, descriptors, **facts)
 
@@ -130,7 +126,7 @@ def _picture_of_query(mesh: es.TriangleMesh, vertices: np.ndarray) -> dict[str, 
 
 def draw_file(path: Path) -> Picture:
     """Draw a file of the index; its vertices are those that were described."""
-    return _draw(es.repair(es.io.read_surface(path).mesh, REPAIRS).mesh)
+    return _draw(es.io.read_surface(path, repair=REPAIRS).mesh)
 
 
 def _draw(mesh: es.TriangleMesh) -> Picture:

@@ -155,8 +155,10 @@ def _limit(seconds: float, memory: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def read_upload(path: Path, n_faces: int) -> es.geometry.RepairedMesh[es.TriangleMesh]:
-    """Read a file from outside, whose path is ours and is not shown in errors.
+def read_upload(
+    path: Path, n_faces: int, repair: Sequence[str] = ()
+) -> es.geometry.RepairedMesh[es.TriangleMesh]:
+    """Read and repair a file from outside, whose path is ours and is not shown in errors.
 
     Raises
     ------
@@ -165,7 +167,7 @@ def read_upload(path: Path, n_faces: int) -> es.geometry.RepairedMesh[es.Triangl
         precision.
     """
     try:
-        found = es.io.read_surface(path)
+        found = es.io.read_surface(path, repair=repair)
     except es.EigenshapeError as error:
         # The folder is ours; the person knows the file by another name.
         text = str(error).replace(str(path), "The file")
