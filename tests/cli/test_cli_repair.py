@@ -7,11 +7,23 @@ import numpy as np
 import pytest
 from running import run
 
-from eigenshape import TriangleMesh, deform, read_mesh, read_shape, repair, rig_shape, write_mesh
+from eigenshape import (
+    FileFormatError,
+    PointCloud,
+    TriangleMesh,
+    deform,
+    read_mesh,
+    read_shape,
+    repair,
+    rig_shape,
+    write_mesh,
+)
 from eigenshape.deformation.handles import Translation
 from eigenshape.geometry.repairs.repair import REPAIRS
+from eigenshape.geometry.topology import is_closed
 from eigenshape.io.folders import find_items
 from eigenshape.io.labeled_shapes import read_labels
+from eigenshape.io.shape_files import write_points
 from eigenshape.shapes.creatures import make_creature
 from eigenshape.shapes.spheres import icosphere
 
@@ -304,16 +316,20 @@ def test_solids_are_split_and_written(tmp_path):
 
 def test_a_mesh_in_the_plane_is_written_at_zero(tmp_path):
     (tmp_path / "flat.obj").write_text("v 0 0\nv 1 0\nv 1 1\nv 0 1\nf 1 2 3 4\n")
-    refused = run("segment", tmp_path / "flat.obj", code=1).stderr
-    assert "it holds 2 triangles in R^2" in refused
-    assert "eigenshape repair, takes them at z = 0" in refused
+    assert "a mesh in the plane was taken at z = 0" in run("segment", tmp_path / "flat.obj").stderr
+    with pytest.raises(FileFormatError, match="es.io.read_surface, or eigenshape repair"):
+        read_mesh(tmp_path / "flat.obj")
     done = run("repair", tmp_path / "flat.obj", "-o", tmp_path / "flat.ply")
     assert "repair: a mesh in the plane was taken at z = 0" in done.stderr
     np.testing.assert_array_equal(read_mesh(tmp_path / "flat.ply").vertices[2], [1, 1, 0])
     run("segment", tmp_path / "flat.ply")
 
 
-def test_points_are_no_mesh_to_repair(tmp_path):
+def test_points_become_a_surface_that_is_written(tmp_path):
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\n")
     refused = run("repair", tmp_path / "a.obj", "-o", tmp_path / "a.ply", code=1).stderr
-    assert "a.obj: A mesh file must hold triangles; it holds 2 points and no face" in refused
+    assert "a.obj: A cloud must have at least 100 points in R^3 to become a surface" in refused
+    write_points(PointCloud(icosphere(3).vertices), tmp_path / "ball.xyz")
+    done = run("repair", tmp_path / "ball.xyz", "-o", tmp_path / "ball.ply")
+    assert "reconstruct_surface made" in done.stderr
+    assert is_closed(read_mesh(tmp_path / "ball.ply"))

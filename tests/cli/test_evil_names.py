@@ -210,9 +210,9 @@ def test_warnings(zoo, monkeypatch):
         import warnings
 
         warnings.warn(f"{path} is odd", UserWarning, stacklevel=1)
-        return es.icosphere(0), ()
+        return es.repair(es.icosphere(0), [])
 
-    monkeypatch.setattr("eigenshape.io.mesh_files.load_mesh", warn)
+    monkeypatch.setattr("eigenshape.cli.steps.reading.read_surface", warn)
     assert f"{SPELLED}0.ply is odd" in run("segment", zoo / f"{EVIL}0.ply").stderr
 
 
