@@ -1,5 +1,6 @@
 """The verbs on shapes that are no triangle meshes, and operators by name."""
 
+import importlib
 import json
 
 import numpy as np
@@ -291,8 +292,12 @@ def test_a_closed_mesh_has_no_boundary_to_hold(folder, tmp_path):
 
 
 @pytest.mark.long
-def test_roughly_and_kept(folder):
+def test_roughly_and_kept(folder, monkeypatch):
     write_mesh(icosphere(4), folder / "ball.off")
+    exact = run("spectrum", folder / "ball.off", "-k", 9, "--accuracy", 1e-3)
+    assert "up to 100,000 points the certified method is as fast" in exact.stderr
+    assert "exactly 9 eigenvalues" in " ".join(exact.stdout.split())
+    monkeypatch.setattr(importlib.import_module("eigenshape.cli.spectrum"), "LARGE", 0)
     rough = run("spectrum", folder / "ball.off", "-k", 9, "--accuracy", 1e-3).stdout
     assert "Whether one is missing was not counted" in " ".join(rough.split())
     found = run_json("spectrum", folder / "ball.off", "-k", 9, "--accuracy", 1e-3)
@@ -307,7 +312,8 @@ def test_roughly_and_kept(folder):
 
 
 @pytest.mark.long
-def test_options_of_the_spectrum_combine(folder):
+def test_options_of_the_spectrum_combine(folder, monkeypatch):
+    monkeypatch.setattr(importlib.import_module("eigenshape.cli.spectrum"), "LARGE", 0)
     kept = folder / "combined"
     options = ("-k", 4, "--boundary", "dirichlet", "--cache", kept)
     fixed = run_json("spectrum", folder / "disc.off", *options)

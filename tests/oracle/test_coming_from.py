@@ -458,3 +458,30 @@ def test_few_rows_have_no_code_and_they_say_what_is_missing(page):
     prose = [cells for cells in rows if "`" not in cells[1]]
     assert all("missing" in cells[1] or cells[-1] for cells in prose)
     assert len(prose) < len(rows) / 4
+
+
+def test_the_anisotropic_operator_of_lapy_is_built_as_its_page_says():
+    lapy = pytest.importorskip("lapy")
+    text = (DOCS / "lapy.md").read_text()
+    block = re.search(r"## Curvature and anisotropy.*?```python\n(.*?)```", text, re.DOTALL)[1]
+    mesh = bumpy_ball()
+    tria = lapy.TriaMesh(mesh.vertices.copy(), mesh.faces.copy())
+    names = {"es": es, "np": np, "mesh": mesh, "tria": tria}
+    exec(block, names)
+    theirs = lapy.Solver(tria, aniso=2.0)
+    for ours, their in (
+        (names["laplacian"].stiffness, theirs.stiffness),
+        (names["laplacian"].mass, theirs.mass),
+    ):
+        assert abs(ours - their).max() < 1e-12 * abs(their).max()
+
+
+def test_bands_of_the_wave_kernel_signature_differ_as_the_page_says():
+    from pyFM.signatures.WKS_functions import auto_WKS
+
+    spectrum = es.solve_spectrum(es.cotangent_laplacian(bumpy_ball()), 60)
+    logs = np.log(spectrum.eigenvalues[1:])
+    width = 7 * np.ptp(logs) / 100
+    assert width / es.spectral.default_energies(spectrum, 100)[1] == pytest.approx(1.27)
+    equal = auto_WKS(spectrum.eigenvalues, spectrum.eigenvectors, 28)
+    assert np.ptp(equal, axis=1).max() < 1e-9 * equal.max()

@@ -82,7 +82,7 @@ def deform(
     picture
         Draw the mesh before and after (PNG, SVG or PDF).
     """
-    side = steps.picture_side(view, up, picture)
+    side = steps.picture_side(view, up, picture, shapes=[mesh])
     steps.require_mesh_path(output)
     steps.require_output(save_edits, (".json",), "A list of edits")
     handles = [name for name in (rotate, move) if name]

@@ -53,7 +53,7 @@ def features(
 ) -> None:
     """Find the feature points of a mesh and the parts around them, most persistent first.
 
-    Above 100,000 vertices, or with --accuracy, heat is approximate, and its error is printed.
+    Above 100,000 vertices heat is approximate, and its error is printed.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def features(
     require_one_rule(
         {"--n-parts": False, "--persistence": is_persistence, "--largest-gap": largest_gap}
     )
-    side = steps.picture_side(view, up, picture)
+    side = steps.picture_side(view, up, picture, shapes=[mesh])
     steps.require_mesh_path(output, colors=True)
     recipe = PRESETS[method]
     surface = steps.load_surface(mesh, repair)

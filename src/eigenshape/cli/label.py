@@ -55,7 +55,7 @@ def label(
     picture
         Draw the best matching labeled mesh and this one (PNG, SVG or PDF).
     """
-    side = steps.picture_side(view, up, picture)
+    side = steps.picture_side(view, up, picture, shapes=[mesh])
     steps.require_mesh_path(output, labels=True)
     examples, left_out = steps.read_examples(like or [], labels or [], library, repair)
     names = es.io.read_label_names(library) if library else []

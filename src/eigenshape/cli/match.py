@@ -62,7 +62,7 @@ def match(
     picture
         Draw both, corresponding points in one color (PNG, SVG or PDF).
     """
-    side = steps.picture_side(view, up, picture)
+    side = steps.picture_side(view, up, picture, shapes=[mesh, whole])
     steps.require_output(output, MAP_FILES, "A map")
     size: Any = scale
     if scale not in ("auto", "known", "unknown"):
@@ -138,7 +138,7 @@ def pose(
     picture
         Draw the mesh before and after (PNG, SVG or PDF).
     """
-    side = steps.picture_side(view, up, picture)
+    side = steps.picture_side(view, up, picture, shapes=[mesh])
     steps.require_mesh_path(output)
     target = steps.load_surface(mesh, repair)
     source, posed = steps.load_poses(rest or like, like, repair)

@@ -83,7 +83,7 @@ def segment(
         if not isfinite(level):
             raise InvalidParameterError(f"--level must be finite; it is {level}.")
         persistence = contrast_at(level)
-    side = steps.picture_side(view, up, picture)
+    side = steps.picture_side(view, up, picture, shapes=[mesh])
     steps.require_mesh_path(output, labels=True)
     surface = steps.load_surface(mesh, repair)
     with progress_bar("parts") as progress:

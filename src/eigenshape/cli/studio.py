@@ -151,7 +151,7 @@ def report(
         Number of eigenfunctions to write.
     """
     steps.require_output(output, (".html",), "A report")
-    side = steps.picture_side(view, up)
+    side = steps.picture_side(view, up, shapes=[mesh])
     writer = import_extra("eigenshape_studio.report", "eigenshape-studio")
     surface = steps.load_surface(mesh, repair)
     with progress_bar("report") as progress:

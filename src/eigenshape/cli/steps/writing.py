@@ -17,6 +17,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.formats.registry import (
     HEMISPHERES,
+    UPRIGHT,
     WITH_COLORS,
     WITH_MORE,
     WRITTEN,
@@ -40,14 +41,19 @@ class Side(TypedDict):
     up: Up
 
 
-def picture_side(view: str, up: str, *pictures: Path | None) -> Side:
+def picture_side(
+    view: str, up: str, *pictures: Path | None, shapes: Sequence[Path] = ()
+) -> Side:
     """Return the side of pictures; raise an error if one cannot be written to its path.
 
-    --view and --up are names, or directions as three numbers separated by commas.
+    --view and --up are names, or directions as three numbers separated by commas. The files of the
+    shapes say which way is up if all are of formats in which y points up.
     """
     for path in pictures:
         if path is not None:
             require_picture_path(path)
+    if up == "auto" and shapes and all(suffix_in(path.name) in UPRIGHT for path in shapes):
+        up = "y"
     return {
         "view": _name_or_direction(view, "--view", ("auto", *VIEWS)),
         "up": _name_or_direction(up, "--up", UP_NAMES),

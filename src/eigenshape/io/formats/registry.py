@@ -31,6 +31,7 @@ Trait = Literal[
     "beside",
     "scenes",
     "single",
+    "upright",
 ]
 
 
@@ -66,6 +67,7 @@ class Format:
         - "labels": labels of faces can be written. Other formats with colors get a material for each.
         - "beside": parts of the file lie in its folder, which `parse` takes as well.
         - "scenes": the file may hold several scenes; `parse` takes the name or number of one.
+        - "upright": the y axis points up, by the format (glTF) or by habit (OBJ).
         - "single": the binary form stores coordinates in single precision.
     """
 
@@ -80,11 +82,11 @@ class Format:
 
 FORMATS = (
     Format(".off", "off", ("cells", "text")),
-    Format(".obj", "obj", ("cells", "text", "colors", "attributes")),
+    Format(".obj", "obj", ("cells", "text", "colors", "attributes", "upright")),
     Format(".ply", "ply", ("cells", "text", "binary", "cloud", "colors", "labels", "attributes")),
     Format(".stl", "stl", ("cells", "text", "binary", "single")),
-    Format(".glb", "gltf", ("cells", "binary", "colors", "attributes")),
-    Format(".gltf", "gltf", ("cells", "attributes", "beside")),
+    Format(".glb", "gltf", ("cells", "binary", "colors", "attributes", "upright")),
+    Format(".gltf", "gltf", ("cells", "attributes", "beside", "upright")),
     Format(".vtu", "vtu", ("cells", "binary", "fields")),
     Format(".vtk", "vtk", ("cells", "binary", "fields")),
     Format(".npz", "npz", ("cells", "binary", "fields")),
@@ -133,6 +135,7 @@ VOLUME_FORMATS = suffixes_with("volume")
 WRITTEN = suffixes_with("text", "binary")
 WRITTEN_CLOUDS = suffixes_with("cloud")
 WITH_MORE = suffixes_with("attributes", "fields")  # than positions and faces
+UPRIGHT = suffixes_with("upright")
 WITH_COLORS = suffixes_with("colors")
 
 

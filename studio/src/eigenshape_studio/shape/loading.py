@@ -10,7 +10,7 @@ import numpy as np
 
 import eigenshape as es
 from eigenshape.geometry.repairs.masks import hemisphere_of
-from eigenshape.io.formats.registry import SHAPE_FORMATS, suffix_of
+from eigenshape.io.formats.registry import SHAPE_FORMATS, UPRIGHT, suffix_of
 from eigenshape.plot.camera import Up, View
 from eigenshape_studio.shape.parse import points_in
 from eigenshape_studio.shape.sides import recall_side
@@ -70,8 +70,12 @@ def load_file(path: str | Path) -> Loaded:
         }
     fields = check_fields(values, mesh.n_vertices)
     side: tuple[View, Up] = ("auto", "auto")
-    if suffix_of(path, None, SHAPE_FORMATS) in OF_BRAINS and recall_side(mesh) is None:
-        side = (TOWARDS[hemisphere_of(mesh)], "z")
+    if recall_side(mesh) is None:  # nobody has turned this shape
+        suffix = suffix_of(path, None, SHAPE_FORMATS)
+        if suffix in OF_BRAINS:
+            side = (TOWARDS[hemisphere_of(mesh)], "z")
+        elif suffix in UPRIGHT:
+            side = ("auto", "y")
     return Loaded(mesh, attributes, fields, side, points_in(path, found.report))
 
 
