@@ -317,7 +317,7 @@ def test_solids_are_split_and_written(tmp_path):
 def test_a_mesh_in_the_plane_is_written_at_zero(tmp_path):
     (tmp_path / "flat.obj").write_text("v 0 0\nv 1 0\nv 1 1\nv 0 1\nf 1 2 3 4\n")
     assert "a mesh in the plane was taken at z = 0" in run("segment", tmp_path / "flat.obj").stderr
-    with pytest.raises(FileFormatError, match="es.io.read_surface, or eigenshape repair"):
+    with pytest.raises(FileFormatError, match=r"es\.io\.read_surface, or eigenshape repair"):
         read_mesh(tmp_path / "flat.obj")
     done = run("repair", tmp_path / "flat.obj", "-o", tmp_path / "flat.ply")
     assert "repair: a mesh in the plane was taken at z = 0" in done.stderr

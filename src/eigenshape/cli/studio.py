@@ -74,6 +74,7 @@ def serve(
     timeout: Annotated[float, typer.Option(min=1)] = 60.0,
     memory: Annotated[float | None, typer.Option(min=0.5)] = None,
     show_sources: bool = False,
+    prefix: str = "",
     browser: bool = False,
 ) -> None:
     """Serve an index: upload a scan, by a page or a program, and get the most similar shapes.
@@ -108,6 +109,9 @@ def serve(
         process has an equal share of the machine's memory.
     show_sources
         Name the files of shapes in answers.
+    prefix : PATH
+        Path below which a proxy offers the service, such as /shapes, whether the proxy passes it on
+        or leaves it out.
     browser
         Open the address in a browser.
     """
@@ -123,6 +127,7 @@ def serve(
         write_token=write_token,
         workers=es.retrieval.Workers(workers, timeout, memory_bytes(memory)),
         show_sources=show_sources,
+        prefix=prefix,
         announce=partial(print_address, "service"),
         browse=browser,
     )

@@ -10,6 +10,7 @@ import asyncio
 import ipaddress
 import json
 import secrets
+import zlib
 from collections.abc import Awaitable, Callable, Collection, MutableMapping
 from dataclasses import dataclass
 from time import monotonic
@@ -28,6 +29,7 @@ WAITING = """<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" con
 <title>{name}</title><h1>The {name} was started anew</h1>
 <p>Open the address that it has printed, in this browser. Then this page goes on, and nothing is lost.
 """
+READING = ("GET", "HEAD")  # methods
 HTML = b"text/html; charset=utf-8"
 MESSAGE_TYPE = b"application/octet-stream"
 POLICY = (
@@ -73,6 +75,10 @@ class Rules:
         application says what takes it.
     json_errors : bool
         Whether refusals are JSON objects with a text under "error". Otherwise they are plain text.
+    prefix : str
+        The path, such as "/shapes", below which a proxy offers this server; see `below`.
+    proxied : collection of str
+        The hosts for which a proxy may speak HTTPS.
     """
 
     token: str
@@ -87,6 +93,8 @@ class Rules:
     open_paths: Collection[str] = ()
     write_token: str | None = None
     json_errors: bool = False
+    prefix: str = ""
+    proxied: Collection[str] = ()
 
 
 class RefusedError(Exception):
@@ -117,10 +125,10 @@ class Guard:
             if self._is_entrance(scope):
                 await self._enter(answered)
                 return
-            if scope["method"] != "GET" or scope["path"] not in self.rules.open_paths:
+            if scope["method"] not in READING or scope["path"] not in self.rules.open_paths:
                 self._check_token(scope)
             self._check_kind(scope)
-            body = await self._read_body(receive)
+            body = await self._read_body(scope, receive)
             await self.app(scope, _replay(body, receive), answered)
         except RefusedError as error:
             page = (scope["method"], scope["path"]) == ("GET", "/")
@@ -136,7 +144,11 @@ class Guard:
             raise RefusedError(421, f"This address is not that of the {self.rules.name}.")
         origin = _only(scope, b"origin", default=f"http://{host}")
         site = _only(scope, b"sec-fetch-site", default="none")
-        if origin != f"http://{host}" or site not in ("same-origin", "none"):
+        origins = [f"http://{host}"] + [f"https://{host}"] * (host in self.rules.proxied)
+        if origin not in origins or site not in (
+            "same-origin",
+            "none",
+        ):
             raise RefusedError(403, f"Only the {self.rules.name}'s own page may send requests.")
 
     def _is_ours(self, host: str) -> bool:
@@ -160,8 +172,9 @@ class Guard:
 
     async def _enter(self, answered: "_Answer") -> None:
         """Turn the token of the address into a cookie, so that it leaves the address bar."""
-        cookie = f"{self._cookie_name}={self.rules.token}; Path=/; HttpOnly; SameSite=Strict"
-        headers = [(b"set-cookie", cookie.encode()), (b"location", b"/")]
+        home = f"{self.rules.prefix}/"
+        cookie = f"{self._cookie_name}={self.rules.token}; Path={home}; HttpOnly; SameSite=Strict"
+        headers = [(b"set-cookie", cookie.encode()), (b"location", home.encode())]
         await answered.text(303, f"Opening the {self.rules.name}.", headers)
 
     @property
@@ -207,8 +220,29 @@ class Guard:
         if not length.isdecimal() or int(length[:20]) > self.rules.most_bytes:
             raise RefusedError(413, f"The body may have {self.rules.most_bytes:,} bytes.")
 
-    async def _read_body(self, receive: Receive) -> bytes:
-        """Read the whole body, while counting its bytes and not waiting for ever."""
+    async def _read_body(self, scope: Scope, receive: Receive) -> bytes:
+        """Read the whole body and unpack it, while counting its bytes and not waiting for ever."""
+        encoding = _only(scope, b"content-encoding", default="identity").strip().lower()
+        if encoding not in ("identity", "gzip"):
+            raise RefusedError(415, f"The body may be packed by gzip, and not by {encoding[:20]}.")
+        body = await self._receive_body(receive)
+        return self._unpacked(body) if encoding == "gzip" else body
+
+    def _unpacked(self, body: bytes) -> bytes:
+        unpacker = zlib.decompressobj(wbits=31)
+        try:
+            found = unpacker.decompress(body, self.rules.most_bytes + 1)
+        except zlib.error as error:
+            raise RefusedError(
+                400, "The body must be packed by gzip, as its header says."
+            ) from error
+        if len(found) > self.rules.most_bytes:
+            raise RefusedError(413, f"The body may have {self.rules.most_bytes:,} bytes.")
+        if not unpacker.eof or unpacker.unused_data:
+            raise RefusedError(400, "The body must be packed by gzip, as its header says.")
+        return found
+
+    async def _receive_body(self, receive: Receive) -> bytes:
         end = monotonic() + self.rules.deadline
         parts, n_bytes = [], 0
         while True:
@@ -225,6 +259,26 @@ class Guard:
                 raise RefusedError(413, f"The body may have {self.rules.most_bytes:,} bytes.")
             if not message.get("more_body", False):
                 return b"".join(parts)
+
+
+def below(app: App, prefix: str) -> App:
+    """Return an application that serves another one below a path, which a proxy may leave out."""
+
+    async def serve(scope: Scope, receive: Receive, send: Send) -> None:
+        path = str(scope.get("path", ""))
+        if prefix and path == prefix:  # links of the page are relative to the path with its slash
+            query = scope["query_string"] and b"?" + scope["query_string"]
+            headers = [(b"location", f"{prefix}/".encode() + query), (b"content-length", b"0")]
+            await send({"type": "http.response.start", "status": 307, "headers": headers})
+            await send({"type": "http.response.body", "body": b""})
+            return
+        if prefix and path.startswith(f"{prefix}/"):
+            raw = scope.get("raw_path") or path.encode()
+            start = len(prefix.encode())
+            scope = {**scope, "path": path[len(prefix) :], "raw_path": raw[start:]}
+        await app(scope, receive, send)
+
+    return serve
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:

@@ -41,9 +41,7 @@ class Side(TypedDict):
     up: Up
 
 
-def picture_side(
-    view: str, up: str, *pictures: Path | None, shapes: Sequence[Path] = ()
-) -> Side:
+def picture_side(view: str, up: str, *pictures: Path | None, shapes: Sequence[Path] = ()) -> Side:
     """Return the side of pictures; raise an error if one cannot be written to its path.
 
     --view and --up are names, or directions as three numbers separated by commas. The files of the

@@ -26,7 +26,7 @@ from starlette.routing import Route
 import eigenshape as es
 from eigenshape.retrieval.store.filters import parse_filters
 from eigenshape.retrieval.store.writing import facts_text, require_name, require_text
-from eigenshape_studio.guard import App, Guard, Rules, bearer_of, is_secret
+from eigenshape_studio.guard import App, Guard, Rules, bearer_of, below, is_secret
 from eigenshape_studio.service import openapi
 from eigenshape_studio.service.describing import Describers, MeshRefusedError, Picture
 from eigenshape_studio.service.metrics import Metrics, count_requests
@@ -60,10 +60,13 @@ class Settings:
         Whether answers name the files of shapes.
     write_token : str, optional
         The secret of those who may add and remove shapes; without it, nobody may.
+    prefix : str
+        The path, such as "/shapes", below which a proxy offers the service.
     """
 
     show_sources: bool = False
     write_token: str | None = None
+    prefix: str = ""
 
 
 class _Drawings:
@@ -257,7 +260,7 @@ class Service:
         wanted = read_parameters(request, openapi.POINTS)
         await self._refresh()
         shape = self._shape(wanted["name"])
-        address = _thumbnail_address(shape.name)
+        address = self._thumbnail_address(shape.name)
         try:
             drawing = await self._drawing(shape.source)
         except MeshRefusedError:
@@ -286,14 +289,14 @@ class Service:
     async def describe_calls(self, request: Request) -> Response:
         """Return the description of all calls."""
         read_parameters(request, ())
-        return JSONResponse(openapi.openapi())
+        return JSONResponse(openapi.openapi(self.settings.prefix))
 
     async def show_page(self, request: Request) -> Response:
         """Return one of the two pages."""
         name, title = PAGES[request.url.path]
         frame = Template((PAGE / "frame.html").read_text(encoding="utf-8"))
         body = (PAGE / f"{name}.html").read_text(encoding="utf-8")
-        return HTMLResponse(frame.substitute(title=title, script=f"/{name}.js", body=body))
+        return HTMLResponse(frame.substitute(title=title, script=f"{name}.js", body=body))
 
     async def show_file(self, request: Request) -> Response:
         """Return a file of the page."""
@@ -335,8 +338,11 @@ class Service:
             "tags": list(shape.tags),
             "attributes": dict(shape.attributes),
             "source": shape.source if self.settings.show_sources else None,
-            "thumbnail": _thumbnail_address(shape.name) if has_picture else None,
+            "thumbnail": self._thumbnail_address(shape.name) if has_picture else None,
         }
+
+    def _thumbnail_address(self, name: str) -> str:
+        return f"{self.settings.prefix}/v1/thumbnails?name={quote(name, safe='')}"
 
     def _match(self, match: Found) -> dict[str, Any]:
         return {
@@ -368,7 +374,7 @@ def make_app(service: Service, rules: Rules) -> App:
     )
     app.router.redirect_slashes = False
     templates = frozenset(path.replace(":any", "") for path in calls)
-    return count_requests(Guard(app, rules), service.metrics, templates)
+    return below(count_requests(Guard(app, rules), service.metrics, templates), rules.prefix)
 
 
 def _by_method(calls: Mapping[str, Endpoint]) -> type[HTTPEndpoint]:
@@ -398,10 +404,6 @@ def _attributes(text: str) -> dict[str, Any]:
             400, f"The parameter attributes must be a JSON object; it is {text[:80]!r}."
         )
     return found
-
-
-def _thumbnail_address(name: str) -> str:
-    return f"/v1/thumbnails?name={quote(name, safe='')}"
 
 
 def _conditions(wanted: dict[str, Any]) -> dict[str, Any] | None:

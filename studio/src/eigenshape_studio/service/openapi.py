@@ -267,10 +267,11 @@ PATHS: dict[str, dict[str, Any]] = {
 }
 
 
-def openapi() -> dict[str, Any]:
-    """Return the description of all calls, of version 3.1 of OpenAPI."""
+def openapi(prefix: str = "") -> dict[str, Any]:
+    """Return the description of all calls below a path, of version 3.1 of OpenAPI."""
     return {
         "openapi": "3.1.0",
+        "servers": [{"url": prefix or "/"}],
         "info": {
             "title": "eigenshape",
             "version": es.__version__,

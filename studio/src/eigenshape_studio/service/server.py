@@ -20,6 +20,7 @@ from eigenshape_studio.service.shelf import ShelfReader
 
 MOST_BYTES = 64 << 20  # of an upload: about a million faces in a binary file
 GRACE = 10  # seconds that queries under way have to end
+PREFIX = re.compile(r"(/[A-Za-z0-9._~-]+)+")
 # A token stands in an address and in a cookie. 16 letters of 64 are 96 bits, beyond guessing.
 TOKEN = re.compile(r"[A-Za-z0-9._~-]{16,256}")
 
@@ -35,6 +36,7 @@ def serve(  # noqa: PLR0913  one for each option of the command
     write_token: str | None = None,
     workers: es.retrieval.Workers | None = None,
     show_sources: bool = False,
+    prefix: str = "",
     announce: Callable[[str], None] = print,
     browse: bool = False,
     describe: Describe = describe_upload,
@@ -63,6 +65,9 @@ def serve(  # noqa: PLR0913  one for each option of the command
         with 60 s for each mesh.
     show_sources : bool
         Whether answers name the files of shapes.
+    prefix : str
+        The path below which a proxy offers the service, such as "/shapes", whether it passes the
+        path on or leaves it out.
     announce : callable
         Called with the address, when the server listens there.
     browse : bool
@@ -74,7 +79,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
     ------
     InvalidParameterError
         If the host is another machine's or all of them, and `allow_remote` is not set; if a token
-        is too short or has letters that an address cannot hold, or the two tokens are equal.
+        is too short or has letters that an address cannot hold, or the two tokens are equal; if the
+        prefix is no path.
     StoreError
         If the folder is no index, or is damaged.
     OSError
@@ -93,6 +99,11 @@ def serve(  # noqa: PLR0913  one for each option of the command
             "The token for writing must differ from the token for reading, which stands in the "
             "address of the page; they are equal."
         )
+    if prefix and not PREFIX.fullmatch(prefix):
+        raise es.InvalidParameterError(
+            "A prefix must be a path of letters, digits, or any of ._~- that begins with a slash and ends "
+            f"with none, such as /shapes; it is {prefix[:80]!r}."
+        )
     shelf = ShelfReader(index)
     listening = listen(host, port)
     port = listening.getsockname()[1]
@@ -108,14 +119,18 @@ def serve(  # noqa: PLR0913  one for each option of the command
         open_paths=("/health",),
         write_token=write_token,
         json_errors=True,
+        prefix=prefix,
+        proxied=set(allow_hosts),
     )
-    address = shown_address(host, port)
+    address = shown_address(host, port) + prefix
     shown = f"{address}/" if token else f"{address}/?token={secret}"
     if workers is None:
         workers = es.retrieval.Workers(timeout=60.0)
     describers = Describers(workers, shelf.recipe, describe)
     try:
-        app = make_app(Service(shelf, describers, Settings(show_sources, write_token)), rules)
+        app = make_app(
+            Service(shelf, describers, Settings(show_sources, write_token, prefix)), rules
+        )
         page = f"{address}/?token={secret}" if browse else None
         run_app(app, listening, lambda: announce(shown), page, grace=GRACE)
     finally:

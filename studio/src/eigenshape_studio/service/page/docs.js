@@ -31,11 +31,11 @@ function describe(path, method, call) {
   return article;
 }
 
-const answer = await fetch("/openapi.json");
+const answer = await fetch("openapi.json");
 const { paths } = await answer.json();
 document.getElementById("example").textContent =
   `curl -H "Authorization: Bearer $EIGENSHAPE_TOKEN" -H "Content-Type: application/octet-stream" \\\n` +
-  `     --data-binary @scan.ply "${location.origin}/v1/query?name=scan.ply&n=5"`;
+  `     --data-binary @scan.ply "${new URL("v1/query?name=scan.ply&n=5", location.href)}"`;
 const articles = Object.entries(paths).flatMap(([path, calls]) =>
   Object.entries(calls).map(([method, call]) => describe(path, method, call)),
 );

@@ -74,7 +74,7 @@ async function search() {
   find("scan-facts").textContent = scan.name;
   say("Describing the scan …", "busy");
   try {
-    const answer = await call(`/v1/query?${wanted}`, {
+    const answer = await call(`v1/query?${wanted}`, {
       method: "POST",
       headers: { "content-type": "application/octet-stream" },
       body: scan,
@@ -137,7 +137,7 @@ async function illustrate(stage, match, pairs, drawn, signal) {
   const theirs = pairs.map(([, vertex]) => vertex).join(",");
   const wanted = new URLSearchParams({ name: match.name, vertices: theirs });
   try {
-    const { points, thumbnail } = await call(`/v1/points?${wanted}`, { signal });
+    const { points, thumbnail } = await call(`v1/points?${wanted}`, { signal });
     if (!thumbnail) {
       stage.textContent = "no picture";
       return;
@@ -175,7 +175,7 @@ addEventListener("drop", (event) => {
   take(event.dataTransfer.files);
 });
 try {
-  const { n_shapes } = await call("/v1/shapes?limit=1");
+  const { n_shapes } = await call("v1/shapes?limit=1");
   find("index-facts").textContent = `an index of ${n_shapes.toLocaleString("en")} shapes`;
 } catch (error) {
   say(error.message, "bad");
