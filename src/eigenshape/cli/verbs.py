@@ -33,7 +33,7 @@ VERBS = (
     "studio", "serve", "report", "warm-up", "demo",
 )  # fmt: skip
 INDEX_VERBS = (
-    "add", "ls", "rm", "stats", "verify", "compact", "export", "merge", "convert", "duplicates", "learn",
+    "add", "ls", "rm", "stats", "verify", "compact", "export", "merge", "duplicates", "learn",
 )  # fmt: skip
 # Verbs that stand in the module of another one; each of the others has a module of its name.
 TOGETHER = {

@@ -10,7 +10,6 @@ from .condensing import run_in_workers as run_in_workers
 from .condensing import write_table as write_table
 from .facts import shape_facts as shape_facts
 from .indexing import choose_shapes as choose_shapes
-from .indexing import convert_index as convert_index
 from .indexing import describe_all as describe_all
 from .indexing import find_doubles as find_doubles
 from .indexing import learn_codebook as learn_codebook

@@ -24,11 +24,10 @@ from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.retrieval.kinds import AnyRecipe
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
-from eigenshape.retrieval.store.conversion import convert_index
 from eigenshape.retrieval.store.filters import choose_shapes, parse_filters
 
 # For the verbs, as they are, beside what is defined here
-__all__ = ["choose_shapes", "convert_index", "parse_filters", "read_stage"]
+__all__ = ["choose_shapes", "parse_filters", "read_stage"]
 
 RETRIES = 3  # workers of a cluster that a task may lose before it counts as failed
 

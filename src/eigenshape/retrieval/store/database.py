@@ -359,15 +359,10 @@ def require_format(place: str, database: sqlite3.Connection) -> None:
             "another folder."
         )
     if version != FORMAT:
-        age, remedy = "a newer", "Install that version, or index the shapes again."
-        if version < FORMAT:
-            age, remedy = (
-                "an older",
-                "Convert it: `eigenshape index convert OLD_FOLDER NEW_FOLDER`.",
-            )
+        age = "an older" if version < FORMAT else "a newer"
         raise StoreError(
             f"{place} must be an index of format {FORMAT}; it is of format {version}, by {age} "
-            f"version of eigenshape. {remedy}"
+            "version of eigenshape. Install that version, or index the shapes again."
         )
 
 
