@@ -14,7 +14,6 @@ from eigenshape.io.formats.cells import (
     CellLists,
     Cells,
     cells_of_types,
-    fans,
     strip_triangles,
 )
 from eigenshape.io.formats.numbers import Cursor, quote_line
@@ -153,7 +152,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
 
 
 def _polydata_cells(lists: dict[bytes, CellLists]) -> Cells:
-    blocks = {}
+    blocks: Cells = {}
     if b"LINES" in lists:
         blocks[SEGMENTS] = lists[b"LINES"].pairs(np.arange(len(lists[b"LINES"].lengths)))
     triangles = NO_TRIANGLES
@@ -165,11 +164,7 @@ def _polydata_cells(lists: dict[bytes, CellLists]) -> Cells:
         everyone = np.arange(len(polygons.lengths))
         if sizes.tolist() == [4] and not len(triangles):
             return blocks | {FOUR_CORNERED: polygons.rows(everyone, 4)}
-        if len(sizes) == 1:
-            fanned = fans(polygons.rows(everyone, int(sizes[0])))
-        else:
-            fanned = fans([row.tolist() for row in polygons.split()])
-        triangles = np.concatenate([triangles, fanned])
+        blocks["polygons"] = polygons
     return blocks | {"triangles": triangles} if len(triangles) else blocks
 
 
