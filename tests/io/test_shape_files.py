@@ -116,15 +116,6 @@ def test_solids_are_split_into_tetrahedra(tmp_path, suffix):
         read_shape(inverted)
 
 
-def test_other_cells_are_named(tmp_path):
-    path = written(tmp_path / "a.vtk", CUBE.points[:6], [("triangle6", [[0, 1, 2, 3, 4, 5]])])
-    with pytest.raises(
-        FileFormatError,
-        match=r"hexahedra, wedges or pyramids; it holds quadratic triangle\. Save it with those",
-    ):
-        read_shape(path)
-
-
 POLYDATA = {
     "text": b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0\n1 1 0 2 1 5\n"
     b"LINES 2 7\n2 0 1\n3 1 2 3\nPOINT_DATA 4\nSCALARS a float\n",
@@ -171,7 +162,7 @@ def test_polygons_become_fans(tmp_path):
         ),
         (
             (b"LINES 2 7", b"LINES two 7"),
-            "A VTK file must count its cells by whole numbers; it says b'two'",
+            "A VTK file must count what it holds by whole numbers; it says b'two'",
         ),
         (
             (b"LINES 2 7\n2 0 1\n3 1 2 3\nPOINT_DATA 4\nSCALARS a float\n", b"LINES 2 9\n2 0"),

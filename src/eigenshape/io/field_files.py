@@ -1,5 +1,6 @@
 """Functions on vertices and faces, in files of a mesh such as .vtu, or without one such as .func.gii."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -182,7 +183,9 @@ def read_fields(path: str | Path) -> Fields:
 
 def _parse_fields(source: SourceFile) -> Fields:
     with naming(source.path):
-        of_vertices, of_faces = format_of(source.suffix).load().parse_fields(source.data)
+        of_vertices, of_faces, *notes = format_of(source.suffix).load().parse_fields(source.data)
+    for note in notes:
+        warnings.warn(f"{source.path}: {note}", stacklevel=3)
     found = dict(of_vertices)
     for name, values in of_faces.items():
         found[f"face_{name}" if name in found else name] = values

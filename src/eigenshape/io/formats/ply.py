@@ -11,7 +11,7 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cells import NO_TRIANGLES, fans, strip_triangles
+from eigenshape.io.formats.cells import NO_TRIANGLES, CellLists, fans, strip_triangles
 from eigenshape.io.formats.numbers import (
     Line,
     lines_of,
@@ -94,8 +94,9 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
         triangles.append(fans(polygons.astype(np.int64) if are_equal else polygons))
     for strip in read_lists(tables, "tristrips"):
         corners = np.asarray(strip, dtype=np.int64)
-        pieces = np.split(corners, np.flatnonzero(corners == -1))  # -1 separates strips
-        triangles.append(strip_triangles([piece[piece != -1] for piece in pieces]))
+        is_end = corners == -1  # between strips
+        starts = np.concatenate([[0], np.cumsum(~is_end)[is_end], [(~is_end).sum()]])
+        triangles.append(strip_triangles(CellLists(starts, corners[~is_end]))[0])
     return vertices, np.concatenate(triangles)
 
 

@@ -82,6 +82,7 @@ FORMATS = (
     Format(".glb", "gltf", ("cells", "binary", "colors", "attributes")),
     Format(".gltf", "gltf", ("cells", "attributes", "beside")),
     Format(".vtu", "vtu", ("cells", "binary", "fields")),
+    Format(".vtp", "vtp", ("cells", "binary", "fields")),
     Format(".vtk", "vtk", ("cells", "binary", "fields")),
     Format(".npz", "npz", ("cells", "binary", "fields")),
     Format(".gii", "neuro.gifti", ("cells", "binary", "fields")),
