@@ -194,7 +194,11 @@ def test_whole_files_give_one_tetrahedron(tmp_path, name):
             ("UNSTRUCTURED_GRID", "STRUCTURED_POINTS"),
             "must hold an unstructured grid or PolyData; it holds 'STRUCTURED_POINTS'",
         ),
-        ("a.vtk", ("DATASET UNSTRUCTURED_GRID\n", ""), "must have a line DATASET after its title and encoding; it has 'POINTS 4 double'"),
+        (
+            "a.vtk",
+            ("DATASET UNSTRUCTURED_GRID\n", ""),
+            "must have a line DATASET after its title and encoding; it has 'POINTS 4 double'",
+        ),
         (
             "a.vtk",
             (f"POINTS 4 double\n{PLACES}", ""),

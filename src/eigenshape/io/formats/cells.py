@@ -238,8 +238,8 @@ def straighten(
         for kind, block in cells.items()
     }
     note = (
-        f"{len(curved.lengths):,} cells with curved sides were read by their corners, and "
-        f"{int(is_middle.sum()):,} points between corners were left out"
+        f"cells with curved sides were read by their corners ({len(curved.lengths):,}), and the points "
+        f"between corners were left out ({int(is_middle.sum()):,})"
     )
     return points[kept], straight, kept, [note]
 

@@ -113,6 +113,9 @@ FORMATS = (
 SIGNATURES = {b"\xff\xff\xfe": ".surf", b"\xff\xff\xff": ".curv"}
 HEMISPHERES = ("lh.", "rh.")
 
+OTHER_VTK = (".vti", ".vtr", ".vts", ".vtm", ".vtmb", ".pvtu", ".pvtp", ".vtkhdf")
+VTK_REMEDY = ' In PyVista, pyvista.read(path).extract_surface().save("a.vtp") writes the surface.'
+
 
 def suffixes_with(*traits: Trait) -> tuple[str, ...]:
     """Return the suffixes of the formats that have one of some traits."""
@@ -169,6 +172,7 @@ def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> st
         remedies = {
             MAP_FORMATS: " es.io.read_fields reads the functions in it.",
             PARCEL_FORMATS: " es.io.read_parcellation reads the parcels in it.",
+            OTHER_VTK: VTK_REMEDY,
             VOLUME_FORMATS: " es.io.read_volume reads the volume in it.",
         }
         remedy = next((text for kind, text in remedies.items() if suffix in kind), "")

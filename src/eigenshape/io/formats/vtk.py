@@ -17,7 +17,6 @@ from eigenshape.io.formats.vtk_cells import (
     POLYLINE,
     STRIP,
     Arrays,
-    VtkGrid,
     VtkShape,
     fit_fields,
     other_dataset,
@@ -35,7 +34,7 @@ KINDS = {
 }  # fmt: skip
 TEXTS = (b"string", b"utf8_string", b"variant")
 # Fewest points of a cell of each section.
-SECTIONS = {b"VERTICES": 1, b"LINES": 2, b"POLYGONS": 3, b"TRIANGLE_STRIPS": 3, b"CELLS": 1}
+SECTIONS = {b"VERTICES": 1, b"LINES": 2, b"POLYGONS": 3, b"TRIANGLE_STRIPS": 3, b"CELLS": 0}
 OF_SURFACES = {
     POLY_VERTEX: b"VERTICES", POLYLINE: b"LINES", POLYGON: b"POLYGONS", STRIP: b"TRIANGLE_STRIPS",
 }  # fmt: skip
@@ -81,7 +80,7 @@ def _read(data: bytes) -> tuple[VtkShape, Cursor]:
     points, types, lists = _sections(cursor)
     if dataset[0].upper() == b"POLYDATA":
         of_types = {kind: lists[name] for kind, name in OF_SURFACES.items() if name in lists}
-        shape = sort_cells(VtkGrid(points, *surface_lists(of_types)))
+        shape = sort_cells(points, *surface_lists(of_types))
         if shape.cells.keys() - {SEGMENTS} == {"quads"}:
             for blocks in (shape.cells, shape.numbers):
                 blocks[FOUR_CORNERED] = blocks.pop("quads")
@@ -95,7 +94,7 @@ def _read(data: bytes) -> tuple[VtkShape, Cursor]:
         raise FileFormatError(
             f"Each cell of a VTK file must have a type; it has {n_cells} cells, {len(types)} types."
         )
-    return sort_cells(VtkGrid(points, lists[b"CELLS"], types)), cursor
+    return sort_cells(points, lists[b"CELLS"], types), cursor
 
 
 def _sections(cursor: Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[bytes, CellLists]]:

@@ -1,6 +1,6 @@
 """Cells of VTK's files by their types, and the points and functions that go with them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -18,6 +18,7 @@ from eigenshape.io.formats.cells import (
     straighten,
     strip_triangles,
 )
+from eigenshape.io.formats.registry import VTK_REMEDY
 
 # The types of cells, as vtkCellType.h numbers them
 EMPTY, VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, STRIP, POLYGON, PIXEL, QUAD = range(10)
@@ -45,16 +46,6 @@ Arrays = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
-class VtkGrid:
-    """What a file holds: points, and for each cell a list of them and VTK's number of its type."""
-
-    points: Float[np.ndarray, "n d"]
-    lists: CellLists
-    types: Int[np.ndarray, " c"]
-    notes: list[str] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
 class VtkShape:
     """Points and cells by kind, and where they stand in the file."""
 
@@ -70,8 +61,7 @@ class VtkShape:
 def other_dataset(found: str) -> FileFormatError:
     """Return the error for a file of VTK that holds neither an unstructured grid nor PolyData."""
     return FileFormatError(
-        f"A VTK file must hold an unstructured grid or PolyData; it holds {found[:40]!r}. In PyVista, "
-        'pyvista.read(path).extract_geometry().save("a.vtp") writes its surface.'
+        f"A VTK file must hold an unstructured grid or PolyData; it holds {found[:40]!r}.{VTK_REMEDY}"
     )
 
 
@@ -83,63 +73,65 @@ def surface_lists(sections: dict[int, CellLists]) -> tuple[CellLists, Int[np.nda
     return CellLists.join([sections[kind] for kind in order]), types
 
 
-def sort_cells(grid: VtkGrid) -> VtkShape:
+def sort_cells(
+    points: Float[np.ndarray, "n d"], lists: CellLists, types: Int[np.ndarray, " c"]
+) -> VtkShape:
     """Sort cells by their kind, without cells that are points; read curved cells by their corners.
+
+    Each cell is a list of points with VTK's number of its type.
 
     Raise FileFormatError if a cell has another type, or its number of corners does not match its
     type.
     """
-    lists, types = grid.lists, grid.types
     found = np.unique(types).tolist()
     known = {EMPTY, VERTEX, POLY_VERTEX, POLYLINE, STRIP, POLYGON, *LINEAR, *CURVED}
     others = [OTHER_NAMES.get(kind, f"VTK's type {kind}") for kind in found if kind not in known]
     if others:
         raise FileFormatError(
             "Cells of a VTK file must be simplices, polygons, strips, polylines, hexahedra, voxels, "
-            f"wedges or pyramids; it holds {', '.join(others)}. In PyVista, "
-            'pyvista.read(path).extract_surface().triangulate().save("a.vtp") writes their surface.'
+            f"wedges or pyramids; it holds {', '.join(others)}.{VTK_REMEDY}"
         )
+    cells: Cells = {}
+    numbers: dict[str, np.ndarray] = {}
     blocks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}  # corners, and cells
     for kind in found:
         chosen = np.flatnonzero(types == kind)
-        lengths = lists.lengths[chosen]
+        some = lists.take(chosen)
+        lengths = some.lengths
         if kind in LINEAR or kind in CURVED:
             name = LINEAR.get(kind) or CURVED[kind]
-            length = N_CORNERS[name]
-            is_wrong = lengths != length if kind in LINEAR else lengths <= length
-            _require_none(chosen[is_wrong], kind, f"{length} corners", lists)
-            corners = lists.rows(chosen, length)
-            corners = corners[:, AROUND[kind]] if kind in AROUND else corners
-            blocks.setdefault(name, []).append((corners, chosen))
+            n_corners = N_CORNERS[name]
+            if kind in LINEAR:
+                _require_none(chosen[lengths != n_corners], kind, f"{n_corners} corners", lists)
+            else:
+                few = chosen[lengths <= n_corners]
+                _require_none(few, kind, f"more points than {n_corners} corners", lists)
+            around = AROUND.get(kind, range(n_corners))
+            blocks.setdefault(name, []).append((lists.rows(chosen, n_corners)[:, around], chosen))
         elif kind == POLYLINE:
             owners = np.repeat(chosen, (lengths - 1).clip(0))
-            blocks.setdefault(SEGMENTS, []).append((lists.take(chosen).pairs(), owners))
-        elif kind in (STRIP, POLYGON):
+            blocks.setdefault(SEGMENTS, []).append((some.pairs(), owners))
+        elif kind == STRIP:
             _require_none(chosen[lengths < 3], kind, "3 corners or more", lists)
-        if kind == STRIP:
-            triangles, owners = strip_triangles(lists.take(chosen))
+            triangles, owners = strip_triangles(some)
             blocks.setdefault("triangles", []).append((triangles, chosen[owners]))
         elif kind == POLYGON:
-            for name in ("triangles", "quads"):
-                same = chosen[lengths == N_CORNERS[name]]
-                if same.size:
-                    blocks.setdefault(name, []).append((lists.rows(same, N_CORNERS[name]), same))
-    cells: Cells = {}
-    numbers = {}
+            _require_none(chosen[lengths < 3], kind, "3 corners or more", lists)
+            n_corners = int(lengths[0])
+            if n_corners in (3, 4) and (lengths == n_corners).all():
+                name = "triangles" if n_corners == 3 else "quads"
+                blocks.setdefault(name, []).append((lists.rows(chosen, n_corners), chosen))
+            else:
+                cells["polygons"], numbers["polygons"] = some, chosen
     for name, parts in blocks.items():
         # Several types become one kind, in the order of the file.
         owners = np.concatenate([owners for _, owners in parts])
         order = np.argsort(owners, kind="stable")
         cells[name] = np.concatenate([corners for corners, _ in parts])[order]
         numbers[name] = owners[order]
-    many = np.flatnonzero((types == POLYGON) & (lists.lengths > 4))
-    if many.size:
-        cells["polygons"], numbers["polygons"] = lists.take(many), many
     curved = lists.take(np.flatnonzero(np.isin(types, list(CURVED))))
-    points, cells, kept, notes = straighten(grid.points, cells, curved)
-    return VtkShape(
-        points, cells, kept, numbers, len(grid.points), len(types), [*grid.notes, *notes]
-    )
+    corners, cells, kept, notes = straighten(points, cells, curved)
+    return VtkShape(corners, cells, kept, numbers, len(points), len(types), notes)
 
 
 def _require_none(cells: Int[np.ndarray, " w"], kind: int, rule: str, lists: CellLists) -> None:
@@ -163,7 +155,7 @@ def fit_fields(shape: VtkShape, of_points: Arrays, of_cells: Arrays) -> tuple[Ar
         kind = four_cornered(shape.points, four) or "tetrahedra"
         cells[kind], numbers[kind] = four, numbers.pop(FOUR_CORNERED)
     rows = np.arange(shape.n_cells)
-    for group in (("tetrahedra", *SOLIDS), ("triangles", "quads", "polygons"), (SEGMENTS,)):
+    for group in (("tetrahedra", *SOLIDS), ("polygons", "triangles", "quads"), (SEGMENTS,)):
         owners = [
             np.repeat(numbers[kind], _n_simplices(kind, cells[kind]))
             for kind in group

@@ -31,7 +31,7 @@ from eigenshape.io.formats.vtk_cells import (
     POLYLINE,
     STRIP,
     Arrays,
-    VtkGrid,
+    VtkShape,
     fit_fields,
     other_dataset,
     sort_cells,
@@ -171,7 +171,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Cells, *tuple[str, ...
     Raise FileFormatError if the content differs from the tags, or they declare more than the file
     can hold.
     """
-    shape = sort_cells(_grid(*_open(data)))
+    shape = _shape(*_open(data))
     return shape.points, shape.cells, *shape.notes
 
 
@@ -182,7 +182,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
     can hold.
     """
     pieces, packing = _open(data)
-    shape = sort_cells(_grid(pieces, packing))
+    shape = _shape(pieces, packing)
     n_points = [_count(piece, "NumberOfPoints") for piece in pieces]
     n_cells = [
         sum(_count(piece, f"NumberOf{name}") for name in ("Cells", *SECTIONS.values()))
@@ -250,7 +250,7 @@ def _count(piece: ElementTree.Element, name: str) -> int:
     return int(text)
 
 
-def _grid(pieces: Sequence[ElementTree.Element], packing: _Packing) -> VtkGrid:
+def _shape(pieces: Sequence[ElementTree.Element], packing: _Packing) -> VtkShape:
     """Return the points and cells of all pieces."""
     points = [_points(piece, packing) for piece in pieces]
     if len({part.shape[1] for part in points}) > 1:
@@ -261,16 +261,22 @@ def _grid(pieces: Sequence[ElementTree.Element], packing: _Packing) -> VtkGrid:
     first = 0  # point of the piece
     for piece, part in zip(pieces, points, strict=True):
         of_piece, kinds = _cells(piece, packing)
+        beyond = of_piece.corners[(of_piece.corners < 0) | (of_piece.corners >= len(part))]
+        if beyond.size:
+            raise FileFormatError(
+                f"Cells of a VTK file must join the {len(part)} points of their piece; one joins "
+                f"point {beyond[0]}."
+            )
         lists.append(CellLists(of_piece.starts, of_piece.corners + first))
         types.append(kinds)
         first += len(part)
-    notes = []
+    shape = sort_cells(np.concatenate(points), CellLists.join(lists), np.concatenate(types))
     if len(pieces) > 1:
-        notes.append(
+        shape.notes.append(
             f"{len(pieces)} pieces were joined; points at their borders may be double, which the "
             "repair weld_seams joins"
         )
-    return VtkGrid(np.concatenate(points), CellLists.join(lists), np.concatenate(types), notes)
+    return shape
 
 
 def _points(piece: ElementTree.Element, packing: _Packing) -> Float[np.ndarray, "n d"]:
