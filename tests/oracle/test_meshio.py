@@ -88,7 +88,7 @@ def test_curved_elements_have_the_corners_of_meshio(tmp_path, binary):
         name = gmsh_types[kind]
         n_nodes = num_nodes_per_cell[name]
         assert N_NODES[kind] == n_nodes
-        if name == "wedge15":  # meshio 5.3 has no order of its nodes, and ends in a KeyError
+        if name in ("wedge15", "pyramid13"):  # meshio 5.3 writes them, and ends in a KeyError
             continue
         points, cells = rng.normal(size=(n_nodes, 3)), [(name, rng.permutation(n_nodes)[None])]
         path = tmp_path / f"{kind}.msh"
