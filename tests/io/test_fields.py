@@ -98,6 +98,20 @@ def test_legacy_sections_of_other_writers(tmp_path):
     assert found["part"].tolist() == [7]
 
 
+def test_polygons_in_npz_files(tmp_path):
+    x, y = [0, 3, 3, 1, 1, 0], [0, 0, 1, 1, 3, 3]
+    points = np.column_stack([x, y, np.zeros(6)])
+    faces = [[0, 1, 2, 3, 4, 5], [5, 4, 3, -1, -1, -1], [3, 2, 1, 0, -1, -1]]
+    np.savez(tmp_path / "a.npz", vertices=points, faces=faces, face_part=[4, 5, 6])
+    mesh, attributes = es.read_mesh(tmp_path / "a.npz", attributes=True)
+    assert mesh.n_faces == 4 + 1 + 2
+    assert es.geometry.surface_area(mesh) == 5.0 + 1.0 + 2.5
+    assert attributes.fields["part"].tolist() == [4, 4, 4, 4, 5, 6, 6]
+    np.savez(tmp_path / "a.npz", vertices=points, faces=[[0, 1, 2, 3], [0, 1, -1, -1]])
+    with pytest.raises(FileFormatError, match=r"three corners or more; face 1 is \[0, 1, -1, -1\]"):
+        es.read_mesh(tmp_path / "a.npz")
+
+
 def test_what_is_no_field_is_refused(tmp_path):
     with pytest.raises(InvalidParameterError, match="42 vertices or 80 faces; 'heat' has 3"):
         write_fields(BALL, tmp_path / "a.vtu", {"heat": [1, 2, 3]})
@@ -111,7 +125,7 @@ def test_what_is_no_field_is_refused(tmp_path):
         ({"vertices": BALL.vertices}, "it lacks faces"),
         (
             {"vertices": BALL.vertices, "faces": BALL.vertices},
-            r"and faces \(f, 3\) of whole numbers",
+            r"and faces \(f, 3\), or \(f, k\) of polygons that may end in -1, of whole numbers",
         ),
         ({"vertices": np.array([None])}, "must hold arrays of numbers; Object arrays"),
     ):

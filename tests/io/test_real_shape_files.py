@@ -49,6 +49,7 @@ SCANS = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:.*are not read")
 def test_every_awkward_file_is_a_shape_or_a_named_error_soon(data, capfd):
     for name in MESHES.keys() | REFUSED.keys():
         start = time.perf_counter()

@@ -137,14 +137,14 @@ def test_polylines(tmp_path, kind):
     np.testing.assert_array_equal(found.points, CURVE)
 
 
-def test_polygons_become_fans(tmp_path):
+def test_polygons_become_triangles(tmp_path):
     flat = (
         POLYDATA["text"]
-        .replace(b"LINES 2 7\n2 0 1\n3 1 2 3", b"POLYGONS 1 5\n4 0 1 2 3")
+        .replace(b"LINES 2 7\n2 0 1\n3 1 2 3", b"POLYGONS 1 5\n4 0 1 3 2")
         .replace(b" 5\nP", b" 0\nP")
     )
     (tmp_path / "a.vtk").write_bytes(flat)
-    assert read_shape(tmp_path / "a.vtk").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert read_shape(tmp_path / "a.vtk").faces.tolist() == [[0, 1, 3], [0, 3, 2]]
 
 
 @pytest.mark.parametrize(

@@ -24,11 +24,12 @@ def triangulate_polygons(
     the best-shaped triangles are cut off one by one (ear clipping, Meisters 1975). What lies outside
     is decided in the plane across the mean normal (Newell's).
 
-    Polygons without area, and those with a corner that is not finite or not a point, become fans.
+    Polygons without area, those with a corner that is not finite or not a point, and those in other
+    dimensions than 2 and 3 become fans.
 
     Parameters
     ----------
-    points : (n, 2) or (n, 3) float
+    points : (n, d) float
         In length.
     starts : (p + 1,) int
         Polygon i has the corners ``corners[starts[i] : starts[i + 1]]``.
@@ -74,8 +75,10 @@ def cut_polygons(
     middle = np.arange(1, len(owners) + 1) - first_triangles[owners]
     places = np.column_stack([np.zeros_like(middle), middle, middle + 1])
     n, dim = points.shape
-    space = np.zeros((3, n + 1))
-    space[:dim, :n], space[:, n] = points.T, np.nan
+    space = np.full((3, n + 1), np.nan)
+    if dim in (2, 3):
+        space[2, :n] = 0.0
+        space[:dim, :n] = points.T
     indices = np.where((corners >= 0) & (corners < n), corners, n)
     crossed = []
     for length in np.unique(lengths[lengths > 3]).tolist():

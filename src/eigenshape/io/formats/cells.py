@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, cast, get_args
+from itertools import chain
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape.geometry.polygons import triangulate_polygons
 from eigenshape.geometry.solids import N_TETRAHEDRA, split_solids
 from eigenshape.io.formats.registry import CellKind
 
@@ -18,6 +20,8 @@ N_CORNERS = {
 }  # fmt: skip
 SOLIDS = ("hexahedra", "wedges", "pyramids")
 NO_TRIANGLES = np.empty((0, 3), dtype=np.int64)
+# Corners by CellKind or another kind of cell: arrays of rows, and CellLists of "polygons"
+Cells = dict[str, Any]
 SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
 # Largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7.
 FLAT = 1e-6
@@ -39,10 +43,6 @@ class CellLists:
         """Return lists of equal length as rows."""
         return self.corners[self.starts[chosen][:, None] + np.arange(length)]
 
-    def split(self) -> list[Int[np.ndarray, " _"]]:
-        """Return all lists, one by one."""
-        return np.split(self.corners, self.starts[1:-1])
-
     def take(self, chosen: Int[np.ndarray, " s"]) -> "CellLists":
         """Return the chosen lists."""
         lengths = self.lengths[chosen]
@@ -62,10 +62,6 @@ class CellLists:
         lengths = [np.zeros(1, dtype=np.int64), *(part.lengths for part in parts)]
         corners = [np.zeros(0, dtype=np.int64), *(part.corners for part in parts)]
         return CellLists(np.cumsum(np.concatenate(lengths)), np.concatenate(corners))
-
-
-# Corners, by CellKind or another kind of cell; of "polygons" lists
-Cells = dict[str, Int[np.ndarray, "_ _"] | CellLists]
 
 
 def require_kind(cells: str | None) -> CellKind | None:
@@ -89,16 +85,16 @@ def require_splittable(others: Sequence[str]) -> None:
 def select_cells(
     points: Float[np.ndarray, "n d"], blocks: Cells, cells: CellKind | None
 ) -> Int[np.ndarray, "s corners"]:
-    """Return the simplices of the requested kind, where each quad becomes two triangles.
+    """Return the simplices of the requested kind, where quads and polygons become triangles.
 
-    The kind "quads" includes the triangles between them, and "tetrahedra" those of hexahedra,
-    wedges and pyramids. Without cells the shape is (0, 3).
+    The kind "triangles" includes those of polygons, "quads" all triangles, and "tetrahedra" those of
+    hexahedra, wedges and pyramids. Without cells the shape is (0, 3).
 
     Raise FileFormatError if the file has no cells of the requested kind, and InvalidShapeError if a
-    hexahedron, wedge or pyramid cannot be split.
+    polygon crosses itself, or a hexahedron, wedge or pyramid cannot be split.
     """
+    blocks = dict(blocks)
     if FOUR_CORNERED in blocks:
-        blocks = dict(blocks)
         four = blocks.pop(FOUR_CORNERED)
         kind: str | None = "tetrahedra" if cells == "tetrahedra" else "quads"
         if cells is None:
@@ -110,13 +106,21 @@ def select_cells(
                 "read_mesh, and --cells in the commands info, spectrum and repair."
             )
         blocks[kind] = four
-    quads = fans(blocks["quads"]) if "quads" in blocks else NO_TRIANGLES
-    triangles = blocks.get("triangles", NO_TRIANGLES)
-    surface = np.concatenate([triangles, quads])
     tetrahedra = blocks.get("tetrahedra", np.empty((0, 4), dtype=np.int64))
     if cells in (None, "tetrahedra"):
         split = [split_solids(points, blocks[name]).simplices for name in SOLIDS if name in blocks]
         tetrahedra = np.concatenate([tetrahedra, *split])
+        if cells is None and len(tetrahedra):
+            return tetrahedra
+    triangles = blocks.get("triangles", NO_TRIANGLES)
+    if "polygons" in blocks:
+        polygons = blocks.pop("polygons")
+        cut, _ = triangulate_polygons(points, polygons.starts, polygons.corners)
+        blocks["triangles"] = triangles = np.concatenate([cut, triangles])
+    quads = NO_TRIANGLES
+    if cells in (None, "quads") and "quads" in blocks:
+        quads = polygon_triangles(points, blocks["quads"])
+    surface = np.concatenate([triangles, quads])
     found = {"tetrahedra": tetrahedra, "quads": surface, "triangles": triangles}
     if cells is not None:
         if not len(found[cells]):
@@ -125,8 +129,7 @@ def select_cells(
                 f"A file that is read with cells={cells!r} must hold {cells}; it holds {held}."
             )
         return found[cells]
-    by_dimension = [tetrahedra, surface, blocks.get(SEGMENTS, surface)]
-    return next((block for block in by_dimension if len(block)), surface)
+    return surface if len(surface) else blocks.get(SEGMENTS, surface)
 
 
 def split_sentence(blocks: Cells) -> str:
@@ -176,17 +179,23 @@ def _multiplicities(rows: Int[np.ndarray, "c p corners"]) -> Int[np.ndarray, "c 
     return counts[inverse.ravel()].reshape(rows.shape[:2])
 
 
-def fans(polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> Int[np.ndarray, "f 3"]:
-    """Split polygons into triangles around their first corner."""
-    if isinstance(polygons, np.ndarray):
-        first = np.broadcast_to(polygons[:, :1], polygons[:, 1:-1].shape)
-        return np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2).reshape(-1, 3)
-    triangles = [
-        (corners[0], corners[place], corners[place + 1])
-        for corners in polygons
-        for place in range(1, len(corners) - 1)
-    ]
-    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
+def polygon_triangles(
+    points: Float[np.ndarray, "n d"],
+    polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"],
+) -> Int[np.ndarray, "f 3"]:
+    """Cut polygons, lists of corners or rows of a table, into triangles."""
+    if isinstance(polygons, np.ndarray) and polygons.shape[1] == 3:
+        return polygons
+    lists = list_corners(polygons)
+    return triangulate_polygons(points, lists.starts, lists.corners)[0]
+
+
+def list_corners(lists: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> CellLists:
+    """Put lists of corners, or rows of a table, one behind the other."""
+    starts = np.cumsum([0, *map(len, lists)])
+    if isinstance(lists, np.ndarray):
+        return CellLists(starts, lists.ravel())
+    return CellLists(starts, np.array([*chain.from_iterable(lists)]).astype(np.int64))
 
 
 def strip_triangles(
