@@ -157,6 +157,5 @@ def test_bones_of_opensim(data):
     for path in paths:
         mesh, theirs = es.read_mesh(path), pv.read(path)
         np.testing.assert_allclose(mesh.vertices, theirs.points, atol=1e-7)
-        assert mesh.n_faces == theirs.triangulate().n_cells
         area = es.geometry.face_areas(mesh).sum()
         assert area == pytest.approx(theirs.area, rel=1e-3)  # some polygons are not flat

@@ -102,7 +102,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
     for strip in read_lists(tables, "tristrips"):
         corners = np.asarray(strip, dtype=np.int64)
         pieces = np.split(corners, np.flatnonzero(corners == -1))  # -1 separates strips
-        strips = list_corners([piece[piece != -1] for piece in pieces])
+        strips = list_corners([piece[piece != -1].tolist() for piece in pieces])
         triangles.append(strip_triangles(strips)[0])
     others = [name for name in tables if len(read_lists(tables, name))]
     notes = [
