@@ -182,7 +182,7 @@ def test_whole_files_give_one_tetrahedron(tmp_path, name):
             ('Cells="1"', 'Cells="x"'),
             "Pieces of a VTK file must count what they hold; NumberOfCells is 'x'",
         ),
-        ("a.vtu", (">10<", ">11<"), "A VTK cell of type 11 must have 8 corners; cell 0 has 4"),
+        ("a.vtu", (">10<", ">11<"), "A VTK cell of type 11 must have 8 points; cell 0 has 4"),
         # A grid of any size in a few bytes.
         (
             "a.vtk",
@@ -192,7 +192,7 @@ def test_whole_files_give_one_tetrahedron(tmp_path, name):
         (
             "a.vtk",
             ("DATASET UNSTRUCTURED_GRID\n", ""),
-            "must have a line DATASET after its title and encoding; it has 'POINTS 4 double'",
+            "must hold an unstructured grid or PolyData; it holds 'POINTS 4 DOUBLE'",
         ),
         (
             "a.vtk",
@@ -330,7 +330,7 @@ def test_a_binary_medit_file_reads_by_any_name_and_must_have_its_end(tmp_path):
         ("text", (b"2 0 1", b"2 0 1.7"), r"must be whole numbers; number 2 is 1\.7"),
         ("text", (b"2 0 1", b"2 0 1e300"), r"must be whole numbers; number 2 is 1e\+300"),
         ("text", (b"1 0 0\n", b"1_0 0 0\n"), "must hold 12 numbers at byte"),
-        ("text", (b"LINES 2 7\n", b"LINES 1 7\n"), "must fill 7 numbers; 1 cells fill 3"),
+        ("text", (b"LINES 2 7\n", b"LINES 1 7\n"), "must hold 1 cells in 7 numbers; 2 cells take 7"),
         ("text", (b"LINES 2 7\n2 0 1\n3 1 2 3", b"POLYGONS 1 3\n2 0 1"), r"3 points or more; cell 0 has 2"),
         ("text", (b"POINT_DATA", b"LINES 1 3\n2 2 3\nPOINT_DATA"), "must have one section LINES; it has two"),
         ("version 5", (b"OFFSETS vtktypeint64", b"OFFSETS"), "they are b''"),

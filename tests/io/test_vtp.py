@@ -119,8 +119,8 @@ def test_pieces_and_the_arrays_that_only_some_have(tmp_path):
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        (("0 1 2<", "0 1 9<"), "must join the 4 points of their piece; one joins point 9"),
-        (("0 1 2<", "0 1 -1<"), "must join the 4 points of their piece; one joins point -1"),
+        (("0 1 2<", "0 1 9<"), "must join its 4 points, counted from 0; cell 0 joins point 9"),
+        (("0 1 2<", "0 1 -1<"), "must join its 4 points, counted from 0; cell 0 joins point -1"),
         (('NumberOfPolys="1"', 'NumberOfPolys="x"'), "count what they hold; NumberOfPolys is 'x'"),
         (
             ('Name="offsets"', 'Name="ends"'),

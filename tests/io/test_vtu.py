@@ -77,7 +77,7 @@ def binaries(tmp_path_factory):
             ("0 1 2 3", "0 1 2 3.5"),
             r"connectivity of a VTK file must be whole numbers; number 3 is 3\.5",
         ),
-        ((">10<", ">5<"), "A VTK cell of type 5 must have 3 corners; cell 0 has 4"),
+        ((">10<", ">5<"), "A VTK cell of type 5 must have 3 points; cell 0 has 4"),
         (
             ('"connectivity" format="ascii"', '"connectivity" format="appended"'),
             "must have an offset; that of 'conne",

@@ -10,31 +10,32 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.cells import (
-    N_CORNERS,
-    SEGMENTS,
-    CellLists,
-    Cells,
-    require_splittable,
-    straighten,
-)
+from eigenshape.io.formats.cells import CellLists, Cells, require_splittable
 from eigenshape.io.formats.numbers import Cursor, quote_line, wholes
+from eigenshape.io.formats.vtk_cells import (
+    HEXAHEDRON,
+    LINE,
+    PYRAMID,
+    QUAD,
+    TETRAHEDRON,
+    TRIANGLE,
+    VERTEX,
+    WEDGE,
+    sort_cells,
+)
 
 # Gmsh writes 4.0 as 4.
 VERSIONS = {b"2": 2.2, b"2.1": 2.2, b"2.2": 2.2, b"4": 4.0, b"4.0": 4.0, b"4.1": 4.1}
-POINT = 15  # elements of one node, which are ignored
-# Numbers of nodes by gmsh's number of the type; the corners come first.
-NODES = {
-    SEGMENTS: {1: 2, 8: 3, 26: 4, 27: 5, 28: 6},
-    "triangles": {2: 3, 9: 6, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21},
-    "quads": {3: 4, 10: 9, 16: 8, 36: 16, 37: 25},
-    "tetrahedra": {4: 4, 11: 10, 29: 20, 30: 35, 31: 56},
-    "hexahedra": {5: 8, 12: 27, 17: 20, 92: 64, 93: 125},
-    "wedges": {6: 6, 13: 18, 18: 15, 90: 40, 91: 75},
-    "pyramids": {7: 5, 14: 14, 19: 13},
-}
-KINDS = {kind: name for name, of_kind in NODES.items() for kind in of_kind}
-N_NODES = {POINT: 1} | {kind: n for of_kind in NODES.values() for kind, n in of_kind.items()}
+# VTK's number of the type of an element, and its number of nodes, by gmsh's number of the type
+ELEMENTS = {
+    1: (LINE, 2), 2: (TRIANGLE, 3), 3: (QUAD, 4), 4: (TETRAHEDRON, 4), 5: (HEXAHEDRON, 8),
+    6: (WEDGE, 6), 7: (PYRAMID, 5), 15: (VERTEX, 1),
+    # Of second order
+    8: (21, 3), 9: (22, 6), 10: (28, 9), 11: (24, 10), 12: (29, 27), 13: (32, 18), 14: (37, 14),
+    16: (23, 8), 17: (25, 20), 18: (26, 15), 19: (27, 13),
+    # Of third order
+    21: (69, 10), 26: (68, 4), 29: (71, 20), 36: (70, 16), 92: (72, 64), 90: (73, 40),
+}  # fmt: skip
 # Sections that a shape does not keep
 LEFT_OUT = (
     b"PhysicalNames",
@@ -72,11 +73,17 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...
         raise FileFormatError(
             "A binary gmsh file must have the order of bytes of this machine. Save it anew as text."
         )
-    in_nodes = (
-        _parametric_nodes(data, is_text)
-        if b"$ParametricNodes" in data
-        else _section(data, b"Nodes")
-    )
+    if is_text and b"$ParametricNodes" in data:
+        # Places on curves and surfaces follow the coordinates.
+        lines = _section(data, b"ParametricNodes").splitlines()
+        in_nodes = b"\n".join([b" ".join(line.split()[:4]) for line in lines]) + b"\n"
+    else:
+        if b"$ParametricNodes" in data:
+            raise FileFormatError(
+                "Nodes of a binary gmsh file of version 2 must have three coordinates; these have "
+                "parametric ones, too. Save it without (Mesh.SaveParametric = 0)."
+            )
+        in_nodes = _section(data, b"Nodes")
     nodes = Cursor(in_nodes, "A gmsh file", is_text=is_text)
     elements = Cursor(_section(data, b"Elements"), "A gmsh file", is_text=is_text)
     if version >= 4:
@@ -88,19 +95,8 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...
         rows = read_elements(elements, _plain_count(elements))
     lost = [b"$" + section for section in LEFT_OUT if b"$" + section in data]
     notes = [f"{b', '.join(lost).decode()} of the file are not kept"] if lost else []
-    points, cells, _, more = straighten(points, *_cells(tags, rows))
-    return points, cells, *notes, *more
-
-
-def _parametric_nodes(data: bytes, is_text: bool) -> bytes:
-    """Return nodes of version 2 without their places on curves and surfaces."""
-    if not is_text:
-        raise FileFormatError(
-            "Nodes of a binary gmsh file of version 2 must have three coordinates; these have "
-            "parametric ones, too. Save it without (Mesh.SaveParametric = 0)."
-        )
-    lines = _section(data, b"ParametricNodes").splitlines()
-    return b"\n".join([b" ".join(line.split()[:4]) for line in lines]) + b"\n"
+    shape = sort_cells(points, *_cells(tags, rows))
+    return shape.points, shape.cells, *notes, *shape.notes
 
 
 def _section(data: bytes, name: bytes) -> bytes:
@@ -144,17 +140,17 @@ def _listed_elements(section: Cursor, count: int) -> Rows:
     words, place = flat.tolist(), 0
     starts: dict[int, list[int]] = {}
     for index in range(count):
-        kind, n_tags = words[place + 1 : place + 3] if place + 3 <= n_words else (POINT, -1)
+        kind, n_tags = words[place + 1 : place + 3] if place + 3 <= n_words else (1, -1)
         _require_known([kind])
         place += 3 + n_tags
         starts.setdefault(kind, []).append(place)
-        place += N_NODES[kind]
+        place += ELEMENTS[kind][1]
         if n_tags < 0 or place > n_words:
             raise FileFormatError(f"{RULE}; element {index} of {count} is not whole.")
     if place != n_words:
         raise FileFormatError(f"{RULE}; more follows after the last of {count} elements.")
     return [
-        (kind, flat[np.array(some)[:, None] + np.arange(N_NODES[kind])])
+        (kind, flat[np.array(some)[:, None] + np.arange(ELEMENTS[kind][1])])
         for kind, some in starts.items()
     ]
 
@@ -172,7 +168,7 @@ def _plain_elements(section: Cursor, count: int) -> Rows:
             raise FileFormatError(
                 f"{RULE}; a block declares {height} elements with {n_tags} tags each."
             )
-        width = 1 + n_tags + N_NODES[kind]
+        width = 1 + n_tags + ELEMENTS[kind][1]
         block = section.take("<i4", height * width).reshape(height, width)
         rows.append((kind, block[:, 1 + n_tags :]))
         count -= height
@@ -221,7 +217,7 @@ def _element_blocks(section: Cursor, size: str, version: float) -> Rows:
         (height,) = section.wholes(size, 1).tolist()
         if height:
             _require_known([kind])
-            width = 1 + N_NODES[kind]
+            width = 1 + ELEMENTS[kind][1]
             block = section.wholes(size if version > 4 else "<i4", height * width)
             rows.append((kind, block.reshape(-1, width)[:, 1:]))
     section.require_end()
@@ -230,7 +226,9 @@ def _element_blocks(section: Cursor, size: str, version: float) -> Rows:
 
 
 def _require_known(kinds: list[int]) -> None:
-    require_splittable([f"elements of gmsh's type {kind}" for kind in kinds if kind not in N_NODES])
+    require_splittable(
+        [f"elements of gmsh's type {kind}" for kind in kinds if kind not in ELEMENTS]
+    )
 
 
 def _require_total(found: int, declared: int, what: str) -> None:
@@ -238,8 +236,8 @@ def _require_total(found: int, declared: int, what: str) -> None:
         raise FileFormatError(f"{RULE}; it declares {declared} {what} and holds {found}.")
 
 
-def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> tuple[Cells, CellLists]:
-    """Return the corners of cells by kind, and all nodes of curved cells.
+def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> tuple[CellLists, Int[np.ndarray, " c"]]:
+    """Return the elements and VTK's numbers of their types.
 
     Nodes have their place in the file instead of their tags.
 
@@ -258,20 +256,17 @@ def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> tuple[Cells, CellLists]:
             "Nodes of a gmsh file must have tags of their own; two have the tag "
             f"{ascending[twice[0]]}."
         )
-    blocks: dict[str, list[np.ndarray]] = {}
-    curved = []
-    for kind, block in rows:
-        if kind == POINT:
-            continue
-        places = np.searchsorted(ascending, block).clip(max=max(len(tags) - 1, 0))
-        unknown = block[ascending[places] != block] if tags.size else block.ravel()
-        if unknown.size:
-            raise FileFormatError(
-                f"Elements of a gmsh file must join its nodes; no node has the tag {unknown[0]}."
-            )
-        nodes, n_corners = order[places], N_CORNERS[KINDS[kind]]
-        blocks.setdefault(KINDS[kind], []).append(nodes[:, :n_corners])
-        if N_NODES[kind] > n_corners:
-            curved.append(CellLists(N_NODES[kind] * np.arange(len(nodes) + 1), nodes.ravel()))
-    cells: Cells = {name: np.concatenate(parts) for name, parts in blocks.items()}
-    return cells, CellLists.join(curved)
+    rows = [(kind, nodes) for kind, nodes in rows if ELEMENTS[kind][0] != VERTEX]
+    lists = CellLists.join(
+        [CellLists(nodes.shape[1] * np.arange(len(nodes) + 1), nodes.ravel()) for _, nodes in rows]
+    )
+    places = np.searchsorted(ascending, lists.corners).clip(max=max(len(tags) - 1, 0))
+    is_unknown = ascending[places] != lists.corners if tags.size else places >= 0
+    unknown = lists.corners[is_unknown]
+    if unknown.size:
+        raise FileFormatError(
+            f"Elements of a gmsh file must join its nodes; no node has the tag {unknown[0]}."
+        )
+    types = [np.full(len(nodes), ELEMENTS[kind][0]) for kind, nodes in rows]
+    none = np.empty(0, dtype=np.int64)
+    return CellLists(lists.starts, order[places]), np.concatenate([none, *types])

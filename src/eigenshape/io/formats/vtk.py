@@ -2,6 +2,7 @@
 
 import re
 import string
+from typing import Any
 from urllib.parse import quote, unquote_to_bytes
 
 import numpy as np
@@ -9,7 +10,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cells import FOUR_CORNERED, SEGMENTS, CellLists, Cells
+from eigenshape.io.formats.cells import FOUR_CORNERED, CellLists, Cells
 from eigenshape.io.formats.numbers import Cursor, quote_line
 from eigenshape.io.formats.vtk_cells import (
     POLY_VERTEX,
@@ -20,6 +21,7 @@ from eigenshape.io.formats.vtk_cells import (
     VtkShape,
     fit_fields,
     other_dataset,
+    require_joined,
     sort_cells,
     surface_lists,
 )
@@ -33,11 +35,10 @@ KINDS = {
     **{f"vtktypeuint{8 * size}".encode(): f">u{size}" for size in (1, 2, 4, 8)},
 }  # fmt: skip
 TEXTS = (b"string", b"utf8_string", b"variant")
-# Fewest points of a cell of each section.
-SECTIONS = {b"VERTICES": 1, b"LINES": 2, b"POLYGONS": 3, b"TRIANGLE_STRIPS": 3, b"CELLS": 0}
 OF_SURFACES = {
     POLY_VERTEX: b"VERTICES", POLYLINE: b"LINES", POLYGON: b"POLYGONS", STRIP: b"TRIANGLE_STRIPS",
 }  # fmt: skip
+SECTIONS = (*OF_SURFACES.values(), b"CELLS")
 DATA_SECTIONS = (b"POINT_DATA", b"CELL_DATA")
 WIDTHS = {  # numbers a row
     b"VECTORS": 3, b"NORMALS": 3, b"TENSORS": 9, b"TENSORS6": 6,
@@ -68,40 +69,39 @@ def _read(data: bytes) -> tuple[VtkShape, Cursor]:
     is_text = head[-1].strip().upper() != b"BINARY"
     place = sum(len(line) + 1 for line in head)
     cursor = Cursor(data, "A VTK file", is_text=is_text, place=place)
-    line = cursor.line()
-    dataset = line.split()[-1:] if line.startswith(b"DATASET ") else []
-    if not dataset:
-        raise FileFormatError(
-            "A legacy VTK file must have a line DATASET after its title and encoding; it has "
-            f"{quote_line((0, line))}."
-        )
-    if dataset[0].upper() not in DATASETS:
-        raise other_dataset(dataset[0].decode("latin-1"))
-    points, types, lists = _sections(cursor)
-    if dataset[0].upper() == b"POLYDATA":
-        of_types = {kind: lists[name] for kind, name in OF_SURFACES.items() if name in lists}
+    dataset = cursor.line().upper().removeprefix(b"DATASET").strip()
+    if dataset not in DATASETS:
+        raise other_dataset(dataset.decode("latin-1"))
+    held = _sections(cursor)
+    points = held.pop(b"POINTS")
+    if dataset == b"POLYDATA":
+        of_types = {kind: held[name] for kind, name in OF_SURFACES.items() if name in held}
+        for cells in of_types.values():
+            require_joined(cells, len(points))
         shape = sort_cells(points, *surface_lists(of_types))
-        if shape.cells.keys() - {SEGMENTS} == {"quads"}:
-            for blocks in (shape.cells, shape.numbers):
-                blocks[FOUR_CORNERED] = blocks.pop("quads")
+        polygons = shape.cells.get("polygons")
+        if polygons and "triangles" not in shape.cells and (polygons.lengths == 4).all():
+            del shape.cells["polygons"]
+            shape.cells[FOUR_CORNERED] = polygons.corners.reshape(-1, 4)
+            shape.numbers[FOUR_CORNERED] = shape.numbers.pop("polygons")[::2]
         return shape, cursor
-    if types is None or b"CELLS" not in lists:
+    if not held.keys() >= {b"CELLS", b"CELL_TYPES"}:
         raise FileFormatError(
             "An unstructured grid of a VTK file must have CELLS and CELL_TYPES; one is missing."
         )
-    n_cells = len(lists[b"CELLS"].lengths)
+    cells, types = held[b"CELLS"], held[b"CELL_TYPES"]
+    n_cells = len(cells.lengths)
     if len(types) != n_cells:
         raise FileFormatError(
             f"Each cell of a VTK file must have a type; it has {n_cells} cells, {len(types)} types."
         )
-    return sort_cells(points, lists[b"CELLS"], types), cursor
+    require_joined(cells, len(points))
+    return sort_cells(points, cells, types), cursor
 
 
-def _sections(cursor: Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[bytes, CellLists]]:
+def _sections(cursor: Cursor) -> dict[bytes, Any]:
     """Read points, types of cells, and lists of cells by the name of their section."""
-    points, types = None, None
-    lists: dict[bytes, CellLists] = {}
-    seen: set[bytes] = set()
+    held: dict[bytes, Any] = {}
     start = cursor.place
     while text := cursor.line():
         words = [*text.split(), b"", b""]
@@ -109,29 +109,27 @@ def _sections(cursor: Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[bytes
         if name in DATA_SECTIONS:
             cursor.place = start
             break
-        if name in seen:
+        if name in held:
             raise FileFormatError(f"A VTK file must have one section {name.decode()}; it has two.")
         if name == b"FIELD":  # functions on nothing, such as the time
             _take_fields(cursor, _count(words[2]))
         elif name == b"POINTS":
             numbers = cursor.take(_kind_of(words[2]), 3 * _count(words[1]))
-            points = numbers.reshape(-1, 3).astype(np.float64)
+            held[name] = numbers.reshape(-1, 3).astype(np.float64)
         elif name == b"CELL_TYPES":
-            types = cursor.wholes(">i4", _count(words[1]))
+            held[name] = cursor.wholes(">i4", _count(words[1]))
         elif name in SECTIONS:
-            lists[name] = _cells(cursor, name, _count(words[1]), _count(words[2]))
+            held[name] = _cells(cursor, _count(words[1]), _count(words[2]))
         else:
             raise FileFormatError(
                 f"Sections of a VTK file must be POINTS, {b', '.join(SECTIONS).decode()}, CELL_TYPES, "
                 f"POINT_DATA or CELL_DATA; one begins with {quote_line((0, text))}."
             )
-        if name != b"FIELD":
-            seen.add(name)
         _skip_metadata(cursor)
         start = cursor.place
-    if points is None:
+    if b"POINTS" not in held:
         raise FileFormatError("A VTK file must have a section POINTS; it has none.")
-    return points, types, lists
+    return held
 
 
 def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
@@ -152,8 +150,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
         elif keyword == b"FIELD":
             found = _take_fields(cursor, _count(words[2]))
         elif keyword == b"SCALARS":
-            if cursor.data[cursor.place : cursor.place + 80].lstrip().startswith(b"LOOKUP_TABLE"):
-                cursor.line()
+            cursor.line()  # LOOKUP_TABLE
             found[name] = _take_array(cursor, words[2], count, _count(words[3] or b"1"))
         elif keyword == b"COLOR_SCALARS":
             values = _take_array(cursor, b"unsigned_char", count, _count(words[2]))
@@ -259,7 +256,7 @@ def _count(word: bytes) -> int:
     return int(word)
 
 
-def _cells(cursor: Cursor, name: bytes, count: int, size: int) -> CellLists:
+def _cells(cursor: Cursor, count: int, size: int) -> CellLists:
     """Read lists of points; version 5 has offsets and connectivity instead of counts per cell."""
     start = cursor.place
     words = cursor.line().split()
@@ -270,41 +267,25 @@ def _cells(cursor: Cursor, name: bytes, count: int, size: int) -> CellLists:
             raise FileFormatError(
                 f"Offsets of a VTK file must rise from 0 to {size}; they are {offsets[:9].tolist()}."
             )
-        cells = CellLists(offsets, corners)
-    else:
-        cursor.place = start
-        cells = _cells_by_counts(cursor.wholes(">i4", size), count)
-    short = np.flatnonzero(cells.lengths < SECTIONS[name])
-    if short.size:
-        raise FileFormatError(
-            f"A cell of {name.decode()} must have {SECTIONS[name]} points or more; cell {short[0]} has "
-            f"{cells.lengths[short[0]]}."
-        )
-    return cells
+        return CellLists(offsets, corners)
+    cursor.place = start
+    return _cells_by_counts(cursor.wholes(">i4", size), count)
 
 
 def _cells_by_counts(flat: Int[np.ndarray, " k"], count: int) -> CellLists:
-    size = len(flat)
-    length = int(flat[0]) if size else 0
-    if length > 0 and size == count * (1 + length) and (flat[:: 1 + length] == length).all():
-        return CellLists(
-            np.arange(0, count * length + 1, length), flat.reshape(count, -1)[:, 1:].ravel()
-        )
+    numbers = flat.tolist()
     places = []  # where the counts are
     place = 0
-    for index in range(count):
-        if place >= size or not 0 <= flat[place] < size - place:
-            raise FileFormatError(
-                f"Cells of a VTK file must fill {size} numbers; cell {index} of {count} does not."
-            )
+    while place < len(numbers) and numbers[place] >= 0:
         places.append(place)
-        place += 1 + int(flat[place])
-    if place != size:
+        place += 1 + numbers[place]
+    if place != len(numbers) or len(places) != count:
         raise FileFormatError(
-            f"Cells of a VTK file must fill {size} numbers; {count} cells fill {place}."
+            f"A VTK file must hold {count} cells in {len(numbers)} numbers; {len(places)} cells take "
+            f"{place}."
         )
-    starts = np.cumsum([0, *flat[places]]) if places else np.zeros(1, dtype=np.int64)
-    return CellLists(starts, np.delete(flat, places))
+    starts = np.append(places, place) - np.arange(count + 1)
+    return CellLists(starts.astype(np.int64), np.delete(flat, places))
 
 
 def format_fields(mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:

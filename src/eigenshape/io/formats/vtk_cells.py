@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.geometry.solids import N_TETRAHEDRA
 from eigenshape.io.formats.cells import (
     FOUR_CORNERED,
     N_CORNERS,
@@ -15,7 +14,6 @@ from eigenshape.io.formats.cells import (
     CellLists,
     Cells,
     four_cornered,
-    straighten,
     strip_triangles,
 )
 from eigenshape.io.formats.registry import VTK_REMEDY
@@ -23,7 +21,7 @@ from eigenshape.io.formats.registry import VTK_REMEDY
 # The types of cells, as vtkCellType.h numbers them
 EMPTY, VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, STRIP, POLYGON, PIXEL, QUAD = range(10)
 TETRAHEDRON, VOXEL, HEXAHEDRON, WEDGE, PYRAMID = range(10, 15)
-LINEAR = {
+STRAIGHT = {
     LINE: SEGMENTS, TRIANGLE: "triangles", QUAD: "quads", PIXEL: "quads", TETRAHEDRON: "tetrahedra",
     HEXAHEDRON: "hexahedra", VOXEL: "hexahedra", WEDGE: "wedges", PYRAMID: "pyramids",
 }  # fmt: skip
@@ -37,11 +35,13 @@ CURVED = {
     }.items()
     for kind in kinds
 }  # fmt: skip
+KINDS = STRAIGHT | CURVED | {POLYLINE: SEGMENTS, STRIP: "triangles", POLYGON: "polygons"}
 # Pixels and voxels list their corners row by row, quads and hexahedra around them.
 AROUND = {PIXEL: [0, 1, 3, 2], VOXEL: [0, 1, 3, 2, 4, 5, 7, 6]}
 OTHER_NAMES = {
     15: "pentagonal prism", 16: "hexagonal prism", 36: "quadratic polygon", 41: "convex point set", 42: "polyhedron",
 }  # fmt: skip
+N_SIMPLICES = {"quads": 2, "hexahedra": 6, "wedges": 3, "pyramids": 2}  # of a cell
 Arrays = dict[str, np.ndarray]
 
 
@@ -52,7 +52,7 @@ class VtkShape:
     points: Float[np.ndarray, "m d"]
     cells: Cells
     kept: Int[np.ndarray, " m"]  # the numbers of the points
-    numbers: dict[str, Int[np.ndarray, " _"]]  # of the cells, by kind as `cells`
+    numbers: dict[str, Int[np.ndarray, " _"]]  # the cell of each simplex, by kind as `cells`
     n_points: int  # of the file, as `n_cells`
     n_cells: int
     notes: list[str]
@@ -73,6 +73,17 @@ def surface_lists(sections: dict[int, CellLists]) -> tuple[CellLists, Int[np.nda
     return CellLists.join([sections[kind] for kind in order]), types
 
 
+def require_joined(lists: CellLists, n_points: int) -> None:
+    """Raise an error if a cell joins a point that there is not."""
+    beyond = np.flatnonzero((lists.corners < 0) | (lists.corners >= n_points))
+    if beyond.size:
+        cell = np.searchsorted(lists.starts, beyond[0], side="right") - 1
+        raise FileFormatError(
+            f"Cells of a VTK file must join its {n_points} points, counted from 0; cell {cell} joins "
+            f"point {lists.corners[beyond[0]]}."
+        )
+
+
 def sort_cells(
     points: Float[np.ndarray, "n d"], lists: CellLists, types: Int[np.ndarray, " c"]
 ) -> VtkShape:
@@ -83,64 +94,71 @@ def sort_cells(
     Raise FileFormatError if a cell has another type, or its number of corners does not match its
     type.
     """
-    found = np.unique(types).tolist()
-    known = {EMPTY, VERTEX, POLY_VERTEX, POLYLINE, STRIP, POLYGON, *LINEAR, *CURVED}
-    others = [OTHER_NAMES.get(kind, f"VTK's type {kind}") for kind in found if kind not in known]
+    found = np.setdiff1d(types, [EMPTY, VERTEX, POLY_VERTEX]).tolist()
+    others = [OTHER_NAMES.get(kind, f"VTK's type {kind}") for kind in found if kind not in KINDS]
     if others:
         raise FileFormatError(
             "Cells of a VTK file must be simplices, polygons, strips, polylines, hexahedra, voxels, "
             f"wedges or pyramids; it holds {', '.join(others)}.{VTK_REMEDY}"
         )
+    n_cells = len(types)
+    lists, middles, notes = _straighten(lists, types)
+    kept = np.delete(np.arange(len(points)), middles)
+    lists = CellLists(lists.starts, np.searchsorted(kept, lists.corners))
     cells: Cells = {}
     numbers: dict[str, np.ndarray] = {}
-    blocks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}  # corners, and cells
+    parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}  # corners, and their cells
     for kind in found:
-        chosen = np.flatnonzero(types == kind)
-        some = lists.take(chosen)
-        lengths = some.lengths
-        if kind in LINEAR or kind in CURVED:
-            name = LINEAR.get(kind) or CURVED[kind]
-            n_corners = N_CORNERS[name]
-            if kind in LINEAR:
-                _require_none(chosen[lengths != n_corners], kind, f"{n_corners} corners", lists)
-            else:
-                few = chosen[lengths <= n_corners]
-                _require_none(few, kind, f"more points than {n_corners} corners", lists)
-            around = AROUND.get(kind, range(n_corners))
-            blocks.setdefault(name, []).append((lists.rows(chosen, n_corners)[:, around], chosen))
-        elif kind == POLYLINE:
-            owners = np.repeat(chosen, (lengths - 1).clip(0))
-            blocks.setdefault(SEGMENTS, []).append((some.pairs(), owners))
+        name, chosen = KINDS[kind], np.flatnonzero(types == kind)
+        lengths = lists.lengths[chosen]
+        least = N_CORNERS.get(name, 3)
+        is_open = kind in (POLYLINE, STRIP, POLYGON)
+        wrong = chosen[lengths < least if is_open else lengths != least]
+        if wrong.size:
+            raise FileFormatError(
+                f"A VTK cell of type {kind} must have {least} points{' or more' * is_open}; cell "
+                f"{wrong[0]} has {lists.lengths[wrong[0]]}."
+            )
+        if kind == POLYGON:
+            cells[name], numbers[name] = lists.take(chosen), np.repeat(chosen, lengths - 2)
+            continue
+        if kind == POLYLINE:
+            corners, owners = lists.take(chosen).pairs(), np.repeat(chosen, lengths - 1)
         elif kind == STRIP:
-            _require_none(chosen[lengths < 3], kind, "3 corners or more", lists)
-            triangles, owners = strip_triangles(some)
-            blocks.setdefault("triangles", []).append((triangles, chosen[owners]))
-        elif kind == POLYGON:
-            _require_none(chosen[lengths < 3], kind, "3 corners or more", lists)
-            n_corners = int(lengths[0])
-            if n_corners in (3, 4) and (lengths == n_corners).all():
-                name = "triangles" if n_corners == 3 else "quads"
-                blocks.setdefault(name, []).append((lists.rows(chosen, n_corners), chosen))
-            else:
-                cells["polygons"], numbers["polygons"] = some, chosen
-    for name, parts in blocks.items():
+            corners, strips = strip_triangles(lists.take(chosen))
+            owners = chosen[strips]
+        else:
+            corners, owners = lists.rows(chosen, least), chosen
+        around = AROUND.get(kind, slice(None))
+        parts.setdefault(name, []).append((corners[:, around], owners))
+    for name, some in parts.items():
         # Several types become one kind, in the order of the file.
-        owners = np.concatenate([owners for _, owners in parts])
+        owners = np.concatenate([owners for _, owners in some])
         order = np.argsort(owners, kind="stable")
-        cells[name] = np.concatenate([corners for corners, _ in parts])[order]
-        numbers[name] = owners[order]
-    curved = lists.take(np.flatnonzero(np.isin(types, list(CURVED))))
-    corners, cells, kept, notes = straighten(points, cells, curved)
-    return VtkShape(corners, cells, kept, numbers, len(points), len(types), notes)
+        cells[name] = np.concatenate([corners for corners, _ in some])[order]
+        numbers[name] = np.repeat(owners[order], N_SIMPLICES.get(name, 1))
+    return VtkShape(points[kept], cells, kept, numbers, len(points), n_cells, notes)
 
 
-def _require_none(cells: Int[np.ndarray, " w"], kind: int, rule: str, lists: CellLists) -> None:
-    """Raise an error that names the first of the cells that break a rule."""
-    if cells.size:
-        raise FileFormatError(
-            f"A VTK cell of type {kind} must have {rule}; cell {cells[0]} has "
-            f"{lists.lengths[cells[0]]}."
-        )
+def _straighten(
+    lists: CellLists, types: Int[np.ndarray, " c"]
+) -> tuple[CellLists, Int[np.ndarray, " m"], list[str]]:
+    """Return the cells by their corners, the points that are between corners alone, and a note."""
+    lengths = lists.lengths
+    for kind, name in CURVED.items():
+        lengths = np.where(types == kind, np.minimum(lengths, N_CORNERS[name]), lengths)
+    n_curved = int((lengths < lists.lengths).sum())
+    if not n_curved:
+        return lists, np.empty(0, dtype=np.int64), []
+    owners = np.repeat(np.arange(len(types)), lists.lengths)
+    is_corner = np.arange(len(owners)) - lists.starts[owners] < lengths[owners]
+    corners = lists.corners[is_corner]
+    middles = np.setdiff1d(lists.corners[~is_corner], corners)
+    note = (
+        f"cells with curved sides were read by their corners ({n_curved:,}), and the points between "
+        f"corners were left out ({len(middles):,})"
+    )
+    return CellLists(np.concatenate([[0], np.cumsum(lengths)]), corners), middles, [note]
 
 
 def fit_fields(shape: VtkShape, of_points: Arrays, of_cells: Arrays) -> tuple[Arrays, Arrays]:
@@ -149,18 +167,14 @@ def fit_fields(shape: VtkShape, of_points: Arrays, of_cells: Arrays) -> tuple[Ar
     Each simplex has the value of the cell that it is a part of. A function that has another number
     of rows than the file has points or cells stays as it is.
     """
-    cells, numbers = dict(shape.cells), dict(shape.numbers)
-    if FOUR_CORNERED in cells:
-        four = cells.pop(FOUR_CORNERED)
-        kind = four_cornered(shape.points, four) or "tetrahedra"
-        cells[kind], numbers[kind] = four, numbers.pop(FOUR_CORNERED)
+    numbers = dict(shape.numbers)
+    if FOUR_CORNERED in numbers:
+        four = numbers.pop(FOUR_CORNERED)
+        kind = four_cornered(shape.points, shape.cells[FOUR_CORNERED]) or "tetrahedra"
+        numbers[kind] = np.repeat(four, N_SIMPLICES.get(kind, 1))
     rows = np.arange(shape.n_cells)
     for group in (("tetrahedra", *SOLIDS), ("polygons", "triangles", "quads"), (SEGMENTS,)):
-        owners = [
-            np.repeat(numbers[kind], _n_simplices(kind, cells[kind]))
-            for kind in group
-            if kind in cells
-        ]
+        owners = [numbers[kind] for kind in group if kind in numbers]
         if any(map(len, owners)):
             rows = np.concatenate(owners)
             break
@@ -172,12 +186,3 @@ def fit_fields(shape: VtkShape, of_points: Arrays, of_cells: Arrays) -> tuple[Ar
         }
 
     return chosen(of_points, shape.n_points, shape.kept), chosen(of_cells, shape.n_cells, rows)
-
-
-def _n_simplices(
-    kind: str, cells: Int[np.ndarray, "c _"] | CellLists
-) -> int | Int[np.ndarray, " c"]:
-    """Return how many simplices each cell becomes."""
-    if isinstance(cells, CellLists):
-        return cells.lengths - 2
-    return {"quads": 2}.get(kind, N_TETRAHEDRA.get(cells.shape[1], 1))

@@ -34,6 +34,7 @@ from eigenshape.io.formats.vtk_cells import (
     VtkShape,
     fit_fields,
     other_dataset,
+    require_joined,
     sort_cells,
     surface_lists,
 )
@@ -183,13 +184,8 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
     """
     pieces, packing = _open(data)
     shape = _shape(pieces, packing)
-    n_points = [_count(piece, "NumberOfPoints") for piece in pieces]
-    n_cells = [
-        sum(_count(piece, f"NumberOf{name}") for name in ("Cells", *SECTIONS.values()))
-        for piece in pieces
-    ]
-    of_points, left_out = _fields(pieces, packing, "PointData", n_points)
-    of_cells, more = _fields(pieces, packing, "CellData", n_cells)
+    of_points, left_out = _fields(pieces, packing, "PointData", ("Points",))
+    of_cells, more = _fields(pieces, packing, "CellData", ("Cells", *SECTIONS.values()))
     notes = [
         f"the array {name!r} is not read: it is of text, or not in all pieces"
         for name in left_out + more
@@ -222,16 +218,15 @@ def _open(data: bytes) -> tuple[list[ElementTree.Element], _Packing]:
     section = root.find("AppendedData")
     if section is not None and not raw:
         appended = (section.text or "").strip().removeprefix("_").encode()
-    header_type = root.get("header_type", "UInt32")
-    if header_type not in HEADER_TYPES:
-        raise FileFormatError(
-            f"header_type of a VTK file must be UInt32 or UInt64; it is {header_type[:30]!r}."
-        )
-    order = root.get("byte_order", "LittleEndian")
-    if order not in ORDERS:
-        raise FileFormatError(
-            f"byte_order of a VTK file must be LittleEndian or BigEndian; it is {order[:30]!r}."
-        )
+    header_type, order = root.get("header_type", "UInt32"), root.get("byte_order", "LittleEndian")
+    for name, word, known in (
+        ("header_type", header_type, HEADER_TYPES),
+        ("byte_order", order, ORDERS),
+    ):
+        if word not in known:
+            raise FileFormatError(
+                f"{name} of a VTK file must be {' or '.join(known)}; it is {word[:30]!r}."
+            )
     compressor = root.get("compressor") or None
     size = np.dtype(ORDERS[order] + HEADER_TYPES[header_type])
     packing = _Packing(size, ORDERS[order], compressor, appended, raw is not None, len(data))
@@ -261,12 +256,7 @@ def _shape(pieces: Sequence[ElementTree.Element], packing: _Packing) -> VtkShape
     first = 0  # point of the piece
     for piece, part in zip(pieces, points, strict=True):
         of_piece, kinds = _cells(piece, packing)
-        beyond = of_piece.corners[(of_piece.corners < 0) | (of_piece.corners >= len(part))]
-        if beyond.size:
-            raise FileFormatError(
-                f"Cells of a VTK file must join the {len(part)} points of their piece; one joins "
-                f"point {beyond[0]}."
-            )
+        require_joined(of_piece, len(part))
         lists.append(CellLists(of_piece.starts, of_piece.corners + first))
         types.append(kinds)
         first += len(part)
@@ -333,11 +323,12 @@ def _lists(arrays: dict[str, ElementTree.Element], packing: _Packing, n_cells: i
 
 
 def _fields(
-    pieces: Sequence[ElementTree.Element], packing: _Packing, section: str, counts: Sequence[int]
+    pieces: Sequence[ElementTree.Element], packing: _Packing, section: str, counts: tuple[str, ...]
 ) -> tuple[Arrays, list[str]]:
     """Return the functions that all pieces have, and the names of other arrays."""
     found: dict[str, list[np.ndarray]] = {}
-    for piece, count in zip(pieces, counts, strict=True):
+    for piece in pieces:
+        count = sum(_count(piece, f"NumberOf{name}") for name in counts)
         for array in piece.findall(f"./{section}/*"):
             name = array.get("Name", section)
             parts = found.setdefault(name, [])

@@ -7,8 +7,6 @@ from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.neuro.shared import find_keys
 from eigenshape.io.formats.numbers import lines_of, number_table, wholes
 
-COLUMNS = "number, kind, x, y, z, radius, parent"
-
 
 def parse(
     data: bytes,
@@ -20,15 +18,13 @@ def parse(
     """
     rows = [(line, words.split()) for line, words in lines_of(data)]
     # Radii are not read: skeletons have nan where none was measured.
-    chosen = [
-        (line, b" ".join([words[0], *words[2:5], words[6]]) if len(words) > 6 else b"")
-        for line, words in rows
-    ]
-    table = number_table(chosen)
-    if table is None:
-        bad = next((row for row in chosen if number_table([row]) is None), (1, b""))
+    table = number_table(
+        [(line, b" ".join([*words[:1], *words[2:5], *words[6:7]])) for line, words in rows]
+    )
+    if table is None or table.shape[1] != 5:
         raise FileFormatError(
-            f"An SWC file must have rows of seven numbers: {COLUMNS}; line {bad[0]} has another one."
+            "An SWC file must have rows of seven numbers: number, kind, x, y, z, radius, parent; "
+            f"the first is {b' '.join(rows[0][1])[:60] if rows else b''!r}."
         )
     numbers = wholes(table[:, 0], "Numbers of an SWC file")
     parents = wholes(table[:, 4], "Parents of an SWC file")
