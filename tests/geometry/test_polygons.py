@@ -142,3 +142,9 @@ def test_polygons_that_cross_themselves_are_refused_by_number(outline):
 
 def test_corners_in_the_order_of_the_outline_are_what_the_error_asks_for():
     assert areas(BOW, np.array([0, 2, 1, 3])[cut([BOW[i] for i in (0, 2, 1, 3)])]).sum() == 1.5
+
+
+def test_equally_good_corners_are_cut_in_the_order_of_the_file():
+    turned = np.array(COMB) @ [[0.6, 0.8], [-0.8, 0.6]]  # whose last digits differ
+    assert (cut(COMB) == cut(turned)).all()
+    assert (cut(COMB) == cut(1e-3 * turned + 4.0)).all()

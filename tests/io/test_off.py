@@ -40,10 +40,15 @@ def test_variants_give_the_tetrahedron(text):
 def test_columns_and_colors_that_are_not_read_are_named(tmp_path):
     text = "NCOFF\n3 1 0\n0 0 0 255 0 0 255 0 0 1\n1 0 0 255 0 0 255 0 0 1\n"
     text += "0 1 0 255 0 0 255 0 0 1\n3 0 1 2 .5 .5 .5\n"  # as MeshLab writes it
-    (tmp_path / "a.off").write_text(text)
-    message = r"a\.off: columns of vertices beside x, y and z and colors of faces are not read"
-    with pytest.warns(UserWarning, match=message):
-        assert read_mesh(tmp_path / "a.off").faces.tolist() == [[0, 1, 2]]
+    message = r"a\.off: colors, normals and texture coordinates are not read"
+    for each in (
+        text,
+        text.replace(" .5 .5 .5", ""),
+        "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 9\n",
+    ):
+        (tmp_path / "a.off").write_text(each)
+        with pytest.warns(UserWarning, match=message):
+            assert read_mesh(tmp_path / "a.off").faces.tolist() == [[0, 1, 2]]
 
 
 @pytest.mark.parametrize(

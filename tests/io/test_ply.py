@@ -36,7 +36,7 @@ TEXT_ROWS = """0 0 0 255 0
 7 3 0 1 3 2 0.5 0.5
 7 4 1 2 3 0 1 .5
 """
-WANTED = [[0, 2, 1], [0, 1, 3], [0, 1, 2], [3, 0, 2]]  # the fan of the last would fold
+WANTED = [[0, 2, 1], [0, 1, 3], [0, 1, 2], [0, 2, 3]]  # the fan of the last would fold
 
 
 def binary_rows(order):

@@ -4,6 +4,10 @@ from eigenshape._compile import njit
 
 # Points nearer than this to a line lie on it, up to rounding of their coordinates.
 ROUNDING = 64 * 2.0**-52
+GONE = -2.0  # in place of the shape of a corner
+STEPS = (
+    2.0**20
+)  # from 0 to 1; shapes that agree to a step are equal, so that rounding decides nothing
 
 
 @njit
@@ -14,39 +18,27 @@ def clip_ears(points, before, after, shapes, triangles):
     triangle, and one on a line with its neighbors only where there is no other. `before` and
     `after` hold the neighbors of each corner. `shapes`, filled with -1, holds those of triangles.
     """
-    n_left, at = len(points), 0
     for place in range(len(triangles)):
-        best = _best_corner(shapes, after, at)
+        best = shapes.argmax()
         if shapes[best] <= 0.0:
             # What was in the way of a corner may be gone.
-            for _ in range(n_left):
-                shapes[at] = _shape(points, before, after, at)
-                at = after[at]
-            best = _best_corner(shapes, after, at)
+            for corner in range(len(points)):
+                if shapes[corner] != GONE:
+                    shapes[corner] = _shape(points, before, after, corner)
+            best = shapes.argmax()
         if shapes[best] < 0.0:
             return False
-        at, end = before[best], after[best]
-        triangles[place, 0], triangles[place, 1], triangles[place, 2] = at, best, end
-        after[at], before[end] = end, at
-        shapes[at] = _shape(points, before, after, at)
+        start, end = before[best], after[best]
+        triangles[place, 0], triangles[place, 1], triangles[place, 2] = start, best, end
+        after[start], before[end], shapes[best] = end, start, GONE
+        shapes[start] = _shape(points, before, after, start)
         shapes[end] = _shape(points, before, after, end)
-        n_left -= 1
     return True
 
 
 @njit
-def _best_corner(shapes, after, start):
-    best, at = start, after[start]
-    while at != start:
-        if shapes[at] > shapes[best]:
-            best = at
-        at = after[at]
-    return best
-
-
-@njit
 def _shape(points, before, after, corner):
-    """Return the area of the triangle at a corner over its longest side squared.
+    """Return the area of the triangle at a corner over its longest side squared, in steps from 1.
 
     It is 0 if the triangle has no area, and -1 if it cannot be cut off: the corner turns right, or
     another one is in the triangle or on its sides.
@@ -58,17 +50,13 @@ def _shape(points, before, after, corner):
         return 0.0 if area >= -margin else -1.0
     at = after[after[corner]]
     while at != before[corner]:
-        other = points[at]
-        if (
-            _turn(a, b, other) >= -margin
-            and _turn(b, c, other) >= -margin
-            and _turn(c, a, other) >= -margin
-            # A bridge to a hole has two corners at each of its ends.
-            and other not in (a, b, c)
-        ):
+        d = points[at]
+        nearest = min(_turn(a, b, d), _turn(b, c, d), _turn(c, a, d))
+        # A bridge to a hole has two corners at each of its ends.
+        if nearest >= -margin and d not in (a, b, c):
             return -1.0
         at = after[at]
-    return area / longest**2
+    return max(1.0, round(STEPS * area / longest**2))
 
 
 @njit
@@ -80,10 +68,9 @@ def _turn(a, b, c):
 @njit
 def crosses_itself(points):
     """Return whether two sides of a polygon cross."""
-    n = len(points)
-    for i in range(n):
-        for j in range(i + 2, n):
-            a, b, c, d = points[i], points[i + 1], points[j], points[(j + 1) % n]
+    for i in range(len(points)):
+        for j in range(i):
+            a, b, c, d = points[i - 1], points[i], points[j - 1], points[j]
             if _parts(a, b, c, d) and _parts(c, d, a, b):
                 return True
     return False

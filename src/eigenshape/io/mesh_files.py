@@ -68,9 +68,9 @@ def read_mesh(
     r"""Read a triangle mesh from a file.
 
     Vertices keep their order and are neither merged nor split. The exception is STL, which does not
-    store shared vertices: there, corners with equal coordinates become one vertex. Polygons become
-    fans of triangles around their first corner. Colors, normals, textures and materials come as
-    attributes, if they are requested. The whole file is read into memory.
+    store shared vertices: there, corners with equal coordinates become one vertex. A polygon of k
+    corners, convex or not, becomes k - 2 triangles inside of it. Colors, normals, textures and
+    materials come as attributes, if they are requested. The whole file is read into memory.
 
     Parameters
     ----------
@@ -102,7 +102,8 @@ def read_mesh(
         If the format is unknown, the path is not a regular file, the content differs from what its
         header declares, or it holds no triangles in R³.
     InvalidShapeError
-        If a coordinate is not finite, or a face has an index that is not that of a vertex.
+        If a coordinate is not finite, a face has an index that is not that of a vertex, or a
+        polygon crosses itself.
     InvalidParameterError
         If `cells` is unknown.
     OSError

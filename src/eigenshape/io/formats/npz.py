@@ -3,11 +3,10 @@
 from io import BytesIO
 
 import numpy as np
-from jaxtyping import Bool, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cells import CellLists, Cells
+from eigenshape.io.formats.cells import Cells, list_corners
 from eigenshape.io.formats.numbers import require_reasonable
 
 VERTEX_FIELD, FACE_FIELD = "vertex_", "face_"  # how the names of functions begin
@@ -15,7 +14,7 @@ Arrays = dict[str, np.ndarray]
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray | Cells]:
-    """Read vertices and faces of a .npz file. Rows of polygons may end in -1."""
+    """Read vertices and faces of a .npz file, where all faces have equally many corners."""
     arrays = _read_arrays(data)
     missing = {"vertices", "faces"} - arrays.keys()
     if missing:
@@ -31,26 +30,12 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray | Cells]:
     ):
         raise FileFormatError(
             "A .npz file of a mesh must hold vertices (n, 3) of numbers and faces (f, 3), or (f, k) of "
-            "polygons that may end in -1, of whole numbers; they are "
-            f"{vertices.shape} {vertices.dtype} and {faces.shape} {faces.dtype}."
+            f"polygons, of whole numbers; they are {vertices.shape} {vertices.dtype} and {faces.shape} {faces.dtype}."
         )
     vertices, faces = vertices.astype(np.float64), faces.astype(np.int64)
     if faces.shape[1] in (2, 3):
         return vertices, faces
-    is_corner = _are_corners(faces)
-    lengths = is_corner.sum(axis=1)
-    short = np.flatnonzero(lengths < 3)
-    if short.size:
-        raise FileFormatError(
-            f"A face must have three corners or more; face {short[0]} is {faces[short[0]].tolist()}."
-        )
-    starts = np.concatenate([[0], np.cumsum(lengths)])
-    return vertices, {"polygons": CellLists(starts, faces[is_corner])}
-
-
-def _are_corners(faces: Int[np.ndarray, "f k"]) -> Bool[np.ndarray, "f k"]:
-    """Return which entries of rows are corners, and not one of the -1 at the end."""
-    return np.logical_or.accumulate(faces[:, ::-1] != -1, axis=1)[:, ::-1]
+    return vertices, {"polygons": list_corners(faces)}
 
 
 def _read_arrays(data: bytes) -> Arrays:
@@ -70,14 +55,14 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     """Return the functions on vertices and those on faces, by name: of polygons on their triangles."""
     of_vertices, of_faces = Arrays(), Arrays()
     arrays = _read_arrays(data)
-    faces = arrays.get("faces", np.empty(0))
+    shape = arrays.get("faces", np.empty(0)).shape
     for name, array in arrays.items():
         if name.startswith(VERTEX_FIELD):
             of_vertices[name.removeprefix(VERTEX_FIELD)] = array
         elif name.startswith(FACE_FIELD):
-            is_of_polygons = faces.ndim == 2 and faces.shape[1] > 3 and len(array) == len(faces)
-            counts = _are_corners(faces).sum(axis=1) - 2 if is_of_polygons else 1
-            of_faces[name.removeprefix(FACE_FIELD)] = np.repeat(array, counts, axis=0)
+            are_polygons = len(shape) == 2 and shape[1] > 3 and array.shape[:1] == shape[:1]
+            values = np.repeat(array, shape[1] - 2, axis=0) if are_polygons else array
+            of_faces[name.removeprefix(FACE_FIELD)] = values
     return of_vertices, of_faces
 
 

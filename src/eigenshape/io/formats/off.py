@@ -71,10 +71,9 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
             )
     vertices = coordinates(rows[:n_vertices])
     faces = _faces(rows[n_vertices:])
-    lost = ["columns of vertices beside x, y and z"] if max(widths, default=3) > 3 else []
     n_words = sum(len(text.split()) for _, text in rows[n_vertices:])
-    lost += ["colors of faces"] if n_words > len(faces) + sum(map(len, faces)) else []
-    notes = [f"{' and '.join(lost)} are not read"] if lost else []
+    has_more = max(widths, default=3) > 3 or n_words > len(faces) + sum(map(len, faces))
+    notes = ["colors, normals and texture coordinates are not read"] if has_more else []
     return vertices, polygon_triangles(vertices, faces), *notes
 
 
