@@ -30,7 +30,7 @@ Fields = dict[str, np.ndarray]
 def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLike]) -> None:
     """Write a mesh with functions on its vertices and faces, or functions on its vertices alone.
 
-    .vtu, .vtk, .npz and .gii hold the mesh, too. .func.gii, .shape.gii, .label.gii, .dscalar.nii,
+    .vtu, .vtp, .vtk, .npz and .gii hold the mesh, too. .func.gii, .shape.gii, .label.gii, .dscalar.nii,
     .curv, .mgh and .mgz hold functions on vertices alone, as Connectome Workbench and FreeSurfer
     keep them; a path such as lh.thickness is a file in .curv. Those and .gii hold numbers of 32
     bits. In .dscalar.nii, the name of a function begins with its hemisphere, as in

@@ -52,7 +52,8 @@ class Format:
         - "attributes": the file holds more than positions and faces. The module whose name ends in
           ``_attributes`` has `read_attributes(source, mesh)`, and `write(job)`, which returns the
           files to write.
-        - "fields": `parse_fields(data)` returns the functions on points and those on cells;
+        - "fields": `parse_fields(data)` returns the functions on points, those on the simplices that
+          are read, and notes, as `parse` does;
           `format_fields(mesh, of_points, of_cells)` writes them with the mesh.
         - "maps": the file holds functions on vertices and no mesh. `parse_fields(data)` returns them and
           an empty dictionary; `format_maps(mesh, of_points, suffix)` writes those of a mesh.
