@@ -21,7 +21,6 @@ from eigenshape.io.formats.vtk_cells import (
     VtkShape,
     fit_fields,
     other_dataset,
-    require_joined,
     sort_cells,
     surface_lists,
 )
@@ -76,8 +75,6 @@ def _read(data: bytes) -> tuple[VtkShape, Cursor]:
     points = held.pop(b"POINTS")
     if dataset == b"POLYDATA":
         of_types = {kind: held[name] for kind, name in OF_SURFACES.items() if name in held}
-        for cells in of_types.values():
-            require_joined(cells, len(points))
         shape = sort_cells(points, *surface_lists(of_types))
         polygons = shape.cells.get("polygons")
         if polygons and "triangles" not in shape.cells and (polygons.lengths == 4).all():
@@ -95,7 +92,6 @@ def _read(data: bytes) -> tuple[VtkShape, Cursor]:
         raise FileFormatError(
             f"Each cell of a VTK file must have a type; it has {n_cells} cells, {len(types)} types."
         )
-    require_joined(cells, len(points))
     return sort_cells(points, cells, types), cursor
 
 

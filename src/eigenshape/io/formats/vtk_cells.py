@@ -101,6 +101,7 @@ def sort_cells(
             "Cells of a VTK file must be simplices, polygons, strips, polylines, hexahedra, voxels, "
             f"wedges or pyramids; it holds {', '.join(others)}.{VTK_REMEDY}"
         )
+    require_joined(lists, len(points))
     n_cells = len(types)
     lists, middles, notes = _straighten(lists, types)
     kept = np.delete(np.arange(len(points)), middles)
