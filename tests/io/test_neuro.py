@@ -1,6 +1,7 @@
 """Files of brains and neurons, beside nibabel: what we read and write is what it writes and reads, to the last bit."""
 
 import base64
+import contextlib
 import gzip
 import re
 from importlib import resources
@@ -403,6 +404,32 @@ def test_a_skeleton_is_a_graph(tmp_path):
     assert es.solve_spectrum(es.cotangent_laplacian(shape), 2).eigenvalues[0] < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("data", "segments", "note"),
+    [
+        (b"0 0 0 0 -5 nan -1\n1 6 0 0 5 NaN 0\n", [[1, 0]], None),  # of skeletor
+        (b"5 1 0 0 0 1 9\n9 1 1 0 0 1 -1\n", [[0, 1]], None),  # the parent comes later
+        (
+            b"1 1 0 0 0 1 -1 7\n2 1 1 0 0 1 1 8\n",
+            [[1, 0]],
+            "columns after the seventh were left out",
+        ),
+        (
+            b"1 1 0 0 0 1 1\n2 1 1 0 0 1 1\n",
+            [[1, 0]],
+            r"were read as roots; point 1 is one \(1 such\)",
+        ),
+    ],
+)
+def test_skeletons_of_other_programs(tmp_path, data, segments, note):
+    path = tmp_path / "a.swc"
+    path.write_bytes(data)
+    with (
+        pytest.warns(UserWarning, match=rf"a\.swc: .*{note}") if note else contextlib.nullcontext()
+    ):
+        assert es.read_shape(path).simplices.tolist() == segments
+
+
 # Volumes.
 
 
@@ -629,7 +656,12 @@ def words(start, *values):
             CIFTI.replace(b"BrainModel", b"BrainNodel"),
             "functions on brain models",
         ),
-        (swc.parse, b"1 1 0 0 0 2.0\n", "rows of seven numbers"),
+        (
+            swc.parse,
+            b"# a\n1 1 0 0 0 2.0\n",
+            "rows of seven numbers.*; the first is b'1 1 0 0 0 2.0'",
+        ),
+        (swc.parse, b"1 1 0 x 0 2.0 -1\n", "rows of seven numbers.*; the first is b'1 1 0 x"),
         (swc.parse, b"", "rows of seven numbers"),
         (swc.parse, SKELETON.replace(b"7 3", b"2 3"), "must differ; 2 occurs twice"),
         (swc.parse, SKELETON.replace(b"0.5 2", b"0.5 4"), "that of point 9 is 4"),

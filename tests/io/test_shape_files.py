@@ -116,15 +116,6 @@ def test_solids_are_split_into_tetrahedra(tmp_path, suffix):
         read_shape(inverted)
 
 
-def test_other_cells_are_named(tmp_path):
-    path = written(tmp_path / "a.vtk", CUBE.points[:6], [("triangle6", [[0, 1, 2, 3, 4, 5]])])
-    with pytest.raises(
-        FileFormatError,
-        match=r"hexahedra, wedges or pyramids; it holds quadratic triangle\. Save it with those",
-    ):
-        read_shape(path)
-
-
 POLYDATA = {
     "text": b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0\n1 1 0 2 1 5\n"
     b"LINES 2 7\n2 0 1\n3 1 2 3\nPOINT_DATA 4\nSCALARS a float\n",
@@ -161,7 +152,7 @@ def test_polygons_become_triangles(tmp_path):
     [
         (
             (b"LINES 2 7\n2 0 1", b"LINES 2 7\n9 0 1"),
-            "Cells of a VTK file must fill 7 numbers; cell 0 of 2 does not",
+            "A VTK file must hold 2 cells in 7 numbers; 1 cells take 10",
         ),
         ((b"POINTS 4 float", b"POINTS 4000 float"), "12000 items at byte .* do not fit into its"),
         ((b"POINTS 4 float", b"POINTS 8 float"), "A VTK file must hold 24 numbers at byte"),
@@ -171,7 +162,7 @@ def test_polygons_become_triangles(tmp_path):
         ),
         (
             (b"LINES 2 7", b"LINES two 7"),
-            "A VTK file must count its cells by whole numbers; it says b'two'",
+            "A VTK file must count what it holds by whole numbers; it says b'two'",
         ),
         (
             (b"LINES 2 7\n2 0 1\n3 1 2 3\nPOINT_DATA 4\nSCALARS a float\n", b"LINES 2 9\n2 0"),
@@ -179,9 +170,9 @@ def test_polygons_become_triangles(tmp_path):
         ),
         (
             (b"LINES", b"TRIANGLE_STRIPS"),
-            "A cell of TRIANGLE_STRIPS must have 3 points or more; cell 0 has 2",
+            "A VTK cell of type 6 must have 3 points or more; cell 0 has 2",
         ),
-        ((b"3 1 2 3", b"3 1 2 9"), r"simplices must index points 0\.\.3; simplex 2 is \[2, 9\]"),
+        ((b"3 1 2 3", b"3 1 2 9"), "must join its 4 points, counted from 0; cell 1 joins point 9"),
     ],
 )
 def test_broken_polydata_is_named(tmp_path, change, match):

@@ -1,5 +1,6 @@
 """Functions on vertices and faces, in files of a mesh such as .vtu, or without one such as .func.gii."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +31,7 @@ Fields = dict[str, np.ndarray]
 def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLike]) -> None:
     """Write a mesh with functions on its vertices and faces, or functions on its vertices alone.
 
-    .vtu, .vtk, .npz and .gii hold the mesh, too. .func.gii, .shape.gii, .label.gii, .dscalar.nii,
+    .vtu, .vtp, .vtk, .npz and .gii hold the mesh, too. .func.gii, .shape.gii, .label.gii, .dscalar.nii,
     .curv, .mgh and .mgz hold functions on vertices alone, as Connectome Workbench and FreeSurfer
     keep them; a path such as lh.thickness is a file in .curv. Those and .gii hold numbers of 32
     bits. In .dscalar.nii, the name of a function begins with its hemisphere, as in
@@ -183,7 +184,9 @@ def read_fields(path: str | Path) -> Fields:
 
 def _parse_fields(source: SourceFile) -> Fields:
     with naming(source.path):
-        of_vertices, of_faces = format_of(source.suffix).load().parse_fields(source.data)
+        of_vertices, of_faces, *notes = format_of(source.suffix).load().parse_fields(source.data)
+    for note in notes:
+        warnings.warn(f"{source.path}: {note}", stacklevel=3)
     found = dict(of_vertices)
     for name, values in of_faces.items():
         found[f"face_{name}" if name in found else name] = values

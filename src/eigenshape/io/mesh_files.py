@@ -98,7 +98,7 @@ def read_mesh(
         raise an error.
     attributes : bool
         Whether to return also what the file holds besides: texture coordinates, materials, images,
-        colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTK, NPZ and GIFTI files hold such content.
+        colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTP, VTK, NPZ and GIFTI files hold such content.
 
     Returns
     -------

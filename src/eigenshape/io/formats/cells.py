@@ -26,16 +26,42 @@ SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
 # Largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7.
 FLAT = 1e-6
 
-VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, QUAD, TETRAHEDRON = 1, 2, 3, 4, 5, 9, 10
-HEXAHEDRON, WEDGE, PYRAMID = 12, 13, 14
-VTK_KINDS = {
-    LINE: SEGMENTS, TRIANGLE: "triangles", QUAD: "quads", TETRAHEDRON: "tetrahedra",
-    HEXAHEDRON: "hexahedra", WEDGE: "wedges", PYRAMID: "pyramids",
-}  # fmt: skip
-VTK_NAMES = {
-    6: "triangle strip", 7: "polygon", 8: "pixel", 11: "voxel",
-    21: "quadratic edge", 22: "quadratic triangle", 23: "quadratic quad", 24: "quadratic tetrahedron", 42: "polyhedron",
-}  # fmt: skip
+
+@dataclass(frozen=True)
+class CellLists:
+    """Lists of points of varying length: list i is corners[starts[i] : starts[i + 1]]."""
+
+    starts: Int[np.ndarray, " c1"]
+    corners: Int[np.ndarray, " k"]
+
+    @property
+    def lengths(self) -> Int[np.ndarray, " c"]:
+        """Number of points of each list."""
+        return np.diff(self.starts)
+
+    def rows(self, chosen: Int[np.ndarray, " s"], length: int) -> Int[np.ndarray, "s length"]:
+        """Return lists of equal length as rows."""
+        return self.corners[self.starts[chosen][:, None] + np.arange(length)]
+
+    def take(self, chosen: Int[np.ndarray, " s"]) -> "CellLists":
+        """Return the chosen lists."""
+        lengths = self.lengths[chosen]
+        ends = np.cumsum(lengths)
+        places = np.arange(lengths.sum()) + np.repeat(self.starts[chosen] - ends + lengths, lengths)
+        return CellLists(np.concatenate([[0], ends]), self.corners[places])
+
+    def pairs(self) -> Int[np.ndarray, "p 2"]:
+        """Return the pairs of successive points in each list."""
+        owner = np.repeat(np.arange(len(self.lengths)), self.lengths)
+        follows = owner[1:] == owner[:-1]
+        return np.column_stack([self.corners[:-1][follows], self.corners[1:][follows]])
+
+    @staticmethod
+    def join(parts: Sequence["CellLists"]) -> "CellLists":
+        """Return the lists of all parts, one after the other."""
+        lengths = [np.zeros(1, dtype=np.int64), *(part.lengths for part in parts)]
+        corners = [np.zeros(0, dtype=np.int64), *(part.corners for part in parts)]
+        return CellLists(np.cumsum(np.concatenate(lengths)), np.concatenate(corners))
 
 
 def require_kind(cells: str | None) -> CellKind | None:
@@ -164,49 +190,6 @@ def polygon_triangles(
     return triangulate_polygons(points, lists.starts, lists.corners)[0]
 
 
-def strip_triangles(strips: Sequence[Int[np.ndarray, " _"]]) -> Int[np.ndarray, "f 3"]:
-    """Split strips into triangles, every second one reversed so that all agree.
-
-    A strip changes its direction by a repeated point. The triangles without area that result from
-    this are left out.
-    """
-    pieces = [np.empty((0, 3), dtype=np.int64)]
-    for corners in strips:
-        triangles = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
-        triangles[1::2] = triangles[1::2, [1, 0, 2]]
-        pieces.append(triangles)
-    found = np.concatenate(pieces).astype(np.int64)
-    first, second, third = found.T
-    return found[(first != second) & (second != third) & (third != first)]
-
-
-@dataclass(frozen=True)
-class CellLists:
-    """Lists of points of varying length: list i is corners[starts[i] : starts[i + 1]]."""
-
-    starts: Int[np.ndarray, " c1"]
-    corners: Int[np.ndarray, " k"]
-
-    @property
-    def lengths(self) -> Int[np.ndarray, " c"]:
-        """Number of points of each list."""
-        return np.diff(self.starts)
-
-    def rows(self, chosen: Int[np.ndarray, " s"], length: int) -> Int[np.ndarray, "s length"]:
-        """Return lists of equal length as rows."""
-        return self.corners[self.starts[chosen][:, None] + np.arange(length)]
-
-    def split(self) -> list[Int[np.ndarray, " _"]]:
-        """Return all lists, one by one."""
-        return np.split(self.corners, self.starts[1:-1])
-
-    def pairs(self, chosen: Int[np.ndarray, " s"]) -> Int[np.ndarray, "p 2"]:
-        """Return the pairs of successive points in lists."""
-        owner = np.repeat(np.arange(len(self.lengths)), self.lengths)
-        follows = (owner[1:] == owner[:-1]) & np.isin(owner[1:], chosen)
-        return np.column_stack([self.corners[:-1][follows], self.corners[1:][follows]])
-
-
 def list_corners(lists: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> CellLists:
     """Put lists of corners, or rows of a table, one behind the other."""
     starts = np.cumsum([0, *map(len, lists)])
@@ -215,34 +198,20 @@ def list_corners(lists: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> Cel
     return CellLists(starts, np.array([*chain.from_iterable(lists)]).astype(np.int64))
 
 
-def cells_of_types(lists: CellLists, types: Int[np.ndarray, " c"]) -> Cells:
-    """Sort cells by their kind; ignore cells that are points.
+def strip_triangles(
+    strips: CellLists,
+) -> tuple[Int[np.ndarray, "f 3"], Int[np.ndarray, " f"]]:
+    """Split strips into triangles, every second one reversed so that all agree, and name their strips.
 
-    Raise FileFormatError if a cell has another type, or its number of corners does not match its
-    type.
+    A strip changes its direction by a repeated point. The triangles without area that result from
+    this are left out.
     """
-    others = np.setdiff1d(types, [VERTEX, POLY_VERTEX, POLYLINE, *VTK_KINDS])
-    if others.size:
-        named = ", ".join(VTK_NAMES.get(int(kind), f"VTK's type {kind}") for kind in others)
-        raise FileFormatError(
-            "Cells of a VTK file must be simplices, quads, polylines, hexahedra, wedges or pyramids; "
-            f"it holds {named}. Save it with those."
-        )
-    blocks = {}
-    for kind, name in VTK_KINDS.items():
-        length = N_CORNERS[name]
-        chosen = np.flatnonzero(types == kind)
-        wrong = chosen[lists.lengths[chosen] != length]
-        if wrong.size:
-            count = lists.lengths[wrong[0]]
-            raise FileFormatError(
-                f"A VTK cell of type {kind} must have {length} corners; cell {wrong[0]} has {count}."
-            )
-        if chosen.size:
-            blocks[name] = lists.rows(chosen, length)
-    polylines = np.flatnonzero(types == POLYLINE)
-    if polylines.size:
-        blocks[SEGMENTS] = np.concatenate(
-            [blocks.get(SEGMENTS, np.empty((0, 2), int)), lists.pairs(polylines)]
-        )
-    return blocks
+    counts = (strips.lengths - 2).clip(0)
+    owners = np.repeat(np.arange(len(counts)), counts)
+    steps = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)  # in the strip
+    odd = steps % 2
+    first = strips.starts[owners] + steps
+    triangles = strips.corners[np.column_stack([first + odd, first + 1 - odd, first + 2])]
+    one, two, three = triangles.T
+    is_real = (one != two) & (two != three) & (three != one)
+    return triangles[is_real], owners[is_real]

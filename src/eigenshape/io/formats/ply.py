@@ -11,7 +11,12 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cells import NO_TRIANGLES, polygon_triangles, strip_triangles
+from eigenshape.io.formats.cells import (
+    NO_TRIANGLES,
+    list_corners,
+    polygon_triangles,
+    strip_triangles,
+)
 from eigenshape.io.formats.numbers import (
     Line,
     lines_of,
@@ -97,7 +102,8 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
     for strip in read_lists(tables, "tristrips"):
         corners = np.asarray(strip, dtype=np.int64)
         pieces = np.split(corners, np.flatnonzero(corners == -1))  # -1 separates strips
-        triangles.append(strip_triangles([piece[piece != -1] for piece in pieces]))
+        strips = list_corners([piece[piece != -1].tolist() for piece in pieces])
+        triangles.append(strip_triangles(strips)[0])
     others = [name for name in tables if len(read_lists(tables, name))]
     notes = [
         f"the element {name}, which has {CORNERS[0]}, is not read"

@@ -55,7 +55,8 @@ class Format:
         - "attributes": the file holds more than positions and faces. The module whose name ends in
           ``_attributes`` has `read_attributes(source, mesh)`, and `write(job)`, which returns the
           files to write.
-        - "fields": `parse_fields(data)` returns the functions on points and those on cells;
+        - "fields": `parse_fields(data)` returns the functions on points, those on the simplices that
+          are read, and notes, as `parse` does;
           `format_fields(mesh, of_points, of_cells)` writes them with the mesh.
         - "maps": the file holds functions on vertices and no mesh. `parse_fields(data)` returns them and
           an empty dictionary; `format_maps(mesh, of_points, suffix)` writes those of a mesh.
@@ -88,6 +89,7 @@ FORMATS = (
     Format(".glb", "gltf", ("cells", "binary", "colors", "attributes", "upright")),
     Format(".gltf", "gltf", ("cells", "attributes", "beside", "upright")),
     Format(".vtu", "vtu", ("cells", "binary", "fields")),
+    Format(".vtp", "vtp", ("cells", "binary", "fields")),
     Format(".vtk", "vtk", ("cells", "binary", "fields")),
     Format(".npz", "npz", ("cells", "binary", "fields")),
     Format(".gii", "neuro.gifti", ("cells", "binary", "fields", "single")),
@@ -118,6 +120,9 @@ FORMATS = (
 SIGNATURES = {b"\xff\xff\xfe": ".surf", b"\xff\xff\xff": ".curv"}
 HEMISPHERES = ("lh.", "rh.")
 GZ = ".gz"  # after the suffix of any format: the file is unpacked when it is read
+
+OTHER_VTK = (".vti", ".vtr", ".vts", ".vtm", ".vtmb", ".pvtu", ".pvtp", ".vtkhdf")
+VTK_REMEDY = ' In PyVista, pyvista.read(path).extract_surface().save("a.vtp") writes the surface.'
 
 
 def suffixes_with(*traits: Trait) -> tuple[str, ...]:
@@ -192,6 +197,7 @@ def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> st
         remedies = {
             MAP_FORMATS: " es.io.read_fields reads the functions in it.",
             PARCEL_FORMATS: " es.io.read_parcellation reads the parcels in it.",
+            OTHER_VTK: VTK_REMEDY,
             VOLUME_FORMATS: " es.io.read_volume reads the volume in it.",
         }
         remedy = next((text for kind, text in remedies.items() if suffix in kind), "")
