@@ -261,7 +261,7 @@ def place_triangles(gltf: Gltf, name: str | int | None = None) -> Scene:
         gltf.require_few(total)  # before any copy is made
         placed.append(_copy_piece(piece, place.copies))
     shown = {place.mesh for place in placements.values()}
-    parts = [part for index in shown for part in gltf.entry("meshes", index)["primitives"]]
+    parts = [part for n in shown for part in _list(gltf.entry("meshes", n), "primitives")]
     if n_others := sum(part.get("mode", TRIANGLES) not in SURFACES for part in parts):
         gltf.notes.append(f"{n_others} primitives of points or lines are left out")
     n_faces = [len(piece.faces) for piece in placed]
