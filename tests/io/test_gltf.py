@@ -121,7 +121,7 @@ def test_any_changed_bytes(tmp_path_factory, data):
     for _ in range(data.draw(st.integers(1, 6))):
         bad[data.draw(st.integers(0, len(bad) - 1))] = data.draw(st.integers(0, 255))
     try:
-        vertices, faces = parse(bytes(bad), folder)
+        vertices, faces = parse(bytes(bad), folder)[:2]
     except (EigenshapeError, OSError):
         return
     assert vertices.shape[1] == faces.shape[1] == 3

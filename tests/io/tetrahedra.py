@@ -78,4 +78,4 @@ FILES = {
 
 def read(parse, data):
     """Read bytes as a file would be read."""
-    return TriangleMesh(*parse(data))
+    return TriangleMesh(*parse(data)[:2])  # what follows are notes
