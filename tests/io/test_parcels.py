@@ -166,7 +166,10 @@ def test_more_vertices_than_a_header_of_nifti_holds(tmp_path):
 def test_a_volume_is_no_function_on_vertices(tmp_path):
     image = nib.Nifti1Image(np.ones((2, 3, 4), np.int16), np.eye(4))
     image.to_filename(tmp_path / "a.nii")
-    with pytest.raises(FileFormatError, match=r"must be n x 1 x 1, .*it has \[2, 3, 4\]"):
+    with pytest.raises(
+        FileFormatError,
+        match=r"A NIfTI file of functions on vertices must be n x 1 x 1, .*it has \[2, 3, 4\]",
+    ):
         read_fields(tmp_path / "a.nii")
     assert read_volume(tmp_path / "a.nii")[0].shape == (2, 3, 4)
     with pytest.raises(FileFormatError, match=r"are only read. Write .mgh"):

@@ -106,11 +106,11 @@ FORMATS = (
     Format(".dscalar.nii", "neuro.cifti", ("maps",)),
     Format(".dtseries.nii", "neuro.cifti", ("maps",)),
     Format(".dlabel.nii", "neuro.cifti", ("maps", "parcels")),
+    Format(".nii", "neuro.nifti", ("maps", "volume")),
+    Format(".nii.gz", "neuro.nifti", ("maps", "volume")),
     Format(".curv", "neuro.freesurfer", ("maps",)),
     Format(".mgh", "neuro.freesurfer", ("maps", "volume")),
     Format(".mgz", "neuro.freesurfer", ("maps", "volume")),
-    Format(".nii", "neuro.nifti", ("maps", "volume")),
-    Format(".nii.gz", "neuro.nifti", ("maps", "volume")),
     Format(".annot", "neuro.annotations", ("parcels",)),
     Format(".label", "neuro.annotations", ("parcels",)),
 )

@@ -18,11 +18,9 @@ from eigenshape.io.formats.neuro.shared import (
 )
 from eigenshape.io.formats.numbers import require_reasonable
 
-HEADERS = {
-    348: "Nifti1Image",
-    540: "Nifti2Image",
-}  # sizes, which files begin with, and classes of nibabel
-LONGEST_HEADER = 540
+# Sizes of headers, which files begin with, and classes of nibabel
+HEADERS = {348: "Nifti1Image", 540: "Nifti2Image"}
+LONGEST_HEADER = 540  # bytes
 MOST_BEFORE = 2**20  # bytes of notes between the header and the numbers
 
 
@@ -90,13 +88,13 @@ def _load(data: bytes, *, is_volume: bool) -> tuple[np.ndarray, np.ndarray]:
     # nibabel returns the number of vertices that FreeSurfer stores elsewhere if 16 bits are too few.
     axes, bits = list(header.get_data_shape()), int(header["bitpix"])
     if is_volume:
-        rule = "A volume must have three axes and one frame"
+        rule = "a volume must have three axes and one frame"
         fits = len(axes) >= 3 and max(axes[3:], default=1) == 1
     else:
-        rule = "Functions on vertices must be n x 1 x 1, or that and frames"
+        rule = "functions on vertices must be n x 1 x 1, or that and frames"
         fits = count_vertices([*axes, 1, 1, 1][:3]) > 0
     if not fits or min(axes) < 1 or bits < 1:
-        raise FileFormatError(f"{rule}; it has {axes}, of {bits} bits each.")
+        raise FileFormatError(f"A NIfTI file of {rule}; it has {axes}, of {bits} bits each.")
     size = math.prod(axes) * bits // 8
     if packed:
         require_reasonable(size, len(data), VOLUME_SIZE)
