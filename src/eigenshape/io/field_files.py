@@ -80,13 +80,11 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     replace_file(path, format_fields(mesh, suffix, fields, structure_named(mesh, path, suffix)))
 
 
-def structure_named(mesh: Mesh, path: Path, suffix: str, source: SourceFile | None = None) -> str:
-    """Return the structure that a GIFTI source names, or CortexLeft or CortexRight by the name of the new file.
+def structure_named(mesh: Mesh, path: Path, suffix: str) -> str:
+    """Return CortexLeft or CortexRight by the name of a file that is to be written.
 
     Raise FileFormatError if the surface lies on the other side than the name says.
     """
-    if source is not None and source.suffix == ".gii":
-        return str(format_of(".gii").load().structure_of(source.data))
     if suffix not in (".gii", *MAP_FORMATS) or not isinstance(mesh, TriangleMesh):
         return ""
     side = side_of_file(mesh, path.name)
@@ -144,7 +142,8 @@ def read_fields(path: str | Path) -> Fields:
     ----------
     path : str or Path
         A file such as `write_fields` writes; also lh.thickness and other files of FreeSurfer
-        without a suffix.
+        without a suffix, and functions on vertices that are stored as a volume of n x 1 x 1 voxels
+        in .nii.
 
     Returns
     -------
@@ -184,7 +183,8 @@ def read_fields(path: str | Path) -> Fields:
 
 def _parse_fields(source: SourceFile) -> Fields:
     with naming(source.path):
-        of_vertices, of_faces, *notes = format_of(source.suffix).load().parse_fields(source.data)
+        module = format_of(source.suffix).load()
+        of_vertices, of_faces, *notes = module.parse_fields(source.data, **source.options)
     for note in notes:
         warnings.warn(f"{source.path}: {note}", stacklevel=3)
     found = dict(of_vertices)

@@ -3,7 +3,7 @@
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Literal, overload
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -24,7 +24,7 @@ from eigenshape.io.attributes import (
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.field_files import format_fields, read_field_attributes, structure_named
+from eigenshape.io.field_files import format_fields, read_field_attributes
 from eigenshape.io.formats.cells import SEGMENTS, require_kind, select_cells, split_sentence
 from eigenshape.io.formats.registry import (
     MESH_FORMATS,
@@ -98,7 +98,8 @@ def read_mesh(
         raise an error.
     attributes : bool
         Whether to return also what the file holds besides: texture coordinates, materials, images,
-        colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTP, VTK, NPZ and GIFTI files hold such content.
+        colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTP, VTK, NPZ, GIFTI and FreeSurfer files
+        hold such content.
 
     Returns
     -------
@@ -171,7 +172,7 @@ def parse_file(
         If hexahedra, wedges or pyramids were split, or the format's `parse` returned notes.
     """
     known = format_of(source.suffix)
-    options: dict[str, Any] = {"folder": source.folder} if "beside" in known.traits else {}
+    options = source.options
     if "scenes" in known.traits:
         options["scene"] = source.scene
     elif source.scene is not None:
@@ -386,8 +387,7 @@ def save_mesh(
             files = known.load("_attributes").write(job)
         elif "fields" in known.traits:
             job.lose([kind for kind in held.contents if kind != "fields"])
-            structure = structure_named(mesh, path, suffix, held.source)
-            files = {path: format_fields(mesh, suffix, held.fields, structure)}
+            files = {path: format_fields(mesh, suffix, held.fields)}
         else:
             job.lose(held.contents)
             module = known.load()

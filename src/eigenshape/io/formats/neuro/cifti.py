@@ -75,7 +75,7 @@ def _parse(data: bytes) -> tuple[Any, Arrays]:
     return maps, found
 
 
-def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
+def parse_parcels(data: bytes, mesh: TriangleMesh) -> tuple[Parcellation]:
     """Return the parcellation of the hemisphere that a mesh is of; the label named ??? is no parcel.
 
     Raise FileFormatError if the file does not hold one function of labels on that hemisphere.
@@ -101,7 +101,8 @@ def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
             f"Labels of a CIFTI file must stand in its table; that of vertex {odd[0]} is "
             f"{labels[odd[0]]:g} ({odd.size} such)."
         )
-    return Parcellation(places, tuple(name for _, name, _ in rows), [color for *_, color in rows])
+    names, colors = tuple(name for _, name, _ in rows), [color for *_, color in rows]
+    return (Parcellation(places, names, colors),)
 
 
 def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) -> bytes:
