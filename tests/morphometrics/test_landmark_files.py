@@ -356,7 +356,9 @@ def test_a_folder_of_landmarks_is_read_at_once(tmp_path):
     assert list(found) == ["b", "left/a"]
     np.testing.assert_array_equal(found["left/a"].points, some_points(1))
     es.morphometrics.write_landmarks(specimen(0), tmp_path / "b.fcsv")
-    with pytest.raises(es.FileFormatError, match="must have one file of landmarks; 'b' has two"):
+    with pytest.raises(
+        es.InvalidParameterError, match="must have one file of landmarks; 'b' has two"
+    ):
         es.morphometrics.read_specimens(tmp_path)
     (tmp_path / "b.fcsv").write_text("1,4,5,6,0,0,0,1,1,1,0,nose,,\n")
     (tmp_path / "b.mrk.json").unlink()

@@ -150,7 +150,7 @@ def read_specimens(path: str | Path, *, unit: str = UNIT) -> dict[str, Landmarks
         If the file does not follow its format, is cut off, or its specimens have different
         landmarks, or a folder holds no landmarks.
     InvalidParameterError
-        If the unit is unknown.
+        If the unit is unknown, or a specimen has two files in a folder.
 
     See Also
     --------
@@ -181,7 +181,7 @@ def read_specimens(path: str | Path, *, unit: str = UNIT) -> dict[str, Landmarks
 def read_folder(folder: Path, unit: str = UNIT, without: Path | None = None) -> Table:
     """Return the landmarks of all files in a folder, but not of those below another one.
 
-    Raise FileFormatError if a specimen has two files, or landmarks of specimens differ.
+    Raise InvalidParameterError if a specimen has two files, or landmarks of specimens differ.
     """
     found: Table = {}
     for path in sorted(folder.rglob("*")):
@@ -197,7 +197,7 @@ def read_folder(folder: Path, unit: str = UNIT, without: Path | None = None) -> 
             specimens = {name: next(iter(specimens.values()))}
         for name, landmarks in specimens.items():
             if name in found:
-                raise FileFormatError(
+                raise InvalidParameterError(
                     f"A specimen must have one file of landmarks; {name!r} has two in {folder}. "
                     "Move one of them elsewhere."
                 )
