@@ -114,8 +114,8 @@ def parse_nts(text: str, stem: str) -> Parsed:
             f"missing values, axes, labels before the numbers; it begins with {lines[0]!r}."
         )
     n_rows, n_columns, n_axes = int(shape[1]), int(shape[3]), int(shape[7])
-    labels = [words[:n_rows] if shape[2] else [], n_columns if shape[4] else 0]
-    numbers = words[len(labels[0]) + labels[1] :]
+    labels = words[:n_rows] if shape[2] else [str(row + 1) for row in range(n_rows)]
+    numbers = words[n_rows * bool(shape[2]) + n_columns * bool(shape[4]) :]
     if len(numbers) != n_rows * n_columns or n_columns % n_axes:
         raise FileFormatError(
             f"there must be {n_rows} times {n_columns} numbers, and {n_axes} for each point; there "
@@ -130,8 +130,7 @@ def parse_nts(text: str, stem: str) -> Parsed:
     notes = (PLANAR,) * (n_axes == 2)
     if n_columns == n_axes:
         return Parsed({stem: numbered(points)}, notes)
-    names = labels[0] or [str(row + 1) for row in range(n_rows)]
-    return Parsed(by_name(names, map(numbered, points.reshape(n_rows, -1, 3))), notes)
+    return Parsed(by_name(labels, map(numbered, points.reshape(n_rows, -1, 3))), notes)
 
 
 def parse_picked_points(text: str, stem: str) -> Parsed:

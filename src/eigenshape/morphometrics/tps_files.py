@@ -27,7 +27,7 @@ class _Rows(NamedTuple):
 
     section: str
     key: str
-    count: str
+    declared: str
     lines: list[str]
 
 
@@ -44,12 +44,12 @@ class _Specimen:
 
     def require_counts(self, name: str) -> None:
         """Raise an error if rows or curves are missing, as at the end of a file that is cut off."""
-        for section, key, count, lines in self.rows:
+        for section, key, declared, lines in self.rows:
             found = len(self.curves()) if key in CURVES else len(lines)
-            if section not in UNREAD and count != str(found):
+            if section not in UNREAD and declared != str(found):
                 raise FileFormatError(
                     f"{key}= must be the number of points or curves below it; {name!r} has "
-                    f"{key}={count}, and there are {found}."
+                    f"{key}={declared}, and there are {found}."
                 )
 
 
