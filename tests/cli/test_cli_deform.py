@@ -13,9 +13,12 @@ from eigenshape.deformation.region import BoxRegion, BrushRegion, region_boundar
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.measure import surface_area
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.resolution.subdivision import subdivide
+from eigenshape.geometry.topology import disjoint_union
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 from eigenshape.shapes.creatures import make_creature
+from eigenshape.shapes.surfaces import icosphere
 
 PNG = b"\x89PNG\r\n\x1a\n"
 QUIET = lambda share, what: None  # noqa: E731
@@ -207,3 +210,33 @@ def test_faces_that_cross_are_pointed_out_with_what_may_help(giraffe):
     folded = run("deform", giraffe, "--region", "y>60%", "--rotate", "x by 170")
     assert hint in folded.stderr
     assert hint not in run("deform", giraffe, "--region", "y>60%", "--rotate", "x by 1").stderr
+
+
+def test_each_patch_turns_about_the_middle_of_its_own_boundary(tmp_path):
+    """Two legs of a table, selected by one box; about a point that is given, they turn as one."""
+    path, edits = tmp_path / "two.ply", tmp_path / "edits.json"
+    ball = icosphere(2)
+    write_mesh(
+        disjoint_union(ball, TriangleMesh(ball.vertices + np.array([3, 0, 0]), ball.faces)), path
+    )
+    for rotation, pivots in (
+        ("x by 30", [[0.0, 0.0], [3.0, 0.0]]),
+        ("x by 30 @ 1.5,0,0", [[1.5, 0.0]]),
+    ):
+        run("deform", path, "--region", "z>0.2", "--rotate", rotation, "--save-edits", edits)
+        moves = json.loads(edits.read_text())["edits"][0]["moves"]
+        found = [move["handle"]["pivot"][:2] for move in moves]
+        np.testing.assert_allclose(sorted(found), pivots, atol=1e-12)
+
+
+def test_an_island_of_a_region_is_named_once(tmp_path):
+    path, region = tmp_path / "ball.ply", tmp_path / "region.txt"
+    ball = icosphere(3)
+    write_mesh(ball, path)
+    top = ball.vertices[:, 2] > 0.5
+    island = np.flatnonzero((ball.vertices[:, 2] > 0.2) & (ball.vertices[:, 2] < 0.25))[0]
+    region.write_text("\n".join(map(str, [*np.flatnonzero(top), island])))
+    words = ["--region", region, "--move", "0,0,0.3"]
+    done = run("deform", path, *words, "--picture", tmp_path / "a.png")
+    assert done.stderr.count("Small patches of a region") == 1
+    assert f"1 vertex at vertex {island} of region 0" in " ".join(done.stderr.split())
