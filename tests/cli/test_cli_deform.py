@@ -240,3 +240,74 @@ def test_an_island_of_a_region_is_named_once(tmp_path):
     done = run("deform", path, *words, "--picture", tmp_path / "a.png")
     assert done.stderr.count("Small patches of a region") == 1
     assert f"1 vertex at vertex {island} of region 0" in " ".join(done.stderr.split())
+
+
+@pytest.fixture(scope="module")
+def textured(tmp_path_factory):
+    """A creature with an image on it, whose vertices are double along the seam at the back."""
+    mesh = make_creature("quadruped", n_vertices=600)
+    x, _, z = (mesh.vertices - mesh.vertices.mean(axis=0)).T
+    u = (np.arctan2(x, z) / (2 * np.pi) + 0.5)[mesh.faces]
+    u += (np.ptp(u, axis=1) > 0.5)[:, None] & (u < 0.5)
+    rows = np.column_stack([mesh.faces.ravel(), u.ravel()])
+    different, faces = np.unique(rows, axis=0, return_inverse=True)
+    vertices = mesh.vertices[different[:, 0].astype(int)]
+    folder = tmp_path_factory.mktemp("textured")
+    (folder / "skin.png").write_bytes(PNG)
+    (folder / "skin.mtl").write_text("newmtl skin\nmap_Kd skin.png\n")
+    lines = ["mtllib skin.mtl", "usemtl skin"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    lines += [
+        f"vt {u!r} {v!r}" for u, v in np.column_stack([different[:, 1], vertices[:, 1]]).tolist()
+    ]
+    lines += ["f " + " ".join(f"{i}/{i}" for i in face) for face in faces.reshape(-1, 3) + 1]
+    path = folder / "character.obj"
+    path.write_text("\n".join(lines) + "\n")
+    assert len(vertices) > mesh.n_vertices
+    return path, mesh.n_vertices
+
+
+def torn(before, after):
+    """Count the places of the file whose corners have come apart."""
+    _, places = np.unique(before.vertices, axis=0, return_inverse=True)
+    corners, where = places.ravel()[before.faces.ravel()], after.vertices[after.faces.ravel()]
+    return sum(len(np.unique(where[corners == place], axis=0)) > 1 for place in np.unique(corners))
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".glb"])
+def test_a_textured_character_does_not_tear_along_its_seams(textured, tmp_path, suffix):
+    path, n_joined = textured
+    if suffix == ".glb":
+        mesh, attributes = read_mesh(path, attributes=True)
+        path = tmp_path / "character.glb"
+        write_mesh(mesh, path, attributes=attributes)
+    before, held = read_mesh(path, attributes=True)
+    bent = tmp_path / f"bent{suffix}"
+    words = ["deform", path, "--region", "y>60%", "--rotate", "x by 40", "-o", bent]
+    said = " ".join(run(*words).stderr.split())
+    n_double = before.n_vertices - n_joined
+    assert f"repair: weld_seams joined {n_double} vertices along seams" in said
+    assert f"vertices have new numbers, up to {n_joined - 1}" in said
+    after, kept = read_mesh(bent, attributes=True)
+    assert torn(before, after) == 0
+    assert not np.array_equal(before.vertices[before.faces], after.vertices[after.faces])
+    np.testing.assert_array_equal(kept.texture_coordinates, held.texture_coordinates)
+    assert [each.image for each in kept.materials] == [PNG]
+    # What was torn before, and is still, where somebody asks for it; then it is said.
+    said = " ".join(run(*words, "--repair", "none").stderr.split())
+    assert "Both sides of a seam must share their vertices" in said
+    assert torn(before, read_mesh(bent)) > 3
+
+
+def test_other_verbs_join_seams_too(textured):
+    path, n_joined = textured
+    for verb in ("segment", "features"):
+        done = run(verb, path, "--json")
+        assert "weld_seams joined" in done.stderr
+        rows = json.loads(done.stdout)
+        found = rows["parts" if verb == "segment" else "features"]
+        assert all(row["vertex"] < n_joined for row in found)
+
+
+def test_a_mesh_without_seams_is_not_said_to_have_none(giraffe):
+    assert "repair" not in run("deform", giraffe, "--region", "y>70%", "--move", "0,0.1,0").stderr

@@ -12,7 +12,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import err, print_json, print_table, print_written, progress_bar
-from eigenshape.cli.inputs import numbers_of
+from eigenshape.cli.inputs import SEAMS, numbers_of
 from eigenshape.deformation.modes import Mode
 
 REGIONS = (
@@ -39,7 +39,7 @@ def deform(
     edits: Path | None = None,
     edits_mesh: Path | None = None,
     save_edits: Path | None = None,
-    repair: str = "none",
+    repair: str = SEAMS,
     output: Path | None = None,
     picture: Path | None = None,
     view: str = "auto",

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_repairs
-from eigenshape.cli.inputs import drops_missing, repair_names
+from eigenshape.cli.inputs import SEAMS, drops_missing, repair_names
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
@@ -44,7 +44,13 @@ def load_surface(path: Path, repairs: str) -> TriangleMesh:
 
 def _repaired(mesh: TriangleMesh, names: tuple[str, ...], before: tuple[str, ...]) -> TriangleMesh:
     done = repair(mesh, names)
-    print_repairs(before + done.report)
+    report = before + done.report
+    if done.mesh.n_vertices == mesh.n_vertices and names == (SEAMS,):
+        # Verbs look for seams by themselves: that there are none is not worth a line.
+        report = before
+    elif done.mesh.n_vertices < mesh.n_vertices:
+        report += (f"vertices have new numbers, up to {done.mesh.n_vertices - 1:,}",)
+    print_repairs(report)
     return done.mesh
 
 
