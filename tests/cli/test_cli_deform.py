@@ -239,7 +239,7 @@ def test_an_island_of_a_region_is_named_once(tmp_path):
     words = ["--region", region, "--move", "0,0,0.3"]
     done = run("deform", path, *words, "--picture", tmp_path / "a.png")
     assert done.stderr.count("Small patches of a region") == 1
-    assert f"1 vertex at vertex {island} of region 0" in " ".join(done.stderr.split())
+    assert f"1 vertex, of which vertex {island} follows by 0." in " ".join(done.stderr.split())
 
 
 @pytest.fixture(scope="module")

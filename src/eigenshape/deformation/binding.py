@@ -37,7 +37,7 @@ LEAST_CONTRAST = 1e-9
 # Weight of smoothness where the fit has no data, against the fit where it has. A larger value blurs
 # the regions.
 SMOOTHNESS = 1e-3
-# An island of a region that follows by less than this at its best vertex is named.
+# A vertex of an island in the bend beside a patch that follows by less than this is named.
 FOLLOWS = 0.95
 
 
@@ -184,11 +184,8 @@ def bind(
     rims = [require_boundary(rig.mesh, mask, number) for number, mask in enumerate(masks)]
     distances = geodesic_distances(rig.mesh, rims)
     patches = [split_region(rig.mesh, *pair) for pair in zip(masks, distances, strict=True)]
-    if n_modes is None:
-        counts = [[_count_modes(rig, patch) for patch in group] for group in patches]
-    else:
-        wanted = whole_number(n_modes, "n_modes", 1, rig.n_modes)
-        counts = [[wanted] * len(group) for group in patches]
+    wanted = None if n_modes is None else whole_number(n_modes, "n_modes", 1, rig.n_modes)
+    counts = [[wanted or _count_modes(rig, patch) for patch in group] for group in patches]
     shares = np.array(
         [_fit_shares(rig, *pair, known) for pair in zip(patches, counts, strict=True)]
     )
@@ -197,11 +194,19 @@ def bind(
     # What follows its own handle exactly follows no other one.
     exact = masks & (shares == 1)
     shares = np.where(exact.any(axis=0), exact, shares / np.maximum(shares.sum(axis=0), 1))
-    _name_islands(patches, shares)
+    islands = np.concatenate([patch.islands for patch in chain.from_iterable(patches)])
+    late = islands[shares[:, islands].sum(axis=0) < FOLLOWS]
+    if late.size:
+        warnings.warn(
+            "Small patches of a region that lie in the bend beside a large one follow in part: "
+            f"{count_nouns(late.size, 'vertex')}, of which vertex {late[0]} follows by "
+            f"{shares[:, late[0]].sum():.2f}. Leave them out, or add what lies between.",
+            stacklevel=3,
+        )
 
     placed = known & ((shares == 0).all(axis=0) | (shares == 1).any(axis=0))
     if not still.any():
-        placed = _placed_beyond_rims(rig, masks, patches, placed)
+        placed = _placed_beyond_rims(rig, patches, placed)
     part = free_part(rig.edges, placed)
     most = np.array([max(group) for group in counts])
     return Binding(rig, masks, most, distances, shares, part)
@@ -217,46 +222,22 @@ def pull_binding(binding: Binding, strength: float) -> Binding:
     return replace(binding, part=pull_part(binding.part, strength * areas / areas.sum()))
 
 
-def _name_islands(patches: Sequence[Sequence[Patch]], shares: Float[np.ndarray, "r n"]) -> None:
-    """Warn of the islands of regions that follow their handle in part only."""
-    found = [
-        (number, island, share)
-        for number, group in enumerate(patches)
-        for patch in group
-        for island in patch.islands
-        if (share := shares[number, island].max()) < FOLLOWS
-    ]
-    if found:
-        number, island, share = found[0]
-        warnings.warn(
-            "Small patches of a region that lie in the bend beside a large one follow in part; "
-            f"{len(found)} do, and the first, {count_nouns(len(island), 'vertex')} at vertex "
-            f"{island[0]} of region {number}, follows by {share:.2f}. "
-            "Leave them out of the region, or add what lies between.",
-            stacklevel=3,
-        )
-
-
 def _placed_beyond_rims(
-    rig: EigenRig,
-    masks: Bool[np.ndarray, "r n"],
-    patches: Sequence[Sequence[Patch]],
-    placed: Bool[np.ndarray, " n"],
+    rig: EigenRig, patches: Sequence[Sequence[Patch]], placed: Bool[np.ndarray, " n"]
 ) -> Bool[np.ndarray, " n"]:
     """Return the placed vertices that are not in the bend of a patch.
 
     Where a patch or the rest of a component would have no placed vertex left, all stay placed.
     """
-    # Number of the patch of each vertex; those outside count by components, below 0.
+    # The number of the patch of each vertex; below 0, that of the component
     owner = -1 - rig.components
-    owner[masks.any(axis=0)] = -2 - rig.components.max()
-    for number, patch in enumerate(chain.from_iterable(patches)):
+    numbered = list(enumerate(chain.from_iterable(patches)))
+    for number, patch in numbered:
         owner[patch.members] = number
     near = np.zeros_like(placed)
-    outside = ~masks.any(axis=0)
-    for number, patch in enumerate(chain.from_iterable(patches)):
+    for number, patch in numbered:
         # Vertices of other patches are free near their own boundaries alone.
-        near[patch.bend] |= outside[patch.bend] | (owner[patch.bend] == number)
+        near[patch.bend] |= (owner[patch.bend] < 0) | (owner[patch.bend] == number)
     groups = np.unique(owner, return_inverse=True)[1]
     n_left = np.bincount(groups[placed & ~near], minlength=groups.max() + 1)
     return placed & (~near | (n_left[groups] == 0))
@@ -281,35 +262,35 @@ def _fit_shares(
 
     Each patch has its own scale: in a common fit, that of a small one would be too low everywhere.
     """
-    shares = np.zeros(len(known))
-    for n_modes in set(counts):
+    shares, most = np.zeros(len(known)), max(counts)
+    if not known.all():
+        weighted = rig.eigenvectors[known, :most] * rig.areas[known, None]
+        gram = weighted.T @ rig.eigenvectors[known, :most]
+        stiffness = SMOOTHNESS * rig.areas[known].sum() / rig.areas.sum()
+    for patch, n_modes in zip(patches, counts, strict=True):
         modes, values = rig.eigenvectors[:, :n_modes], rig.eigenvalues[:n_modes]
-        pairs = zip(patches, counts, strict=True)
-        group = [patch.members for patch, count in pairs if count == n_modes]
-        goals = np.column_stack([modes[members].T @ rig.areas[members] for members in group])
+        members = patch.members
+        goal = modes[members].T @ rig.areas[members]
         if not known.all():
-            # Least squares where the indicators are known, and smooth elsewhere. Where they are
-            # known everywhere, the modes are orthonormal with respect to the areas.
-            gram = (modes[known] * rig.areas[known, None]).T @ modes[known]
+            # Least squares where the indicator is known, and smooth elsewhere. Where it is known
+            # everywhere, the modes are orthonormal with respect to the areas.
             relative_values = values / max(values[-1], np.finfo(float).tiny)
-            stiff = SMOOTHNESS * rig.areas[known].sum() / rig.areas.sum() * relative_values**2
-            goals = np.linalg.solve(gram + np.diag(stiff), goals)
-        for members, goal in zip(group, goals.T, strict=True):
-            fit = modes @ goal
-            here = rig.components == rig.components[members[0]]
-            rest = known & here
-            rest[members] = False
-            best, least = fit[members].max(), np.min(fit[rest], initial=np.inf)
-            if not best - least > LEAST_CONTRAST * abs(best) and rest.any():
-                if not rig.components.any():
-                    raise InvalidParameterError(
-                        "Modes must differ between a region and the rest; "
-                        f"the lowest {n_modes} are constant there. Increase n_modes."
-                    )
-                # The modes of a rig may all be too coarse for a small component.
-                shares[members] = 1
-                continue
-            low = max(CLIP * min(best, 1), least if rest.any() else 0.0)
-            high = min(1 - CLIP, best)
+            stiff = np.diag(stiffness * relative_values**2)
+            goal = np.linalg.solve(gram[:n_modes, :n_modes] + stiff, goal)
+        fit = modes @ goal
+        here = rig.components == rig.components[members[0]]
+        rest = here.copy()
+        rest[members] = False
+        best, least = fit[members].max(), fit[rest].min()
+        if best - least > LEAST_CONTRAST * abs(best):
+            low, high = max(CLIP * min(best, 1), least), min(1 - CLIP, best)
             shares[here] += np.clip((fit[here] - low) / (high - low), 0, 1)
+        elif rig.components.any():
+            # The modes of a rig may all be too coarse for a small component.
+            shares[members] = 1
+        else:
+            raise InvalidParameterError(
+                "Modes must differ between a region and the rest; "
+                f"the lowest {n_modes} are constant there. Increase n_modes."
+            )
     return np.minimum(shares, 1)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.spatial import cKDTree
 
 from eigenshape.deformation.region import Region, region_boundary, region_mask, require_boundary
 from eigenshape.geometry.distances.geodesic import geodesic_distances, unchecked_waves
@@ -27,8 +26,8 @@ class Patch:
     ----------
     members : (m,) int
         Its vertices.
-    islands : tuple of (i,) int
-        The connected parts among them other than the largest.
+    islands : (i,) int
+        Those of them that lie apart from the largest part.
     extent : float
         δ, its depth over that of the rest of the component: the largest geodesic distances from its
         boundary to a vertex on either side.
@@ -37,7 +36,7 @@ class Patch:
     """
 
     members: Int[np.ndarray, " m"]
-    islands: tuple[Int[np.ndarray, " i"], ...]
+    islands: Int[np.ndarray, " i"]
     extent: float
     bend: Int[np.ndarray, " b"]
 
@@ -66,29 +65,26 @@ def split_region(
     patches, taken = [], np.isinf(depths)
     present = np.unique(labels[mask])
     wave = unchecked_waves(mesh) if len(present) > 1 else None
+    none = np.empty(0, dtype=np.int64)
     for label in present[np.argsort(-depths[present], kind="stable")]:
         if taken[label]:
             continue
-        taken[label] = True
         own = labels == label
-        depth = depths[label]
-        if depth == 0:
+        if depths[label] == 0:
             # Nothing around it is free. There may be thousands of such patches, of a vertex each.
-            none = np.empty(0, dtype=np.int64)
-            patches.append(Patch(np.flatnonzero(own), (), 0.0, none))
+            patches.append(Patch(np.flatnonzero(own), none, 0.0, none))
             continue
         away = distances if wave is None else wave(region_boundary(mesh, own))
         outside = away[np.isfinite(away) & ~own].max()
-        zone = FREE_DEPTH * min(depth, outside)
+        zone = FREE_DEPTH * min(depths[label], outside)
         farthest = np.zeros(len(mask))
         np.maximum.at(farthest, labels[mask], away[mask])
         is_island = ~taken & (farthest < zone)
         taken |= is_island
-        islands = [labels == island for island in present[is_island[present]]]
-        members = np.flatnonzero(np.any([own, *islands], axis=0))
-        parts = tuple(np.flatnonzero(island) for island in islands)
+        islands = mask & is_island[labels]
         bend = np.flatnonzero(away < zone)
-        patches.append(Patch(members, parts, float(depth / outside), bend))
+        members, apart = np.flatnonzero(own | islands), np.flatnonzero(islands)
+        patches.append(Patch(members, apart, float(depths[label] / outside), bend))
     return patches
 
 
@@ -102,11 +98,10 @@ def regions_of_patches(mesh: TriangleMesh, region: Region) -> list[Region]:
     members = [patch.members for patch in split_region(mesh, mask, distances)]
     if len(members) == 1:
         return [region]
-    owners = np.repeat(np.arange(len(members)), [len(patch) for patch in members])
-    tree = cKDTree(mesh.vertices[np.concatenate(members)])
     pieces = vertex_components(mesh)[1]
     for piece in np.unique(pieces[mask & np.isinf(distances)]):
         whole = np.flatnonzero(pieces == piece)
-        nearest = owners[tree.query(mesh.vertices[whole].mean(axis=0))[1]]
+        arms = [mesh.vertices[patch] - mesh.vertices[whole].mean(axis=0) for patch in members]
+        nearest = np.argmin([np.linalg.norm(arm, axis=1).min() for arm in arms])
         members[nearest] = np.append(members[nearest], whole)
     return list(members)
