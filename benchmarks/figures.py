@@ -86,6 +86,7 @@ FIGURES = {
     "search": Figure("bench_search.py --queries 20 --qdrant 0", STORE),
     "retrieval": Figure("bench_retrieval.py --repeats 1", DESCRIBING),
     "deform": Figure("bench_deform.py --repeats 1", ("deformation",)),
+    "characters": Figure("bench_characters.py --repeats 1", ("deformation", "io")),
     "kernel": Figure("bench_kernel.py --repeats 1", ("operators",)),
     "approximate": Figure(
         "bench_approximate.py --cases dragon sphere-160k kernel-20k",

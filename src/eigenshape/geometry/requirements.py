@@ -3,6 +3,8 @@
 Each check costs a few sorts. Its error names the first offender by index and value, and the repair.
 """
 
+import warnings
+
 import numpy as np
 
 from eigenshape._errors import InvalidShapeError, try_auto
@@ -62,6 +64,19 @@ def require_joined(mesh: Mesh) -> None:
             "Pieces that lie edge on edge must share their vertices; "
             f"those at vertices {one.tolist()} and {two.tolist()} do not, "
             f"at {mesh.points[one].tolist()} ({len(apart)} such). {try_auto()}"
+        )
+
+
+def warn_of_seams(mesh: TriangleMesh) -> None:
+    """Warn if vertices are double along seams, as those of a texture: the mesh comes apart there."""
+    pairs = seams(mesh)
+    if len(pairs):
+        one, two = pairs[0]
+        warnings.warn(
+            "Both sides of a seam must share their vertices to bend together; the edges "
+            f"{one.tolist()} and {two.tolist()} lie on each other and do not ({len(pairs)} such). "
+            'Try repair(mesh, ["weld_seams"]), or --repair weld_seams on the command line.',
+            stacklevel=3,
         )
 
 
