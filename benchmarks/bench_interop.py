@@ -1,4 +1,4 @@
-"""Let other programs write ten shapes and read ours, and compare coordinates, areas, colors and fields.
+r"""Let other programs write ten shapes and read ours, and compare coordinates, areas, colors and fields.
 
     python benchmarks/bench_interop.py                                    # all programs that are installed
     python benchmarks/bench_interop.py --tools trimesh,meshio             # some
@@ -9,11 +9,12 @@ A program whose Python package is not installed beside eigenshape runs in FOLDER
 JavaScript packages lie in FOLDER/npm/node_modules:
 
     python -m venv ~/interop/blender && ~/interop/blender/bin/pip install bpy
-    npm install --prefix ~/interop/npm three @gltf-transform/core @gltf-transform/extensions @gltf-transform/functions
+    npm install --prefix ~/interop/npm three meshoptimizer @gltf-transform/core @gltf-transform/extensions \
+        @gltf-transform/functions
 
 There are three ways: the program writes and eigenshape reads; eigenshape writes and the program reads; the program
-writes, eigenshape reads and writes again with all attributes, and the program reads. Every file is read by every program
-that knows its format, so that a difference has witnesses. It is
+writes, eigenshape reads and writes again with all attributes, and the program reads. All programs that know a format
+read its files, so that a difference has witnesses. It is
 
 - equal, if all that the file can hold is what it should be;
 - named, if an error or a warning of eigenshape says so;
@@ -29,12 +30,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Set
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from interop.compare import compare
 from interop.here import listen, read_here, write_again, write_here
-from interop.shapes import Shape, make_shapes
+from interop.shapes import make_shapes
 from report import dump, new_figures, options_of
 
 TOOLS = {
@@ -57,6 +60,8 @@ OURS = {
     ".vtk": ("prism", "fields", "far"),
     ".vtp": ("prism", "fields", "far"),
 }
+# The suffix in which a file with attributes is written again.
+AGAIN = {".glb": ".glb", ".gltf": ".glb", ".obj": ".obj", ".ply": ".ply"}
 # What formats cannot hold, by the beginning of an aspect.
 CANNOT = {
     ".stl": ("texture", "colors", "field"),
@@ -139,17 +144,24 @@ class Exchange:
 
     def wait_for(self, tool: str, command: list[str], answered: Path) -> str:
         """Wait for the end of a program, or end one that gives no answer, and say how it ended."""
-        with (self.folder / f"{tool}.log").open("a") as log:
-            with subprocess.Popen(command, stdout=log, stderr=log, cwd=self.folder) as process:
-                size = -1
-                while True:
-                    try:
-                        return f"the program ended with status {process.wait(PATIENCE)}"
-                    except subprocess.TimeoutExpired:
-                        before, size = size, answered.stat().st_size
-                        if size == before:
-                            process.kill()
-                            return f"the program gave no answer for {PATIENCE} s"
+        with (
+            (self.folder / f"{tool}.log").open("a") as log,
+            subprocess.Popen(command, stdout=log, stderr=log, cwd=self.folder) as process,
+        ):
+            size = -1
+            while True:
+                try:
+                    return f"the program ended with status {process.wait(PATIENCE)}"
+                except subprocess.TimeoutExpired:
+                    before, size = size, answered.stat().st_size
+                    if size == before:
+                        process.kill()
+                        return f"the program gave no answer for {PATIENCE:g} s"
+
+    def place(self, folder: str, name: str, suffix: str) -> Path:
+        """Return the path of a file in its folder, since buffers, materials and images lie beside it."""
+        (self.folder / folder).mkdir(exist_ok=True)
+        return self.folder / folder / f"{name}{suffix}"
 
     def let_write(self) -> dict[Path, tuple[str, str, str]]:
         """Let all programs write; return the program, the format and the shape of each file, or its error."""
@@ -158,10 +170,7 @@ class Exchange:
             jobs = []
             for number, (form, (suffix, *names)) in enumerate(about["writes"].items()):
                 for name in names:
-                    # Buffers, materials and images lie beside a file, so that each has its folder.
-                    folder = self.folder / f"{tool}-{number}-{name}"
-                    folder.mkdir(exist_ok=True)
-                    path = folder / f"{name}{suffix}"
+                    path = self.place(f"{tool}-{number}-{name}", name, suffix)
                     files[path] = (tool, form, name)
                     shape = self.shapes[name]
                     jobs.append(
@@ -209,6 +218,15 @@ class Exchange:
         return dict(self.compared[path])
 
 
+class Written(NamedTuple):
+    """A file that eigenshape wrote, or why it did not."""
+
+    path: Path
+    name: str  # of the shape
+    messages: list[str]
+    error: str
+
+
 def is_named(aspect: str, messages: list[str]) -> str:
     """Return the message that names an aspect, if there is one."""
     if aspect.startswith("field"):
@@ -223,7 +241,7 @@ def is_named(aspect: str, messages: list[str]) -> str:
 
 def first_words(text: str) -> str:
     """Return the beginning of a message without the path before it."""
-    text = text.split(": ", 1)[-1] if "/" in text.split(": ")[0] else text
+    text = text.split(": ", 1)[-1] if "/" in text.split(": ", maxsplit=1)[0] else text
     sentence = text.replace("|", "/").split("; ")[0].split(". ")[0]
     return sentence if len(sentence) <= 90 else sentence[:87] + "..."
 
@@ -271,8 +289,13 @@ def agrees(ours: Found, theirs: Found, aspect: str) -> bool:
     return aspect not in compare(split, theirs)
 
 
-def judge_writing(exchange: Exchange, path: Path, tool: str, name: str, messages: list[str]) -> str:
-    """Judge what a program reads of a file of eigenshape."""
+def judge_writing(
+    exchange: Exchange, written: Written, tool: str, unknown: Set[str] = frozenset()
+) -> str:
+    """Judge what a program reads of a file of eigenshape, but for aspects that are unknown before."""
+    path, name, messages, error = written
+    if error:
+        return f"named: {first_words(error)}"
     answer = exchange.found[path, tool]
     others = exchange.readers(path, name)
     others.pop(tool, None)
@@ -282,6 +305,8 @@ def judge_writing(exchange: Exchange, path: Path, tool: str, name: str, messages
         return f"{kind}: {first_words(answer['error'])}"
     results = []
     for aspect, fact in exchange.differences(path, name, answer["found"]).items():
+        if aspect in unknown:
+            continue
         right = [other for other, differences in others.items() if aspect not in differences]
         if message := is_named(aspect, messages):
             results.append(f"named: {first_words(message)}")
@@ -301,74 +326,59 @@ def worst(results: list[str]) -> str:
     return "equal"
 
 
+def write_ours(exchange: Exchange) -> list[Written]:
+    """Write our shapes in our formats."""
+    written = []
+    for suffix, names in OURS.items():
+        for name in names:
+            path = exchange.place(f"here-{name}-{suffix[1:]}", name, suffix)
+            _, messages, error = listen(partial(write_here, exchange.shapes[name], path))
+            written.append(Written(path, name, messages, error))
+    return written
+
+
+def write_theirs_again(
+    exchange: Exchange, theirs: dict[Path, tuple[str, str, str]]
+) -> dict[Path, Written]:
+    """Write again, by the file that each was read from, what programs wrote in formats with attributes."""
+    written = {}
+    for source, (_, _, name) in theirs.items():
+        suffix = AGAIN.get(source.suffix)
+        if suffix and "triangles" in exchange.shapes[name]:
+            path = exchange.place(f"{source.parent.name}-again", name, suffix)
+            _, messages, error = listen(partial(write_again, source, path))
+            written[source] = Written(path, name, messages, error)
+    return written
+
+
 def run(exchange: Exchange) -> list[dict[str, str]]:
     """Let programs write and read, and judge all of it; a row for each file and way."""
     theirs = exchange.let_write()
-    said: dict[Path, list[str]] = {}
-    refused: dict[Path, str] = {}
-    ours: dict[Path, str] = {}
-    again: dict[Path, Path] = {}
-    for suffix, names in OURS.items():
-        for name in names:
-            folder = exchange.folder / f"here-{name}-{suffix[1:]}"
-            folder.mkdir(exist_ok=True)
-            path = folder / f"{name}{suffix}"
-            _, said[path], refused[path] = listen(
-                lambda path=path, name=name: write_here(exchange.shapes[name], path)
-            )
-            ours[path] = name
-    for source, (_, _, name) in theirs.items():
-        if source.suffix not in (".glb", ".gltf", ".obj", ".ply") or name in ("curves", "solids"):
-            continue
-        suffix = ".glb" if source.suffix == ".gltf" else source.suffix
-        folder = source.parent.with_name(f"{source.parent.name}-again")
-        folder.mkdir(exist_ok=True)
-        path = folder / f"{name}{suffix}"
-        _, said[path], refused[path] = listen(
-            lambda source=source, path=path: write_again(source, path)
-        )
-        again[path] = source
-    exchange.let_read([*theirs, *ours, *again])
-
+    ours = write_ours(exchange)
+    again = write_theirs_again(exchange, theirs)
+    exchange.let_read([*theirs, *(each.path for each in [*ours, *again.values()])])
     rows = []
 
     def add(tool: str, form: str, way: str, name: str, result: str) -> None:
         version = exchange.about[tool]["version"]
-        row = {
-            "tool": tool,
-            "version": version,
-            "format": form,
-            "way": way,
-            "shape": name,
-            "result": result,
-        }
-        rows.append(row)
+        row = {"tool": tool, "version": version, "format": form, "way": way}
+        rows.append(row | {"shape": name, "result": result})
         if "SILENT" in result:
-            print(*row.values(), sep="  ", flush=True)
+            print(*rows[-1].values(), sep="  ", flush=True)
 
     for path, (tool, form, name) in theirs.items():
         add(tool, form, "read", name, judge_reading(exchange, path, tool, name))
-    for path, name in ours.items():
+    for each in ours:
         for tool, about in exchange.about.items():
-            if path.suffix not in about["reads"]:
-                continue
-            if refused[path]:
-                result = f"named: {first_words(refused[path])}"
-            else:
-                result = judge_writing(exchange, path, tool, name, said[path])
-            add(tool, path.suffix[1:].upper(), "write", name, result)
-    for path, source in again.items():
+            if each.path.suffix in about["reads"]:
+                form = each.path.suffix[1:].upper()
+                add(tool, form, "write", each.name, judge_writing(exchange, each, tool))
+    for source, each in again.items():
         tool, form, name = theirs[source]
-        if path.suffix not in exchange.about[tool]["reads"]:
-            continue
-        if refused[path]:
-            add(tool, form, "again", name, f"named: {first_words(refused[path])}")
-            continue
-        # What the program does not find in its own file is no loss of ours.
-        own = exchange.readers(source, name).get(tool, {})
-        result = judge_writing(exchange, path, tool, name, said[path])
-        parts = [part for part in result.split("; ") if not any(aspect in part for aspect in own)]
-        add(tool, form, "again", name, result if parts else "equal")
+        if each.path.suffix in exchange.about[tool]["reads"]:
+            # What the program does not find in its own file is no loss of ours.
+            own = set(exchange.readers(source, name).get(tool, {}))
+            add(tool, form, "again", name, judge_writing(exchange, each, tool, own))
     return rows
 
 

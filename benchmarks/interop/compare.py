@@ -28,9 +28,12 @@ def compare(truth: Shape, found: Shape) -> dict[str, str]:
     differences: dict[str, str] = {}
     size = float(np.ptp(np.array(truth["points"]), axis=0).max())
     near = SINGLE * size
-    right, got = used_points(truth), used_points(found)
-    if not len(got):
+    corners = [corner for cell in cells_of(found) for corner in cell]
+    if not corners:
         return {"coordinates": "none"}
+    if max(corners) >= len(found["points"]):
+        return {"coordinates": "corners without a point"}
+    right, got = used_points(truth), used_points(found)
     gap = max(KDTree(got).query(right)[0].max(), KDTree(right).query(got)[0].max())
     if not gap <= near:
         differences["coordinates"] = f"off by {gap / size:.2g} of the size"
@@ -99,7 +102,7 @@ def area(shape: Shape) -> float | None:
 
 def volume(shape: Shape) -> float | None:
     """Return the volume that a closed surface encloses, or that of solids."""
-    if "cells" in shape and shape["cells"]:
+    if shape.get("cells"):
         return float(sizes(shape).sum())
     if not shape.get("closed", True) or not shape.get("polygons"):
         return None

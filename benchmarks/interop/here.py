@@ -1,5 +1,6 @@
 """What eigenshape reads of the files of others, and what it writes for them, with all that it says."""
 
+import itertools
 import json
 import warnings
 from collections.abc import Callable
@@ -7,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse import eye_array
-
 from interop.exchange import as_list
+from scipy.sparse import eye_array
 
 import eigenshape as es
 from eigenshape.io.formats.registry import FIELD_FORMATS
@@ -111,7 +111,7 @@ def write_here(shape: Shape, path: Path) -> None:
 def shape_of(shape: Shape, points: np.ndarray) -> es.SimplicialMesh:
     """Return curves as segments, and solids as tetrahedra."""
     if "lines" in shape:
-        pairs = [pair for row in shape["lines"] for pair in zip(row, row[1:], strict=False)]
+        pairs = [pair for row in shape["lines"] for pair in itertools.pairwise(row)]
         return es.SimplicialMesh(points, np.array(pairs))
     cells = {kind: np.array(corners) for kind, corners in shape["cells"].items()}
     tetrahedra = [

@@ -142,36 +142,35 @@ def read(path: Path) -> Shape:
     turn = Matrix.Rotation(-np.pi / 2, 4, "X") if path.suffix in (".glb", ".gltf") else Matrix()
     graph = bpy.context.evaluated_depsgraph_get()
     found: Shape = {"points": [], "polygons": [], "point_fields": {}, "cell_fields": {}}
-    textures, colors = [], []
     for thing in bpy.context.scene.objects:
-        if thing.type != "MESH" or not thing.visible_get():
-            continue  # the importer adds a hidden shape for bones
-        shown = thing.evaluated_get(graph)
-        mesh = shown.to_mesh()
-        place = turn @ shown.matrix_world
-        start = len(found["points"])
-        found["points"] += [tuple(place @ vertex.co) for vertex in mesh.vertices]
-        order = -1 if place.determinant() < 0 else 1
-        for face in mesh.polygons:
-            corners = list(face.vertices)[::order]
-            loops = list(face.loop_indices)[::order]
-            found["polygons"].append([start + corner for corner in corners])
-            if mesh.uv_layers:
-                textures.append([tuple(mesh.uv_layers[0].data[loop].uv) for loop in loops])
-            if mesh.color_attributes:
-                layer = mesh.color_attributes[0]
-                places = corners if layer.domain == "POINT" else loops
-                colors.append([[255 * part for part in layer.data[i].color_srgb] for i in places])
-        for layer in mesh.attributes:
-            if layer.data_type in KINDS.values() and layer.domain in ("POINT", "FACE"):
-                values = np.array([entry.value for entry in layer.data])
-                key = "point_fields" if layer.domain == "POINT" else "cell_fields"
-                found[key] |= plain_fields({layer.name: values})
-    if textures:
-        found["corner_texture"] = textures
-    if colors:
-        found["corner_colors"] = colors
+        if thing.type == "MESH" and thing.visible_get():  # the importer hides a shape for bones
+            shown = thing.evaluated_get(graph)
+            add_mesh(found, shown.to_mesh(), turn @ shown.matrix_world)
     return found
+
+
+def add_mesh(found: Shape, mesh: bpy.types.Mesh, place: Matrix) -> None:
+    """Add a mesh at its place to what was found."""
+    start = len(found["points"])
+    found["points"] += [tuple(place @ vertex.co) for vertex in mesh.vertices]
+    order = -1 if place.determinant() < 0 else 1
+    for face in mesh.polygons:
+        corners = list(face.vertices)[::order]
+        loops = list(face.loop_indices)[::order]
+        found["polygons"].append([start + corner for corner in corners])
+        if mesh.uv_layers:
+            layer = mesh.uv_layers[0].data
+            found.setdefault("corner_texture", []).append([tuple(layer[i].uv) for i in loops])
+        if mesh.color_attributes:
+            layer = mesh.color_attributes[0]
+            places = corners if layer.domain == "POINT" else loops
+            colors = [[255 * part for part in layer.data[i].color_srgb] for i in places]
+            found.setdefault("corner_colors", []).append(colors)
+    for layer in mesh.attributes:
+        if layer.data_type in KINDS.values() and layer.domain in ("POINT", "FACE"):
+            values = np.array([entry.value for entry in layer.data])
+            key = "point_fields" if layer.domain == "POINT" else "cell_fields"
+            found[key] |= plain_fields({layer.name: values})
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """meshio writes and reads."""
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,7 +20,7 @@ def mesh_of(shape: Shape) -> meshio.Mesh:
         pieces = [corners]
         if "lines" in shape:
             kind = "line"
-            pieces = [list(pair) for pair in zip(corners, corners[1:], strict=False)]
+            pieces = [list(pair) for pair in itertools.pairwise(corners)]
         if blocks and blocks[-1][0] == kind and len(blocks[-1][1][0]) == len(pieces[0]):
             blocks[-1][1].extend(pieces)
         else:

@@ -59,7 +59,7 @@ def read(path: Path) -> Shape:
     for name in ("mask", "level", "step", "label", "count", "low", "height"):
         try:
             fields[name] = mesh.vertex_custom_scalar_attribute_array(name)
-        except Exception:  # noqa: BLE001, S112 there is no such attribute
+        except Exception:  # noqa: BLE001 there is no such attribute
             continue
     found["point_fields"] = plain_fields(fields)
     return found

@@ -71,9 +71,13 @@ def test_witnesses_decide_whose_difference_it_is(interop, shapes, tmp_path):
     gray = {key: value for key, value in shapes["colors"].items() if key != "colors"}
     interop.write_here(shapes["colors"], path)
     exchange.found = {(path, "a"): {"found": gray}, (path, "b"): {"found": shapes["colors"]}}
-    judged = interop.judge_writing(exchange, path, "a", "colors", [])
+    written = interop.Written(path, "colors", [], "")
+    judged = interop.judge_writing(exchange, written, "a")
     assert judged == "theirs: colors none; right in b"
-    assert interop.judge_writing(exchange, path, "b", "colors", []) == "equal"
+    assert interop.judge_writing(exchange, written, "a", {"colors"}) == "equal"
+    assert interop.judge_writing(exchange, written, "b") == "equal"
+    refused = written._replace(error="No colors. Leave them out.")
+    assert interop.judge_writing(exchange, refused, "b") == "named: No colors"
     assert interop.judge_reading(exchange, path, "a", "colors") == "equal"
     interop.write_here(gray, path)  # as a program that keeps no colors would
     assert interop.judge_reading(exchange, path, "a", "colors").startswith("SILENT: colors none")
