@@ -26,7 +26,6 @@ from .parts import find_tree as find_tree
 from .parts import part_rows as part_rows
 from .parts import print_rows as print_rows
 from .parts import regions_of_patches as regions_of_patches
-from .reading import load_mesh as load_mesh
 from .reading import load_poses as load_poses
 from .reading import load_repaired as load_repaired
 from .reading import load_shape as load_shape

@@ -18,7 +18,6 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
     WriteJob,
     corner_normals,
     linear_colors,
@@ -51,6 +50,7 @@ from eigenshape.io.formats.gltf import (
 )
 from eigenshape.io.formats.rounding import rounding_loss
 from eigenshape.io.formats.stl import single_precision
+from eigenshape.io.opening import SourceFile
 
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}

@@ -17,7 +17,6 @@ from eigenshape.geometry.polygons import cut_polygons
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
     WriteJob,
     corner_normals,
     plain_attributes,
@@ -25,6 +24,7 @@ from eigenshape.io.attributes import (
 )
 from eigenshape.io.formats.numbers import rows_text
 from eigenshape.io.formats.obj import Corner, ObjSheet, read_sheet
+from eigenshape.io.opening import SourceFile
 
 MAP = re.compile(r"(?im)^([ \t]*(?:map_\w+|bump|disp|decal|norm|refl)[ \t]+)(.+?)[ \t\r]*$")
 PLAIN_MATERIAL = {"newmtl", "kd", "d", "tr", "map_kd", "ka", "ke", "ks", "ns", "ni", "illum"}

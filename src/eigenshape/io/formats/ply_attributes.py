@@ -16,7 +16,6 @@ from eigenshape.geometry.polygons import triangulate_polygons
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
     WriteJob,
     corner_normals,
     plain_attributes,
@@ -34,6 +33,7 @@ from eigenshape.io.formats.ply import (
     read_lists,
     read_tables,
 )
+from eigenshape.io.opening import SourceFile
 
 IMAGE = re.compile(rb"(?m)^comment TextureFile[ \t]+(.+?)[ \t\r]*$")  # as MeshLab writes it
 TINTS = ("red", "green", "blue")
