@@ -96,7 +96,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...
     lost = [b"$" + section for section in LEFT_OUT if b"$" + section in data]
     notes = [f"{b', '.join(lost).decode()} of the file are not kept"] if lost else []
     shape = sort_cells(points, *_cells(tags, rows))
-    return shape.points, shape.cells, *notes, *shape.notes
+    return shape.points, shape.cells, *(notes + shape.notes)
 
 
 def _section(data: bytes, name: bytes) -> bytes:

@@ -151,7 +151,9 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
         elif keyword == b"COLOR_SCALARS":
             values = _take_array(cursor, b"unsigned_char", count, _count(words[2]))
             # In text they are shares of 255.
-            found[name] = np.rint(255 * values).astype(np.uint8) if cursor.is_text else values
+            found[name] = (
+                np.rint(255 * np.asarray(values)).astype(np.uint8) if cursor.is_text else values
+            )
         elif keyword == b"TEXTURE_COORDINATES":
             found[name] = _take_array(cursor, words[3], count, _count(words[2]))
         elif keyword in WIDTHS:
@@ -169,7 +171,8 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
             if values is None
         ]
         fields[section] |= {name: values for name, values in found.items() if values is not None}
-    return *fit_fields(shape, *fields.values()), *notes
+    of_points, of_cells = fit_fields(shape, *fields.values())
+    return of_points, of_cells, *notes
 
 
 def _take_fields(cursor: Cursor, count: int) -> dict[str, np.ndarray | None]:

@@ -190,7 +190,8 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
         f"the array {name!r} is not read: it is of text, or not in all pieces"
         for name in left_out + more
     ]
-    return *fit_fields(shape, of_points, of_cells), *notes
+    of_points, of_cells = fit_fields(shape, of_points, of_cells)
+    return of_points, of_cells, *notes
 
 
 def _open(data: bytes) -> tuple[list[ElementTree.Element], _Packing]:
