@@ -173,7 +173,7 @@ def test_colors_of_an_mni_object_are_named(tmp_path, data, what):
 
 def test_an_mni_object_of_polygons():
     _, cells = mni_obj.parse(mni_text(SQUARE, [[0, 1, 2, 3]]))
-    assert [polygon.tolist() for polygon in cells["polygons"].split()] == [[0, 1, 2, 3]]
+    assert cells["polygons"].corners.tolist() == [0, 1, 2, 3]
     with pytest.raises(FileFormatError, match="three corners or more; polygon 1 has 2"):
         mni_obj.parse(mni_text(SQUARE, [[0, 1, 2], [0, 3]]))
 

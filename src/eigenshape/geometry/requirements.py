@@ -10,12 +10,12 @@ import numpy as np
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.face_turns import face_turns, inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.seams import seams
 from eigenshape.geometry.simplices import require_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     repeated_simplices,
     require_simplices_everywhere,
-    seams,
     vertex_components,
 )
 
@@ -102,7 +102,7 @@ def require_oriented(mesh: TriangleMesh) -> None:
         one_sided = int(np.argmin(orientable))
         remedy = (
             f"The piece of face {one_sided} has one side only, like a Möbius strip. Try repair(mesh, "
-            '["cut_one_sided"]), or --repair cut_one_sided on the command line.'
+            '["auto", "cut_one_sided"]), or --repair auto,cut_one_sided on the command line.'
         )
     raise InvalidShapeError(
         "Neighboring faces must be turned the same way; "

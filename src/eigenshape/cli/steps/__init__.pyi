@@ -9,6 +9,7 @@ from .condensing import join_tables as join_tables
 from .condensing import require_table as require_table
 from .condensing import run_in_workers as run_in_workers
 from .condensing import write_table as write_table
+from .facts import note_seams as note_seams
 from .facts import shape_facts as shape_facts
 from .indexing import choose_shapes as choose_shapes
 from .indexing import describe_all as describe_all
