@@ -22,6 +22,7 @@ from eigenshape.io.formats.registry import (
     format_of,
     written_suffix,
 )
+from eigenshape.io.formats.rounding import loss_in_single
 from eigenshape.io.opening import SourceFile, naming, open_file
 
 WRITABLE = ("f8", "f4", "i8", "i4", "u1")  # numpy's types of fields that are written as they are
@@ -77,7 +78,13 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     """
     mesh, path = as_simplicial(mesh), as_path(path)
     suffix = written_suffix(path, FIELD_FORMATS)
-    replace_file(path, format_fields(mesh, suffix, fields, structure_named(mesh, path, suffix)))
+    data = format_fields(mesh, suffix, fields, structure_named(mesh, path, suffix))
+    lost = []
+    if "single" in format_of(suffix).traits and isinstance(mesh, TriangleMesh):
+        lost = loss_in_single(mesh)
+    replace_file(path, data)
+    for loss in lost:
+        warnings.warn(f"{path.name} does not keep {loss}", stacklevel=2)
 
 
 def structure_named(mesh: Mesh, path: Path, suffix: str) -> str:

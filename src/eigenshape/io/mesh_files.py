@@ -13,10 +13,8 @@ from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidSh
 from eigenshape._files import as_path, replace_file
 from eigenshape._typing import FileLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import PLURALS, count_nouns
-from eigenshape.geometry.simplices import size_one
 from eigenshape.io.attributes import (
     MeshAttributes,
     WriteJob,
@@ -35,11 +33,9 @@ from eigenshape.io.formats.registry import (
     suffixes_with,
     written_suffix,
 )
+from eigenshape.io.formats.rounding import loss_in_single
 from eigenshape.io.opening import SourceFile, naming, open_file
 
-# Largest share of the shortest side of a face by which rounding may move its corners without a word,
-# and of the area by which it may change the whole at all.
-ROUNDING, MOST_CHANGE = 0.01, 0.01
 KINDS = {2: SEGMENTS, 3: "triangles"}  # of cells, by their number of corners
 
 
@@ -394,36 +390,10 @@ def save_mesh(
             files = {path: (module.format_binary if is_binary else module.format_text)(mesh)}
     except FileFormatError as err:
         raise FileFormatError(f"{path} cannot hold the mesh. {err}") from err
-    lost += rounding_loss(mesh) if is_binary and "single" in known.traits else []
+    lost += loss_in_single(mesh) if is_binary and "single" in known.traits else []
     for place, data in files.items():
         replace_file(place, data)
     return f"{path.name} does not keep: {', '.join(dict.fromkeys(lost))}." if lost else ""
-
-
-def rounding_loss(mesh: TriangleMesh) -> list[str]:
-    """Name what single precision takes from a shape; nothing while sides are much longer than it.
-
-    Raise FileFormatError if the area changes by more than `MOST_CHANGE`.
-    """
-    rounded = mesh.vertices.astype(np.float32).astype(np.float64)
-    corners, scale = size_one((mesh.vertices - mesh.vertices[0])[mesh.faces])
-    single = (rounded - mesh.vertices[0])[mesh.faces] / scale
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    moved = np.linalg.norm(single - corners, axis=2)
-    before, after = triangle_areas(corners), triangle_areas(single)
-    damaged = (moved.max(axis=1) > ROUNDING * sides.min(axis=1)) & (before > 0)
-    if not damaged.any():
-        return []
-    n_flat = int(((after == 0) & (before > 0)).sum())
-    change = abs(after.sum() - before.sum()) / before.sum()
-    faces = f"{count_nouns(int(damaged.sum()), 'face')}, of which {n_flat} lose their area"
-    remedy = "Write .ply or .glb, or subtract mesh.vertices.mean(axis=0) from the vertices before."
-    if change > MOST_CHANGE:
-        raise FileFormatError(
-            f"Single precision must keep the area to {MOST_CHANGE:.0%}; rounding changes it by "
-            f"{change:.2g}, and {faces}. {remedy}"
-        )
-    return [f"the shape of {faces}: coordinates are rounded to single precision. {remedy}"]
 
 
 def _replaced_by_parts(held: MeshAttributes, has_part_materials: bool) -> list[str]:

@@ -14,6 +14,11 @@ from eigenshape.geometry.simplices import size_one
 ROUNDING, MOST_CHANGE = 0.01, 0.01
 
 
+def loss_in_single(mesh: TriangleMesh) -> list[str]:
+    """Name what is lost if a file holds coordinates in single precision; see `rounding_loss`."""
+    return rounding_loss(mesh, mesh.vertices.astype(np.float32)[mesh.faces].astype(np.float64))
+
+
 def rounding_loss(mesh: TriangleMesh, found: Float[np.ndarray, "f 3 3"]) -> list[str]:
     """Name what is lost if a file gives the corners of faces back as they are found, if that is anything.
 
