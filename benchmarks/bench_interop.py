@@ -26,6 +26,7 @@ read its files, so that a difference has witnesses. It is
 import importlib.util
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -262,7 +263,7 @@ def judge_reading(exchange: Exchange, path: Path, tool: str, name: str) -> str:
         alike = [
             other
             for other in witnesses
-            if other != tool and agrees(found, exchange.found[path, other]["found"], aspect)
+            if agrees(found, exchange.found[path, other]["found"], aspect)
         ]
         # A program may read its own numbers by a convention that is not the format's.
         has_own_convention = right == [tool] and aspect in KEPT_AT_CORNERS and fact != "none"
@@ -413,7 +414,11 @@ def table(rows: list[dict[str, str]]) -> list[list[str]]:
     for row in rows:
         key = (row["tool"], row["way"], row["format"])
         kind, _, text = row["result"].partition(": ")
-        cell = row["shape"] if kind == "equal" else f"*{row['shape']}*: {text}"
+        # A reader of the page asks what differs and for whom; by how much stands in the file of figures.
+        short = (
+            re.sub(r" (?:off by|\S+ for) .*?(?=, and |$)", "", text) if kind == "theirs" else text
+        )
+        cell = row["shape"] if kind == "equal" else f"*{row['shape']}*: {short}"
         groups.setdefault(key, {}).setdefault(kind, []).append(cell)
     versions = {row["tool"]: row["version"] for row in rows}
     merged: dict[tuple[str, str, str], list[str]] = {}

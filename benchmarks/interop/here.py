@@ -1,9 +1,9 @@
 """What eigenshape reads of the files of others, and what it writes for them, with all that it says."""
 
-import itertools
 import json
 import warnings
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 

@@ -56,7 +56,7 @@ class Document:
         rows = np.ascontiguousarray(rows, dtype="f")
         used = np.flatnonzero(rows.any(axis=1)).astype("H")
         indices = pygltflib.AccessorSparseIndices(
-            self.view(used.tobytes()), componentType=KINDS["H"]
+            bufferView=self.view(used.tobytes()), componentType=KINDS["H"]
         )
         values = pygltflib.AccessorSparseValues(bufferView=self.view(rows[used].tobytes()))
         sparse = pygltflib.Sparse(count=len(used), indices=indices, values=values)
