@@ -26,6 +26,7 @@ read its files, so that a difference has witnesses. It is
 import importlib.util
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -76,6 +77,7 @@ CANNOT = {
 }
 KEPT = "only a file of the same format keeps"  # which says nothing about where points are
 MOVING = ("instanc", "skin", "joint", "morph", "precision", "rounded", "coordinate", "moved")
+KEPT_AT_CORNERS = ("texture", "colors")
 WORDS = {"texture": ("texture",), "colors": ("color",)}  # which a warning about an aspect says
 # Colors of glTF are linear light by the format; these convert them, others store and show them as they are.
 LINEAR = ("blender", "three")
@@ -257,25 +259,42 @@ def judge_reading(exchange: Exchange, path: Path, tool: str, name: str) -> str:
         if message := is_named(aspect, messages):
             results.append(f"named: {first_words(message)}")
             continue
-        right = [other for other, differences in witnesses.items() if aspect not in differences]
+        right = finders(aspect, witnesses)
         alike = [
             other
             for other in witnesses
-            if other != tool and agrees(found, exchange.found[path, other]["found"], aspect)
+            if agrees(found, exchange.found[path, other]["found"], aspect)
         ]
+        # A program may read its own numbers by a convention that is not the format's.
+        has_own_convention = right == [tool] and aspect in KEPT_AT_CORNERS and fact != "none"
         is_light = aspect == "colors" and path.suffix in (".glb", ".gltf")
-        strict = [other for other in alike if is_light and other in LINEAR]
-        if (right in ([], [tool]) and alike) or strict or (not right and witnesses):
-            results.append(f"theirs: {aspect} {fact}; so reads {', '.join(alike or witnesses)}")
+        takes_light = is_light and any(other in LINEAR for other in alike)
+        if alike and (not right or has_own_convention or takes_light):
+            results.append(f"theirs: {aspect} {fact}, and so read {listed(alike)}")
         else:
-            results.append(f"SILENT: {aspect} {fact}; right in {', '.join(right) or 'no program'}")
+            results.append(f"SILENT: {aspect} {fact}; right in {listed(right) or 'no program'}")
     return worst(results)
+
+
+def finders(aspect: str, witnesses: dict[str, Found]) -> list[str]:
+    """Return the programs that find an aspect as it should be, where the points are right, too."""
+    return [
+        tool
+        for tool, differences in witnesses.items()
+        if aspect not in differences and "coordinates" not in differences
+    ]
+
+
+def listed(tools: list[str]) -> str:
+    """Return the names of at most three programs, and how many there are besides."""
+    names = [TITLES[tool] for tool in tools]
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
 def agrees(ours: Found, theirs: Found, aspect: str) -> bool:
     """Return whether another program reads the same as eigenshape."""
     stored = f"corner_{aspect}"
-    if aspect not in ("texture", "colors"):
+    if aspect not in KEPT_AT_CORNERS:
         return aspect not in compare(ours, theirs)
     if stored not in ours:
         return aspect not in theirs and stored not in theirs
@@ -307,11 +326,11 @@ def judge_writing(
     for aspect, fact in exchange.differences(path, name, answer["found"]).items():
         if aspect in unknown:
             continue
-        right = [other for other, differences in others.items() if aspect not in differences]
+        right = finders(aspect, others)
         if message := is_named(aspect, messages):
             results.append(f"named: {first_words(message)}")
         elif right:
-            results.append(f"theirs: {aspect} {fact}; right in {', '.join(right)}")
+            results.append(f"theirs: {aspect} {fact}, and right in {listed(right)}")
         else:
             results.append(f"SILENT: {aspect} {fact}")
     return worst(results)
@@ -376,9 +395,16 @@ def run(exchange: Exchange) -> list[dict[str, str]]:
     for source, each in again.items():
         tool, form, name = theirs[source]
         if each.path.suffix in exchange.about[tool]["reads"]:
-            # What the program does not find in its own file is no loss of ours.
-            own = set(exchange.readers(source, name).get(tool, {}))
-            add(tool, form, "again", name, judge_writing(exchange, each, tool, own))
+            # What the program, or nobody, finds in its own file is no loss of ours.
+            before = exchange.readers(source, name)
+            unknown = set(before.get(tool, {}))
+            unknown |= {
+                aspect
+                for differences in before.values()
+                for aspect in differences
+                if not finders(aspect, before)
+            }
+            add(tool, form, "again", name, judge_writing(exchange, each, tool, unknown))
     return rows
 
 
@@ -388,7 +414,11 @@ def table(rows: list[dict[str, str]]) -> list[list[str]]:
     for row in rows:
         key = (row["tool"], row["way"], row["format"])
         kind, _, text = row["result"].partition(": ")
-        cell = row["shape"] if kind == "equal" else f"*{row['shape']}*: {text}"
+        # A reader of the page asks what differs and for whom; by how much stands in the file of figures.
+        short = (
+            re.sub(r" (?:off by|\S+ for) .*?(?=, and |$)", "", text) if kind == "theirs" else text
+        )
+        cell = row["shape"] if kind == "equal" else f"*{row['shape']}*: {short}"
         groups.setdefault(key, {}).setdefault(kind, []).append(cell)
     versions = {row["tool"]: row["version"] for row in rows}
     merged: dict[tuple[str, str, str], list[str]] = {}

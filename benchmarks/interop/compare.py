@@ -25,7 +25,6 @@ SPLITS = {
 
 def compare(truth: Shape, found: Shape) -> dict[str, str]:
     """Return the aspects of a shape that were found to be others, each with what is and what should be."""
-    differences: dict[str, str] = {}
     size = float(np.ptp(np.array(truth["points"]), axis=0).max())
     near = SINGLE * size
     corners = [corner for cell in cells_of(found) for corner in cell]
@@ -34,18 +33,21 @@ def compare(truth: Shape, found: Shape) -> dict[str, str]:
     if max(corners) >= len(found["points"]):
         return {"coordinates": "corners without a point"}
     right, got = used_points(truth), used_points(found)
+    if not np.isfinite(got).all():
+        return {"coordinates": "not finite"}
     gap = max(KDTree(got).query(right)[0].max(), KDTree(right).query(got)[0].max())
-    if not gap <= near:
-        differences["coordinates"] = f"off by {gap / size:.2g} of the size"
+    facts = {}
     for name, measure in (("area", area), ("volume", volume), ("length", length)):
         expected, measured = measure(truth), measure(found)
         if expected is None:
             continue
         if measured is None or not abs(measured - expected) <= 10 * SINGLE * expected:
             text = "none" if measured is None else f"{measured:.5g}"
-            differences[name] = f"{text} for {expected:.5g}"
-    if "coordinates" in differences:
-        return differences
+            facts[name] = f"{text} for {expected:.5g}"
+    if not gap <= near:  # all else follows from where the points are
+        sizes_told = "".join(f", {name} {fact}" for name, fact in facts.items())
+        return {"coordinates": f"off by {gap / size:.2g} of the size{sizes_told}"}
+    differences = facts
     if "texture" in truth:
         differences |= compare_at_corners(truth, found, "texture", 1e-4)
     if "colors" in truth:

@@ -1,9 +1,9 @@
 """What eigenshape reads of the files of others, and what it writes for them, with all that it says."""
 
-import itertools
 import json
 import warnings
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -85,10 +85,11 @@ def write_here(shape: Shape, path: Path) -> None:
         fields[name] = values[shape["owners"]] if "owners" in shape else values
     points = np.array(shape["points"])
     if "triangles" not in shape:
-        solid = shape_of(shape, points)
-        rows = (solid.n_points, solid.n_simplices)
-        fitting = {name: values for name, values in fields.items() if len(values) in rows}
-        es.io.write_fields(solid, path, fitting)
+        solid, owners = simplices_of(shape, points)
+        if "cells" in shape:
+            for name in shape["cell_fields"]:
+                fields[name] = fields[name][owners]
+        es.io.write_fields(solid, path, fields)
         return
     mesh = es.TriangleMesh(points, np.array(shape["triangles"]))
     if fields and path.suffix in (".vtu", ".vtk", ".vtp"):
@@ -108,16 +109,21 @@ def write_here(shape: Shape, path: Path) -> None:
     es.write_mesh(mesh, path, colors=colors, attributes=attributes)
 
 
-def shape_of(shape: Shape, points: np.ndarray) -> es.SimplicialMesh:
-    """Return curves as segments, and solids as tetrahedra."""
+def simplices_of(shape: Shape, points: np.ndarray) -> tuple[es.SimplicialMesh, np.ndarray]:
+    """Return curves as segments and solids as tetrahedra, and the cell that each is a piece of."""
     if "lines" in shape:
-        pairs = [pair for row in shape["lines"] for pair in itertools.pairwise(row)]
-        return es.SimplicialMesh(points, np.array(pairs))
-    cells = {kind: np.array(corners) for kind, corners in shape["cells"].items()}
-    tetrahedra = [
-        es.geometry.split_solids(points, cells[kind]).simplices for kind in cells if kind != "tetra"
-    ]
-    return es.SimplicialMesh(points, np.concatenate([*tetrahedra, cells["tetra"]]))
+        pairs = [pair for row in shape["lines"] for pair in pairwise(row)]
+        owners = np.repeat(np.arange(len(shape["lines"])), [len(row) - 1 for row in shape["lines"]])
+        return es.SimplicialMesh(points, np.array(pairs)), owners
+    blocks, counts = [], []
+    for kind, cells in shape["cells"].items():
+        block = np.array(cells)
+        if kind != "tetra":
+            block = es.geometry.split_solids(points, block).simplices
+        blocks.append(block)
+        counts += [len(block) // len(cells)] * len(cells)
+    solid = es.SimplicialMesh(points, np.concatenate(blocks))
+    return solid, np.repeat(np.arange(len(counts)), counts)
 
 
 def write_again(source: Path, path: Path) -> None:

@@ -60,6 +60,13 @@ const write = (...steps) => async (shape, path) => {
   if (steps.length) await document.transform(...steps);
   await io.write(path, document);
 };
+const writeNodeWeights = async (shape, path) => {
+  const document = documentOf(shape);
+  const [node] = document.getRoot().listNodes();
+  node.setWeights(shape.weights);
+  node.getMesh().setWeights(shape.weights.map(() => 1));
+  await io.write(path, document);
+};
 const writeMeshopt = async (shape, path) => {
   const document = documentOf(shape);
   document.createExtension(ALL_EXTENSIONS.find((each) => each.EXTENSION_NAME === "EXT_meshopt_compression")).setRequired(true);
@@ -150,6 +157,7 @@ await serve(
     "GLB, sparse": [".glb", write(sparse()), ...surfaces],
     "GLB, instances": [".glb", write(dedup(), instance({ min: 2 })), "copies"],
     "GLB, joined": [".glb", write(dedup(), flatten(), joinMeshes(), weld()), ...surfaces],
+    "GLB, weights of a node": [".glb", writeNodeWeights, "morph"],
     "GLB, meshopt": [".glb", writeMeshopt, ...surfaces],
   },
   { ".glb": read, ".gltf": read },

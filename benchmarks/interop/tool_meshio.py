@@ -52,6 +52,9 @@ def writer_of(name: str, **options: object) -> Callable[[Shape, Path], None]:
             mesh.point_data.pop("is seen", None)
         if name == "ply":
             mesh.point_data.pop("vector", None)
+        else:  # s and t mean nothing there
+            mesh.point_data.pop("s", None)
+            mesh.point_data.pop("t", None)
         meshio.write(path, mesh, file_format=name, **options)
 
     return write

@@ -56,9 +56,9 @@ class Document:
         rows = np.ascontiguousarray(rows, dtype="f")
         used = np.flatnonzero(rows.any(axis=1)).astype("H")
         indices = pygltflib.AccessorSparseIndices(
-            self.view(used.tobytes()), componentType=KINDS["H"]
+            bufferView=self.view(used.tobytes()), componentType=KINDS["H"]
         )
-        values = pygltflib.AccessorSparseValues(self.view(rows[used].tobytes()))
+        values = pygltflib.AccessorSparseValues(bufferView=self.view(rows[used].tobytes()))
         sparse = pygltflib.Sparse(count=len(used), indices=indices, values=values)
         accessor = pygltflib.Accessor(
             componentType=KINDS["f"], count=len(rows), type=TYPES[rows.shape[1]], sparse=sparse,
@@ -155,26 +155,19 @@ def write_skin(shape: Shape, path: Path) -> None:
     document.save(path)
 
 
-def write_targets(shape: Shape, path: Path, *, sparse: bool = False, on_node: bool = False) -> None:
-    """Write targets with weights, of the mesh or of the node, whose weights replace those of the mesh."""
+def write_targets(shape: Shape, path: Path, *, sparse: bool = False) -> None:
+    """Write targets with weights of the mesh; a node of pygltflib has no weights."""
     document = document_of(shape)
     add = document.add_sparse if sparse else document.add
     mesh = document.gltf.meshes[0]
     mesh.primitives[0].targets = [{"POSITION": add(target)} for target in shape["targets"]]
-    mesh.weights = [1.0, 1.0] if on_node else shape["weights"]
-    if on_node:
-        document.gltf.nodes[0].weights = shape["weights"]
+    mesh.weights = shape["weights"]
     document.save(path)
 
 
 def write_sparse_targets(shape: Shape, path: Path) -> None:
     """Write sparse targets."""
     write_targets(shape, path, sparse=True)
-
-
-def write_node_weights(shape: Shape, path: Path) -> None:
-    """Write weights of the node."""
-    write_targets(shape, path, on_node=True)
 
 
 if __name__ == "__main__":
@@ -190,7 +183,6 @@ if __name__ == "__main__":
             "glTF, skin": Writer(".gltf", write_skin, ("skin",)),
             "GLB, targets": Writer(".glb", write_targets, ("morph",)),
             "GLB, sparse targets": Writer(".glb", write_sparse_targets, ("morph",)),
-            "GLB, weights of a node": Writer(".glb", write_node_weights, ("morph",)),
         },
         {},
     )

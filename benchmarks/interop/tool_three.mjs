@@ -14,6 +14,7 @@ import { VTKLoader } from "three/examples/jsm/loaders/VTKLoader.js";
 import { Gathered, linearColor, rows, screenColor, serve } from "./exchange.mjs";
 
 globalThis.self = globalThis;
+globalThis.ProgressEvent = class {};
 globalThis.requestAnimationFrame = (work) => setTimeout(work, 0);
 globalThis.FileReader = class {
   readAsArrayBuffer(blob) {
@@ -27,18 +28,19 @@ globalThis.FileReader = class {
   }
 };
 
-function geometryOf(shape) {
+/** Return a geometry; what goes to glTF has v downward, as the loader of glTF leaves it. */
+function geometryOf(shape, down) {
   const geometry = new THREE.BufferGeometry();
   geometry.setIndex(shape.triangles.flat());
   geometry.setAttribute("position", new THREE.Float32BufferAttribute(shape.points.flat(), 3));
-  if (shape.texture) geometry.setAttribute("uv", new THREE.Float32BufferAttribute(shape.texture.flatMap(([u, v]) => [u, v]), 2));
+  if (shape.texture) geometry.setAttribute("uv", new THREE.Float32BufferAttribute(shape.texture.flatMap(([u, v]) => [u, down ? 1 - v : v]), 2));
   if (shape.colors) geometry.setAttribute("color", new THREE.Float32BufferAttribute(shape.colors.flatMap(linearColor), 3));
   return geometry;
 }
 
 /** Return the object that shows a shape. */
-function objectOf(shape) {
-  const geometry = geometryOf(shape);
+function objectOf(shape, down = false) {
+  const geometry = geometryOf(shape, down);
   const material = new THREE.MeshStandardMaterial({ vertexColors: Boolean(shape.colors) });
   const place = (object, { translation, rotation, scale }) => {
     object.position.set(...translation);
@@ -96,7 +98,7 @@ const scene = (object) => {
 };
 
 const writeGltf = (make, binary) => async (shape, path) => {
-  const made = await new GLTFExporter().parseAsync(scene(make(shape)), { binary });
+  const made = await new GLTFExporter().parseAsync(scene(make(shape, true)), { binary });
   writeFileSync(path, binary ? Buffer.from(made) : JSON.stringify(made));
 };
 const writeText = (exporter, options) => (shape, path) => {
@@ -204,6 +206,5 @@ await serve(
     ".ply": readGeometry(new PLYLoader()),
     ".stl": readGeometry(new STLLoader()),
     ".vtk": readGeometry(new VTKLoader()),
-    ".vtp": readGeometry(new VTKLoader()),
   },
 );

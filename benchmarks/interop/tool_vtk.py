@@ -157,7 +157,9 @@ def read(path: Path) -> Shape:
     chosen = solid if solid and not surface else surface
     texture = mesh.active_texture_coordinates
     if texture is not None:
-        found["texture"] = np.asarray(texture)[:, :2]
+        found["texture"] = np.array(texture)[:, :2].astype(float)
+        if path.suffix in (".glb", ".gltf"):  # v as in the file: downward
+            found["texture"][:, 1] = 1.0 - found["texture"][:, 1]
     for name in ("RGB", "RGBA", "Colors", "COLOR_0", "Color"):
         if name in mesh.point_data and mesh.point_data[name].ndim == 2:
             colors = np.asarray(mesh.point_data[name])

@@ -66,23 +66,30 @@ def test_a_skin_left_undone_is_not_named_by_what_is_only_kept(interop):
 
 def test_witnesses_decide_whose_difference_it_is(interop, shapes, tmp_path):
     exchange = object.__new__(interop.Exchange)
-    exchange.shapes, exchange.about, exchange.compared = shapes, {"a": {}, "b": {}}, {}
+    exchange.shapes, exchange.about, exchange.compared = shapes, {"trimesh": {}, "blender": {}}, {}
     path = tmp_path / "colors.ply"
     gray = {key: value for key, value in shapes["colors"].items() if key != "colors"}
     interop.write_here(shapes["colors"], path)
-    exchange.found = {(path, "a"): {"found": gray}, (path, "b"): {"found": shapes["colors"]}}
+    exchange.found = {
+        (path, "trimesh"): {"found": gray},
+        (path, "blender"): {"found": shapes["colors"]},
+    }
     written = interop.Written(path, "colors", [], "")
-    judged = interop.judge_writing(exchange, written, "a")
-    assert judged == "theirs: colors none; right in b"
-    assert interop.judge_writing(exchange, written, "a", {"colors"}) == "equal"
-    assert interop.judge_writing(exchange, written, "b") == "equal"
+    judged = interop.judge_writing(exchange, written, "trimesh")
+    assert judged == "theirs: colors none, and right in Blender"
+    assert interop.judge_writing(exchange, written, "trimesh", {"colors"}) == "equal"
+    assert interop.judge_writing(exchange, written, "blender") == "equal"
     refused = written._replace(error="No colors. Leave them out.")
-    assert interop.judge_writing(exchange, refused, "b") == "named: No colors"
-    assert interop.judge_reading(exchange, path, "a", "colors") == "equal"
+    assert interop.judge_writing(exchange, refused, "blender") == "named: No colors"
+    assert interop.judge_reading(exchange, path, "trimesh", "colors") == "equal"
     interop.write_here(gray, path)  # as a program that keeps no colors would
-    assert interop.judge_reading(exchange, path, "a", "colors").startswith("SILENT: colors none")
-    exchange.found[path, "b"], exchange.compared = {"found": gray}, {}
-    assert interop.judge_reading(exchange, path, "a", "colors").startswith("theirs: colors none")
+    assert interop.judge_reading(exchange, path, "trimesh", "colors").startswith(
+        "SILENT: colors none"
+    )
+    exchange.found[path, "blender"], exchange.compared = {"found": gray}, {}
+    assert interop.judge_reading(exchange, path, "trimesh", "colors").startswith(
+        "theirs: colors none"
+    )
 
 
 def test_formats_with_the_same_results_share_a_row(interop):
