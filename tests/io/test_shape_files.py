@@ -1,4 +1,5 @@
 import struct
+import warnings
 
 import meshio
 import numpy as np
@@ -264,8 +265,14 @@ EXPECTED = [[0, 0, 0], [1, 0, 0], [0, 1.5, 0]]
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_of_points(tmp_path, name):
     (tmp_path / name).write_bytes(TABLES[name])
-    assert read_shape(tmp_path / name).points.tolist() == EXPECTED
-    assert read_points(tmp_path / name, dim=1).dim == 1
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        assert read_shape(tmp_path / name).points.tolist() == EXPECTED
+        assert read_points(tmp_path / name, dim=1).dim == 1
+    more = b" 7" in TABLES[name]
+    assert [
+        str(each.message).endswith("1 columns after x, y and z are not read") for each in said
+    ] == [True, True] * more
 
 
 def test_a_binary_point_set(tmp_path):
@@ -309,6 +316,7 @@ def pcd(kind):
     return PCD + b"DATA binary_compressed\n" + struct.pack("<II", len(packed), len(plain)) + packed
 
 
+@pytest.mark.filterwarnings("ignore:.*the fields .* are not read")
 @pytest.mark.parametrize("kind", ["ascii", "binary", "binary_compressed"])
 def test_point_cloud_data(tmp_path, kind):
     (tmp_path / "a.pcd").write_bytes(pcd(kind))
@@ -390,6 +398,10 @@ def test_missing_returns_are_refused_or_dropped_when_asked(tmp_path):
         (b"3\n0 0 0\n", "it declares 3 and holds 1"),
         (b"# nothing\n", "A file of points must hold points; it holds none"),
         (b"0 0\n", "A vertex must have three numbers; line 1 is '0 0'"),
+        (
+            b"Version 1.0\nS001 1 2 3\n",
+            "landmarks of Landmark Editor. es.morphometrics.read_landmarks",
+        ),
     ],
 )
 def test_broken_tables_are_named(tmp_path, content, match):

@@ -2,6 +2,15 @@
 
 Nodes, instances, skins and morph targets place them, in the pose that stands in the file; animations
 are not played.
+
+Read: triangles, strips and fans of one scene; nodes, instances, skins, default weights of morph
+    targets, quantized and sparse accessors.
+Kept: to GLB all but tangents and instances; to others texture coordinates (with their transform),
+    normals, colors, materials with their images, names of nodes.
+Named: other scenes; hidden nodes; points and lines; weights of joints that have no sum of 1;
+    extensions that are not read; digits that are lost.
+Refused: meshes that Draco or meshopt has packed, and other extensions that a file requires;
+    buffers outside the file or its folder.
 """
 
 import base64

@@ -2,6 +2,12 @@
 
 All other sections are left out, and those that a shape could need are named. The format is described at
 https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format
+
+Read: elements by their corners, of versions 2 and 4, text and binary; nodes with parameters.
+Kept: nothing besides points and cells.
+Named: names of physical groups, partitions and functions; elements of higher order; solids that
+    were cut.
+Refused: versions 1 and 3; a mesh of Ansys, with the call of meshio that converts it.
 """
 
 import re

@@ -1,4 +1,10 @@
-"""NumPy archives: the arrays `vertices` and `faces`, and functions on them."""
+"""NumPy archives: the arrays `vertices` and `faces`, and functions on them.
+
+Read: faces of any number of corners.
+Kept: functions: arrays whose names begin with vertex_ and face_.
+Named: other arrays.
+Refused: arrays of other shapes or types.
+"""
 
 from io import BytesIO
 

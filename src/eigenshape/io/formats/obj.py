@@ -1,4 +1,11 @@
-"""Wavefront OBJ: positions and faces, and the lines of a file that `obj_attributes` understands."""
+"""Wavefront OBJ: positions and faces, and the lines of a file that `obj_attributes` understands.
+
+Read: polygons of any outline, polylines, vertices in a plane, negative indices, lines that go on.
+Kept: from OBJ to OBJ all but comments, points and polylines; to others texture coordinates,
+    normals, colors, materials with their images, groups.
+Named: missing materials and images; lines that are not kept.
+Refused: a corner that is no vertex; a face that crosses itself.
+"""
 
 import codecs
 import re

@@ -1,4 +1,10 @@
-"""Object File Format: counts, vertices and faces, as text or binary."""
+"""Object File Format: counts, vertices and faces, as text or binary.
+
+Read: polygons of any outline; binary files; OFF, COFF, NOFF, CNOFF, STOFF and 4OFF.
+Kept: nothing besides positions and faces.
+Named: colors, normals and texture coordinates, which are not read.
+Refused: a count that the file does not hold; a face that crosses itself; other dimensions (nOFF).
+"""
 
 import re
 from collections.abc import Sequence

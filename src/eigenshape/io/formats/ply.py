@@ -1,4 +1,11 @@
-"""Polygon File Format: a header that declares tables, then their rows, as text or binary of either order."""
+"""Polygon File Format: a header that declares tables, then their rows, as text or binary of either order.
+
+Read: polygons of any outline and strips, text and binary of both orders, all types of numbers.
+Kept: texture coordinates, normals, colors of vertices and faces, labels, fields, the image of a
+    comment.
+Named: elements with corners under another name; lists; missing images.
+Refused: a row that is not there; a face that crosses itself.
+"""
 
 import re
 import struct

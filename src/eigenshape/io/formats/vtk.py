@@ -1,4 +1,11 @@
-"""Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID, and functions on them."""
+"""Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID, and functions on them.
+
+Read: POLYDATA and UNSTRUCTURED_GRID, text and binary, cells of all kinds but polyhedra, by their
+    corners.
+Kept: functions on points and cells, of all types of numbers, masks and colors.
+Named: cells that were cut or read by their corners; arrays of text; data of unknown kinds.
+Refused: other data sets, with the call of PyVista that writes their surface; polyhedra.
+"""
 
 import re
 import string

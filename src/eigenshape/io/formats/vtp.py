@@ -1,4 +1,10 @@
-"""VTP files: PolyData of VTK in XML, and functions on them."""
+"""VTP files: PolyData of VTK in XML, and functions on them.
+
+Read: polygons, strips, lines and vertices; text, binary, zlib, LZMA and LZ4; several pieces.
+Kept: functions on points and cells.
+Named: arrays of text, or not in all pieces.
+Refused: a polygon that crosses itself; more than a file can hold.
+"""
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.vtk_cells import Arrays

@@ -1,4 +1,11 @@
-"""VTU files: unstructured grids of VTK in XML, and functions on them."""
+"""VTU files: unstructured grids of VTK in XML, and functions on them.
+
+Read: cells of all kinds but polyhedra, by their corners; text, binary, zlib, LZMA and LZ4;
+    several pieces.
+Kept: functions on points and cells.
+Named: cells that were cut or read by their corners; arrays of text, or not in all pieces.
+Refused: polyhedra; more than a file can hold.
+"""
 
 import numpy as np
 

@@ -1,4 +1,10 @@
-"""Annotation and label files of FreeSurfer: parcels with names and colors, and one parcel as a list of vertices."""
+"""Annotation and label files of FreeSurfer: parcels with names and colors, and one parcel as a list of vertices.
+
+Read: annotations of versions 1 and 2, and labels.
+Kept: names, colors and opacity of parcels.
+Named: parcels of one color, black and transparent ones; points without a vertex.
+Refused: an annotation without its table of colors; writing parcels of one color.
+"""
 
 from typing import Any
 

@@ -1,4 +1,10 @@
-"""CIFTI files: functions, series and parcels on the vertices of both hemispheres, and on voxels below them."""
+"""CIFTI files: functions, series and parcels on the vertices of both hemispheres, and on voxels below them.
+
+Read: scalars, series and labels of both hemispheres.
+Kept: names of maps; names and colors of parcels.
+Named: nothing.
+Refused: files without surfaces.
+"""
 
 from typing import Any
 

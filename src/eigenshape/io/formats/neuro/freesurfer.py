@@ -1,4 +1,11 @@
-"""Files of FreeSurfer: surfaces, functions on their vertices (curv), and volumes that hold such functions (MGH)."""
+"""Files of FreeSurfer: surfaces, functions on their vertices (curv), and volumes that hold such functions (MGH).
+
+Read: surfaces of triangles and quadrangles, binary and text; functions of the new and the old
+    form; MGH of n x 1 x 1, also with factored numbers.
+Kept: from FreeSurfer to FreeSurfer the volume that a surface belongs to (c_ras).
+Named: that volume in other formats; digits that are lost.
+Refused: patches; functions in place of a surface, and the other way around.
+"""
 
 import gzip
 import zlib

@@ -1,4 +1,11 @@
-"""GIFTI files: surfaces, functions and labels of vertices, in XML. nibabel writes them."""
+"""GIFTI files: surfaces, functions and labels of vertices, in XML. nibabel writes them.
+
+Read: surfaces, functions and labels of all ten types of numbers; text, binary, packed, and in a
+    file beside.
+Kept: from GIFTI to GIFTI the transformations, metadata and structure.
+Named: the transformation and metadata in other formats; parcels of one key; digits that are lost.
+Refused: several surfaces; files outside the folder; labels without names as parcels.
+"""
 
 import base64
 import binascii

@@ -1,4 +1,10 @@
-"""MNI objects, such as the surfaces of CIVET: polygons with normals and colors, in text or binary."""
+"""MNI objects, such as the surfaces of CIVET: polygons with normals and colors, in text or binary.
+
+Read: polygons, text and binary.
+Kept: nothing besides positions and faces.
+Named: colors of items and vertices.
+Refused: several objects in one file; lines.
+"""
 
 from typing import Any
 

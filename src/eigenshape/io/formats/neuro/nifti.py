@@ -1,4 +1,10 @@
-"""NIfTI files: a number for each voxel, and where the voxels lie."""
+"""NIfTI files: a number for each voxel, and where the voxels lie.
+
+Read: volumes of three axes; one number for each vertex, as n x 1 x 1.
+Kept: the map from voxels to space.
+Named: nothing.
+Refused: several frames as a volume; a map that is not finite.
+"""
 
 import math
 import zlib

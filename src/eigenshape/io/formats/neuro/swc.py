@@ -1,4 +1,10 @@
-"""SWC files: skeletons of neurons, as rows of number, kind, x, y, z, radius and parent."""
+"""SWC files: skeletons of neurons, as rows of number, kind, x, y, z, radius and parent.
+
+Read: points and their parents; points that are their own parents, radii that are not numbers.
+Kept: nothing besides positions.
+Named: columns after the seventh.
+Refused: a parent that is not there.
+"""
 
 import numpy as np
 from jaxtyping import Float, Int
