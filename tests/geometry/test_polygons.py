@@ -127,6 +127,7 @@ def test_corners_that_are_no_points_are_left_to_the_mesh():
     "outline",
     [
         BOW,
+        [[0, 0], [1, 0], [0, 1], [1, 0]],
         [[0, 0], [1, 1], [1, 0], [0, 1]],
         [[np.cos(a), np.sin(a)] for a in 4 * np.pi * np.arange(5) / 5],
         [[0, 0], [4, 0], [4, 3], [1, 3], [1, -1], [2, -1], [2, 2], [3, 2], [3, 1], [0, 1]],

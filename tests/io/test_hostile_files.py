@@ -189,7 +189,7 @@ RICH = {
     ),
     "obj rich": (
         obj.parse,
-        b"v 0 0 0 1\nv 1 0 \\\n0\nvt 0 0\nv 0 1 0\nf 1/1 2//2 -1/1/1\nf 1 2 3 2\n",
+        b"v 0 0 0 1\nv 1 0 \\\n0\nvt 0 0\nv 0 1 0\nf 1/1 2//2 -1/1/1\nf 1 2 3 1\n",
     ),
 }
 WORDS = [

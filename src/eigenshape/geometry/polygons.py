@@ -46,16 +46,16 @@ def triangulate_polygons(
     Raises
     ------
     InvalidShapeError
-        If a polygon crosses itself.
+        If a polygon crosses itself, or folds back so that it has no area.
     """
     triangles, owners, crossed = cut_polygons(points, starts, corners)
     if crossed.size:
         first = crossed[0]
         raise InvalidShapeError(
-            "Faces must be polygons that do not cross themselves, as seen along their normals; face "
-            f"{first} with the corners {corners[starts[first] : starts[first + 1]].tolist()} does "
-            f"({crossed.size} such). List its corners in the order of the outline, or save the mesh "
-            "with triangles."
+            "Faces must be polygons that do not cross themselves or fold back, as seen along their "
+            f"normals; face {first} with the corners "
+            f"{corners[starts[first] : starts[first + 1]].tolist()} does ({crossed.size} such). List its "
+            "corners in the order of the outline, or save the mesh with triangles."
         )
     return triangles, owners
 
