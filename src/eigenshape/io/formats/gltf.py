@@ -230,7 +230,14 @@ def _decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -
             f"A GLB file must hold all its data; buffers[{index}] points outside, to {str(uri)[:80]!r}."
         )
     size = _whole(entry, "byteLength")
-    data = read_regular(file_beside(index, str(uri), folder), "numbers")
+    path = file_beside(index, str(uri), folder)
+    # A service must not tell where its folder is, as an error of the system would.
+    if not path.exists():
+        raise FileFormatError(
+            f"Buffers of a .gltf file must lie in its folder; buffers[{index}], {str(uri)[:80]!r}, is not there. "
+            "Give the file with its folder, or save it as .glb, which holds all."
+        )
+    data = read_regular(path, "numbers")
     if len(data) < size:
         raise FileFormatError(
             f"buffers[{index}] must have {size} bytes; the file {str(uri)[:80]!r} has {len(data)}."
