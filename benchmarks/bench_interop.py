@@ -455,15 +455,16 @@ def main() -> None:
         default=Path(
             os.environ.get("EIGENSHAPE_INTEROP", Path.home() / ".cache/eigenshape-interop")
         ),
-        help="folder of Pythons and node_modules of programs",
+        help="folder of Pythons and node_modules of programs; EIGENSHAPE_INTEROP names another default",
     )
     parser.add_argument("--keep", type=Path, help="folder for the files")
     options = parser.parse_args()
+    tools = ["meshio"] if options.quick else options.tools.split(",")
     with tempfile.TemporaryDirectory() as temporary:
         folder = (options.keep or Path(temporary)).resolve()
         folder.mkdir(exist_ok=True, parents=True)
-        exchange = Exchange(folder, options.environments.expanduser(), options.tools.split(","))
-        for tool in options.tools.split(","):
+        exchange = Exchange(folder, options.environments.expanduser(), tools)
+        for tool in tools:
             if tool not in exchange.about:
                 print(f"{tool}: not installed", flush=True)
         rows = run(exchange)
