@@ -1,6 +1,7 @@
 """What eigenshape reads of the files of others, and what it writes for them, with all that it says."""
 
 import json
+import re
 import warnings
 from collections.abc import Callable
 from itertools import pairwise
@@ -28,7 +29,9 @@ def listen(work: Callable[[], Any]) -> tuple[Any, list[str], str]:
             result, error = work(), ""
         except es.EigenshapeError as err:
             result, error = None, f"{err}"
-    return result, [str(each.message) for each in caught], error
+    # A path before a message is no word about what the file holds.
+    messages = [re.sub(r"^/\S+: ", "", str(each.message)) for each in caught]
+    return result, messages, error
 
 
 def read_here(path: Path) -> Shape:

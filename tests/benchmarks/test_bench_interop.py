@@ -61,6 +61,7 @@ def test_a_skin_left_undone_is_not_named_by_what_is_only_kept(interop):
     kept = "a.glb: only a file of the same format keeps skins"
     assert not interop.is_named("coordinates", [kept])
     assert interop.is_named("coordinates", ["a.glb: its skin is not applied"])
+    assert not interop.is_named("colors", ["keeps properties other than color and image"])
     assert interop.is_named("field part", ["a.ply does not keep: the field 'part'."])
 
 
