@@ -43,13 +43,13 @@ ELEMENTS = {
     21: (69, 10), 26: (68, 4), 29: (71, 20), 36: (70, 16), 92: (72, 64), 90: (73, 40),
 }  # fmt: skip
 # Sections that a shape does not keep
-LEFT_OUT = (
-    b"PhysicalNames",
-    b"PartitionedEntities",
-    b"NodeData",
-    b"ElementData",
-    b"ElementNodeData",
-)
+LEFT_OUT = {
+    b"PhysicalNames": "names of physical groups",
+    b"PartitionedEntities": "partitions",
+    b"NodeData": "fields on nodes",
+    b"ElementData": "fields on elements",
+    b"ElementNodeData": "fields on corners of elements",
+}
 NODE = np.dtype([("tag", "<i4"), ("place", "<f8", 3)])  # of a binary file of version 2
 RULE = "Nodes and elements of a gmsh file must be as it declares them"
 
@@ -99,8 +99,8 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...
         tags, points = _plain_nodes(nodes, _plain_count(nodes))
         read_elements = _listed_elements if is_text else _plain_elements
         rows = read_elements(elements, _plain_count(elements))
-    lost = [b"$" + section for section in LEFT_OUT if b"$" + section in data]
-    notes = [f"{b', '.join(lost).decode()} of the file are not kept"] if lost else []
+    lost = [what for section, what in LEFT_OUT.items() if b"$" + section in data]
+    notes = [f"its {', '.join(lost)} are not kept"] if lost else []
     shape = sort_cells(points, *_cells(tags, rows))
     return shape.points, shape.cells, *(notes + shape.notes)
 
