@@ -13,7 +13,8 @@ from eigenshape.io.formats.registry import format_of
 def read_or_refuse(parse, data):
     try:
         with np.errstate(all="ignore"):
-            mesh = TriangleMesh(*parse(data))
+            points, faces, *_ = parse(data)
+            mesh = TriangleMesh(points, faces)
     except EigenshapeError:
         return None
     assert np.isfinite(mesh.vertices).all()
