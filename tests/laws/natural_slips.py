@@ -50,8 +50,10 @@ def given_as(
 ) -> Iterator[None]:
     """Let all values be those of another body, or of the same in another unit."""
     start_afresh(Form(unit, surface, n_modes))
-    yield
-    start_afresh(Form())
+    try:
+        yield
+    finally:
+        start_afresh(Form())
 
 
 def start_afresh(form: Form) -> None:

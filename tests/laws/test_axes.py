@@ -5,7 +5,6 @@ reason beside its name.
 """
 
 import inspect
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any, get_type_hints
@@ -18,6 +17,7 @@ from laws.natural_slips import VALUES, fresh, given_as, kinds, public_callables,
 
 import eigenshape as es
 
+pytestmark = pytest.mark.filterwarnings("ignore")
 Answer = list[tuple[str, np.ndarray]] | str
 PICTURES_AND_FILES = ("draw", "figure_", "part_colors", "view", "write_", "read_", "open_", "save")
 # What says nothing of these axes, or has tests of its own because it takes seconds.
@@ -125,13 +125,6 @@ NAMES = sorted(
 )
 
 
-@pytest.fixture(scope="module", autouse=True)
-def quietly():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
-
-
 @pytest.fixture(scope="module")
 def names(in_turn):
     return in_turn(NAMES)
@@ -231,7 +224,6 @@ def test_every_number_scales_by_a_power_of_the_unit(names, right, unit):
 BY_CORNER = "is a list of corners or of places in them"
 BY_SEARCH = "searches from random points of the faces, which begin at another corner"
 ORDERED = {
-    "Allometry.shapes": BY_CORNER,
     "align_surfaces": BY_SEARCH,
     "carry_landmarks": BY_SEARCH,
     "closest_points": BY_CORNER,
@@ -247,7 +239,6 @@ ORDERED = {
     "prepare_heat_geodesics": BY_CORNER,
     "prepare_vector_heat": BY_CORNER,
     "sample_surface": BY_SEARCH,
-    "subdivide": BY_CORNER,
     "transfer_labels": "names a corner of the clearest face",
     "witness_region": BY_SEARCH,
 }
