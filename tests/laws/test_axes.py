@@ -12,6 +12,7 @@ from typing import Any, get_type_hints
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from beartype.roar import BeartypeCallHintViolation
 from laws import natural_slips
 from laws.natural_slips import VALUES, fresh, given_as, kinds, public_callables, right_value
 
@@ -93,7 +94,8 @@ def answer(code: Callable[..., Any], given: dict[str, Any]) -> Answer:
     ]
     try:
         return list(numbers(code(*starred, **given)))
-    except es.EigenshapeError as error:
+    except (es.EigenshapeError, BeartypeCallHintViolation) as error:
+        # Types are refused by the tests before the library refuses them: natural_slips asks it.
         return f"{type(error).__name__}: {error}"
 
 
@@ -276,10 +278,9 @@ OF_A_BASIS = "is a basis of eigenspaces that both copies share, or stands in one
 OF_ONE_COPY = "the right values are of the first copy"
 NOT_FOR_EACH = {
     "Solver.eigs": OF_A_BASIS,
-    "align_modes": OF_A_BASIS,
     "approximate_heat_signature": "is an estimate by random vectors",
     "boundary_load": OF_ONE_COPY,
-    "carry_attributes": OF_THE_WHOLE,
+    "closest_points": "a point on an edge is in either triangle",
     "curvature_tensors": OF_THE_WHOLE,
     "detailed_skeleton": OF_A_BASIS,
     "eigen_deformation": OF_A_BASIS,
@@ -293,11 +294,11 @@ NOT_FOR_EACH = {
     "operator_bundle": OF_A_BASIS,
     "prepare_heat_geodesics": OF_THE_WHOLE,
     "prepare_vector_heat": OF_THE_WHOLE,
-    "project": OF_A_BASIS,
     "reconstruct": OF_A_BASIS,
     "signed_heat_distance": OF_ONE_COPY,
     "solve_spectrum": OF_A_BASIS,
     "transfer_labels": OF_THE_WHOLE,
+    "warp_mesh": OF_ONE_COPY,
     "wave_kernel_signature": "is a share of all modes",
 }
 APART = 6 * np.pi  # of waves of length 2 pi in the right values, which are the same for both copies
