@@ -3,6 +3,7 @@
 import copy
 import json
 import mimetypes
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,6 @@ from jaxtyping import Int
 from scipy.sparse import csr_array
 
 from eigenshape._errors import FileFormatError
-from eigenshape._files import read_regular
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
@@ -29,31 +29,34 @@ from eigenshape.io.carrying import interpolate
 from eigenshape.io.formats.gltf import (
     COMPRESSIONS,
     INSTANCES,
+    KINDS,
     LEVELS,
     SURFACES,
+    WIDTHS,
     Gltf,
     Placement,
     Scene,
     decode,
-    decode_buffers,
+    decode_buffer,
     extension,
-    file_beside,
+    families,
     pack,
+    place_triangles,
     pose_matrices,
     raw_accessor,
-    read_accessor,
+    read_beside,
     read_gltf,
-    read_scene,
     sides,
     transform_points,
+    turn_back,
     view_of,
 )
 from eigenshape.io.formats.rounding import rounding_loss
 from eigenshape.io.formats.stl import single_precision
 from eigenshape.io.opening import SourceFile
 
-COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
-TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+COMPONENTS = {kind[-2:]: number for number, kind in KINDS.items()}
+TYPES = {width: name for name, width in WIDTHS.items()}
 # What a document may hold besides a scene with materials.
 EXTRAS = ("skins", "animations", "cameras", "extensions")
 TANGENTS = "tangents, which viewers compute anew"
@@ -68,58 +71,57 @@ OF_GEOMETRY = (
 # A shape that lies this many times its size from the origin is written about its own middle: three
 # of the 24 binary digits of single precision are worth a node that is moved.
 FAR = 8
-Columns = dict[str, tuple[np.ndarray, bool]]  # numbers, and whether whole ones mean shares of one
+Column = tuple[np.ndarray, bool]  # numbers, and whether whole ones mean shares of one
+Columns = dict[str, Column]
 
 
 def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     """Return the attributes of the triangles of a scene, by face as in the mesh that was read."""
     gltf, scene = _open(source)
-    n_faces = len(scene.piece.faces)
-    corner_rows = scene.piece.rows[scene.piece.faces]
+    rows_of_corners = scene.piece.rows[scene.piece.faces]
     found: dict[str, Any] = {}
-    materials = [_material(gltf, source, entry) for entry in gltf.tree.get("materials", [])]
     nodes = list(scene.placements)
-    face_materials, face_groups, face_parts = np.full((3, n_faces), -1)
-    for part, (node, _, primitive, chosen) in enumerate(_placed_primitives(gltf, scene)):
-        named = primitive["attributes"]
-        number = primitive.get("material", -1)
-        face_materials[chosen], face_groups[chosen] = number, nodes.index(node)
-        face_parts[chosen] = part
+    parts, face_parts = _parts(scene)
+    face_materials, face_groups = np.full((2, len(face_parts)), -1)
+    for number, (node, place) in enumerate(parts):
+        chosen = np.flatnonzero(face_parts == number)
+        primitive = gltf.entry("meshes", scene.placements[node].mesh)["primitives"][place]
+        face_materials[chosen] = primitive.get("material", -1)
+        face_groups[chosen] = nodes.index(node)
         coordinates, transform = _base_coordinates(gltf, primitive)
-        columns = {"normals": ("NORMAL", (3,)), "texture_coordinates": (coordinates, (2,)),
-                   "colors": ("COLOR_0", (3, 4))}  # fmt: skip
-        for key, (name, widths) in columns.items():
-            if name not in named:
+        columns = {"normals": ("NORMAL", 3), "texture_coordinates": (coordinates, 2),
+                   "colors": ("COLOR_0", 4)}  # fmt: skip
+        for key, (name, width) in columns.items():
+            if name not in primitive["attributes"]:
                 continue
-            width = raw_accessor(gltf, named[name]).shape[1]
-            if width not in widths:
+            rows = decode(*_column(gltf, primitive["attributes"][name]))
+            if key == "colors" and rows.shape[1] == 3:
+                rows = np.pad(rows, ((0, 0), (0, 1)), constant_values=1.0)
+            if rows.shape[1] != width:
                 raise FileFormatError(
-                    f"{name} of a primitive must have {widths[0]} numbers each; it has {width}."
+                    f"{name} of a primitive must have {width} numbers each; it has {rows.shape[1]}."
                 )
-            rows = read_accessor(gltf, named[name], width)
-            if key == "colors" and width == 3:
-                rows = np.column_stack([rows, np.ones(len(rows))])
             if key == "texture_coordinates":
-                rows = _transform_coordinates(rows, transform)
+                rows = _upward_coordinates(rows, transform)
             default = 1.0 if key == "colors" else 0.0
-            table = found.setdefault(key, np.full((n_faces, 3, max(widths)), default))
-            table[chosen] = _take(rows, corner_rows[chosen], name)
-    if "texture_coordinates" in found:
-        found["texture_coordinates"][..., 1] = 1.0 - found["texture_coordinates"][..., 1]
+            table = found.setdefault(key, np.full((*mesh.faces.shape, width), default))
+            table[chosen] = _take(rows, rows_of_corners[chosen], name)
     if "colors" in found:
         found["colors"][..., :3] = screen_colors(found["colors"][..., :3])
         found["colors"] = np.rint(255 * found["colors"].clip(0, 1)).astype(np.uint8)
-    entries = [gltf.entry("nodes", node) for node in nodes]
     names = [
-        str(entry.get("name") or gltf.entry("meshes", entry["mesh"]).get("name", ""))
-        for entry in entries
+        str(
+            gltf.entry("nodes", node).get("name")
+            or gltf.entry("meshes", place.mesh).get("name", "")
+        )
+        for node, place in scene.placements.items()
     ]
     return replace(
         plain_attributes(mesh),
         face_parts=face_parts,
         face_materials=face_materials,
         face_groups=face_groups,
-        materials=tuple(materials),
+        materials=tuple(_material(gltf, source, entry) for entry in gltf.entries("materials")),
         groups=tuple(names),
         others=_others(gltf),
         source=source,
@@ -129,19 +131,19 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
 
 def _open(source: SourceFile) -> tuple[Gltf, Scene]:
     gltf = read_gltf(source.data, source.folder if source.suffix == ".gltf" else None)
-    return gltf, read_scene(gltf, source.scene)
+    return gltf, place_triangles(gltf, source.scene)
 
 
-def _placed_primitives(
-    gltf: Gltf, scene: Scene
-) -> Iterator[tuple[int, int, dict[str, Any], Int[np.ndarray, " k"]]]:
-    """Give the node, the number and the faces of each primitive of each node that has faces."""
-    for node in scene.placements:
-        primitives = gltf.entry("meshes", gltf.entry("nodes", node)["mesh"])["primitives"]
-        for number, primitive in enumerate(primitives):
-            chosen = (scene.nodes == node) & (scene.piece.primitives == number)
-            if chosen.any():
-                yield node, number, primitive, np.flatnonzero(chosen)
+def _parts(scene: Scene) -> tuple[list[list[int]], Int[np.ndarray, " f"]]:
+    """Return the node and the number of each primitive that has faces, and each face's primitive in this list."""
+    size = scene.piece.primitives.max() + 1
+    codes, owners = np.unique(scene.nodes * size + scene.piece.primitives, return_inverse=True)
+    return np.transpose(np.divmod(codes, size)).tolist(), owners
+
+
+def _column(gltf: Gltf, index: Any) -> Column:
+    """Return the rows of an accessor as they are stored."""
+    return raw_accessor(gltf, index), gltf.entry("accessors", index).get("normalized") is True
 
 
 def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
@@ -167,13 +169,13 @@ def _base_coordinates(gltf: Gltf, primitive: dict[str, Any]) -> tuple[str, dict[
     return f"TEXCOORD_{transform.get('texCoord', texture.get('texCoord', 0))}", transform
 
 
-def _transform_coordinates(rows: np.ndarray, transform: dict[str, Any]) -> np.ndarray:
-    """Scale, turn and shift texture coordinates, whose v goes down (KHR_texture_transform)."""
+def _upward_coordinates(rows: np.ndarray, transform: dict[str, Any]) -> np.ndarray:
+    """Scale, turn and shift texture coordinates (KHR_texture_transform), and let v go up."""
     angle = transform.get("rotation", 0.0)
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     scaled = rows * transform.get("scale", [1.0, 1.0])
-    turned: np.ndarray = scaled @ turn.T + transform.get("offset", [0.0, 0.0])
-    return turned
+    moved = scaled @ turn + transform.get("offset", [0.0, 0.0])
+    return np.column_stack([moved[:, 0], 1.0 - moved[:, 1]])
 
 
 def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material:
@@ -189,11 +191,10 @@ def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material
         if number is not None:
             held = gltf.entry("images", number)
             image, kind = _image(gltf, source, held)
+            uri = held.get("uri", "data:")
+            named_file = Path(str(held.get("name") or ("" if uri.startswith("data:") else uri)))
             ending = mimetypes.guess_extension(kind) or f".{kind.rpartition('/')[2]}"
-            ending = ".jpg" if kind == "image/jpeg" else ending
-            stem = Path(str(held.get("name") or held.get("uri", "")[:80])).name
-            stem = Path(stem).stem if not stem.startswith("data:") else ""
-            image_name = f"{stem or f'image{number}'}{ending}"
+            image_name = f"{named_file.stem or f'image{number}'}{ending}"
     return Material(str(entry.get("name", "")), (red, green, blue, alpha), image, image_name)
 
 
@@ -204,11 +205,9 @@ def _image(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> tuple[bytes
     uri = str(entry.get("uri", ""))
     kind = entry.get("mimeType") or mimetypes.guess_type(uri)[0] or "image/png"
     if uri.startswith("data:"):
-        return decode_buffers({"buffers": [{"uri": uri}]}, b"")[0], uri[5:].partition(";")[
-            0
-        ] or kind
+        return decode_buffer(0, entry, b"", None), uri[5:].partition(";")[0] or kind
     try:
-        return read_regular(file_beside(0, uri, source.folder), "an image"), kind
+        return read_beside(0, uri, source.folder), kind
     except (OSError, FileFormatError):
         return None, kind
 
@@ -332,8 +331,7 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     gltf, scene = _open(source)
     document = _copy_document(gltf, source, job.lost)
     file_rows = scene.piece.rows[scene.piece.faces.ravel()]
-    parts = [(node, number) for node, number, _, _ in _placed_primitives(gltf, scene)]
-    nodes, primitive_numbers = np.array(parts)[attributes.face_parts].T
+    nodes, primitive_numbers = np.array(_parts(scene)[0])[attributes.face_parts].T
     places = mesh.vertices[mesh.faces]
     found = np.zeros_like(places)  # where the written file puts the corners
     normals = corner_normals(attributes, mesh)
@@ -341,7 +339,7 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     for node, place in scene.placements.items():
         primitives = gltf.entry("meshes", place.mesh)["primitives"]
         written[node] = [part for part in primitives if part.get("mode", 4) not in SURFACES]
-        for numbers in _sharing(primitives):
+        for numbers in families(primitives):
             shared = primitives[numbers[0]]
             chosen = np.flatnonzero((nodes == node) & np.isin(primitive_numbers, numbers))
             if not chosen.size:
@@ -353,31 +351,23 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
             blends = csr_array((blends.data, inverse.ravel(), blends.indptr))
             columns = _carry_columns(gltf, shared, rows, blends)
             old = decode(*columns[0].pop("POSITION"))
+            has_normals = normals is not None and "NORMAL" in shared["attributes"]
             normal = (
-                normals[chosen].reshape(-1, 3)
-                if normals is not None and "NORMAL" in shared["attributes"]
-                else None
+                normals[chosen].reshape(-1, 3) if has_normals else np.empty((blends.shape[0], 0))
             )
             # Corners of the file agree if their rows do, others if all their values do.
             keys = [rows[blends.indices]]
             if blends.nnz > 3 * len(chosen):
-                keys = [
-                    column
-                    for table in columns
-                    for values, _ in table.values()
-                    for column in values.T
-                ]
-            keys += [] if normal is None else [*np.rint(normal.T * 1e5)]
-            first, indices = _split_corners([mesh.faces[chosen].ravel(), *keys])
+                keys = [values for table in columns for values, _ in table.values()]
+            first, indices = _split_corners(
+                [mesh.faces[chosen].ravel(), *keys, np.rint(normal * 1e5)]
+            )
             columns = [_choose_rows(table, first) for table in columns]
             wanted = places[chosen].reshape(-1, 3)[first]
-            facing = None if normal is None else normal[first]
-            turned, put = _place_vertices(place, columns, old[first], wanted, facing)
+            turned, put = _place_vertices(place, columns, old[first], wanted, normal[first])
             triangles = indices.reshape(-1, 3)
             found[chosen] = put[triangles]
-            # A reflection turns triangles over, and the reader has turned them back.
-            flips = turned[triangles].sum(axis=1) < 0
-            triangles = np.where(flips[:, None], triangles[:, ::-1], triangles)
+            triangles = turn_back(triangles, turned)  # as the reader does
             job.lost.extend([TANGENTS] if "TANGENT" in shared["attributes"] else [])
             changed: dict[str, Any] = {"attributes": document.add_columns(columns[0])}
             if columns[1:]:
@@ -422,9 +412,9 @@ def _place_vertices(
     columns: list[Columns],
     old: np.ndarray,
     places: np.ndarray,
-    normals: np.ndarray | None,
+    normals: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Add the positions that a node moves into places, and normals, to the columns of vertices.
+    """Add the positions that a node moves into places, and normals if there are any, to the columns of vertices.
 
     What stays in its place keeps its old position, also below a node or joint of scale 0. Return
     the side that each vertex is turned to, and the place of its rounded position.
@@ -432,14 +422,15 @@ def _place_vertices(
     table, *targets = columns
     pose = place.matrix[None]
     if place.bones is not None:
-        pose = pose_matrices({name: decode(*column) for name, column in table.items()}, place.bones)
+        values = {name: decode(*column) for name, column in table.items()}
+        pose, _ = pose_matrices(values, place.bones)
     linear = pose[:, :3, :3]
     shifts, turns = (_morph(place, targets, name) for name in ("POSITION", "NORMAL"))
     moves = places - transform_points(pose, old + shifts)
     with np.errstate(over="ignore"):  # what is too large is found when places are compared
         local = (old + np.einsum("...ij,...j->...i", np.linalg.pinv(linear), moves)).astype("<f4")
     table["POSITION"] = local, False
-    if normals is not None:
+    if normals.size:
         normals = unit_rows(np.einsum("...ji,...j->...i", linear, normals))
         table["NORMAL"] = unit_rows(normals - turns).astype("<f4"), False
     return np.broadcast_to(sides(pose), len(local)), transform_points(pose, local + shifts)
@@ -467,20 +458,9 @@ def _drop_extensions(tree: dict[str, Any], nodes: Iterable[int]) -> list[str]:
     for key in ("extensionsUsed", "extensionsRequired"):
         names = tree.pop(key, [])
         still_used = [name for name in names if name not in dropped or f'"{name}":' in text]
-        if still_used:
-            tree[key] = still_used
+        tree |= {key: still_used} if still_used else {}
     return [f"the extension {name}, which is about the old geometry"
             for name in sorted(dropped.difference(COMPRESSIONS))]  # fmt: skip
-
-
-def _sharing(primitives: list[dict[str, Any]]) -> list[list[int]]:
-    """Return the numbers of surfaces that share their vertices and differ in material alone."""
-    families: dict[str, list[int]] = {}
-    for number, part in enumerate(primitives):
-        if part.get("mode", 4) in SURFACES:
-            key = json.dumps([part["attributes"], part.get("targets")], sort_keys=True)
-            families.setdefault(key, []).append(number)
-    return list(families.values())
 
 
 def _split_corners(keys: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -493,12 +473,12 @@ def _split_corners(keys: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 def _blend(
     gltf: Gltf, index: int, name: str, rows: Int[np.ndarray, " r"], blends: csr_array
-) -> tuple[np.ndarray, bool]:
+) -> Column:
     """Interpolate an attribute; joints, whose weights go along, and numbers of things are only chosen."""
-    values = _take(raw_accessor(gltf, index), rows, name)
+    values, is_normalized = _column(gltf, index)
+    values = _take(values, rows, name)
     is_chosen = name.startswith(("JOINTS", "WEIGHTS"))
     is_chosen |= name.startswith("_") and values.dtype.kind in "iu"
-    is_normalized = gltf.entry("accessors", index).get("normalized") is True
     return interpolate(blends, values, blend=not is_chosen), is_normalized
 
 
@@ -530,35 +510,34 @@ def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document
 def _replace_meshes(tree: dict[str, Any], written: dict[int, list[dict[str, Any]]]) -> None:
     """Give each node a mesh of its new primitives, and empty the accessors that they replace."""
     nodes, meshes = tree["nodes"], tree["meshes"]
-    before = copy.deepcopy(meshes)
-    first_user: dict[int, int] = {}
-    for node, entry in enumerate(nodes):
-        first_user.setdefault(entry.get("mesh", -1), node)
+    before = _accessors_of(meshes)
+    users = Counter(node.get("mesh") for node in nodes)
     for node, primitives in written.items():
         index = nodes[node]["mesh"]
+        users[index] -= 1
+        mesh = {**meshes[index], "primitives": primitives}
         if not primitives:
             del nodes[node]["mesh"]  # all its faces were dropped
             nodes[node].pop("skin", None)
-        elif first_user[index] == node:
-            meshes[index] = {**before[index], "primitives": primitives}
+        elif not users[index]:
+            meshes[index] = mesh
         else:  # several nodes share a mesh, and each has its own positions now
             nodes[node]["mesh"] = len(meshes)
-            meshes.append({**before[index], "primitives": primitives})
-    still_used = {index for mesh in meshes for index in _accessors_of(mesh)}
+            meshes.append(mesh)
+    still_used = _accessors_of(meshes)
     for animation in tree.get("animations", []):
         still_used |= {s[key] for s in animation.get("samplers", []) for key in ("input", "output")}
     still_used |= {skin.get("inverseBindMatrices") for skin in tree.get("skins", [])}
-    for index in {index for mesh in before for index in _accessors_of(mesh)} - still_used:
+    for index in before - still_used:
         for key in ("bufferView", "byteOffset", "sparse", "min", "max"):
             tree["accessors"][index].pop(key, None)  # its data are left out when packed
 
 
-def _accessors_of(mesh: dict[str, Any]) -> Iterator[int]:
-    for part in mesh["primitives"]:
-        for columns in (part["attributes"], *part.get("targets", [])):
-            yield from columns.values()
-        if "indices" in part:
-            yield part["indices"]
+def _accessors_of(meshes: list[dict[str, Any]]) -> set[int]:
+    parts = [part for mesh in meshes for part in mesh["primitives"]]
+    tables = [table for part in parts for table in (part["attributes"], *part.get("targets", []))]
+    indices = {part["indices"] for part in parts if "indices" in part}
+    return indices.union(*(table.values() for table in tables))
 
 
 def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
@@ -592,8 +571,7 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
         if not tables and len(groups) == 1:  # vertices keep their order, also those without a face
             first, indices, positions = np.arange(mesh.n_vertices), corners, places
         else:
-            keys = [corners, *(column for values, _ in rows.values() for column in values.T)]
-            first, indices = _split_corners(keys)
+            first, indices = _split_corners([corners, *(values for values, _ in rows.values())])
             positions = places[corners]
         table = document.add_columns(_choose_rows({"POSITION": (positions, False), **rows}, first))
         materials = attributes.face_materials[in_group]
