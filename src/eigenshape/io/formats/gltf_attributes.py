@@ -63,11 +63,14 @@ TANGENTS = "tangents, which viewers compute anew"
 MADE_ANEW = ("POSITION", "NORMAL", "TANGENT")
 # Attributes of vertices that are made anew, go to other formats or are named as skins.
 CARRIED = {*MADE_ANEW, "COLOR_0", "JOINTS_0", "WEIGHTS_0"}
+KEPT_OF_MATERIALS = {
+    "name", "pbrMetallicRoughness", "baseColorFactor", "baseColorTexture", "metallicFactor",
+}  # fmt: skip
 # Extensions that copy, compress or replace the old geometry, or name its vertices by number.
-OF_GEOMETRY = (
+OF_GEOMETRY = {
     *COMPRESSIONS, INSTANCES, LEVELS, "EXT_instance_features", "EXT_mesh_manifold", "EXT_mesh_polygon",
     "EXT_mesh_primitive_edge_visibility", "CESIUM_primitive_outline", "FB_ngon_encoding",
-)  # fmt: skip
+}  # fmt: skip
 # A shape that lies this many times its size from the origin is written about its own middle: three
 # of the 24 binary digits of single precision are worth a node that is moved.
 FAR = 8
@@ -205,7 +208,7 @@ def _image(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> tuple[bytes
     uri = str(entry.get("uri", ""))
     kind = entry.get("mimeType") or mimetypes.guess_type(uri)[0] or "image/png"
     if uri.startswith("data:"):
-        return decode_buffer(0, entry, b"", None), uri[5:].partition(";")[0] or kind
+        return decode_buffer(0, entry, b"", None), kind
     try:
         return read_beside(0, uri, source.folder), kind
     except (OSError, FileFormatError):
@@ -217,21 +220,18 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
     tree = gltf.tree
     names = [kind for kind in EXTRAS if tree.get(kind)]
     primitives = [part for mesh in tree.get("meshes", []) for part in mesh.get("primitives", [])]
-    further: set[str] = set()
-    for part in primitives:
-        further |= {*part["attributes"]} - CARRIED - {_base_coordinates(gltf, part)[0]}
+    tables = [{*part["attributes"]} - {_base_coordinates(gltf, part)[0]} for part in primitives]
+    further = set().union(*tables) - CARRIED
     names.extend(f"the values {name} of vertices" for name in sorted(further))
     if any("targets" in part for part in primitives):
         names.append("morph targets")
     if any(part.get("mode", 4) not in SURFACES for part in primitives):
         names.append("lines and points")
-    plain_pbr = {"baseColorFactor", "baseColorTexture", "metallicFactor"}
     for entry in tree.get("materials", []):
         pbr = _base_color(entry)
-        is_metal = pbr.get("metallicFactor", 1.0) != 0.0  # our own files say 0
         is_clear = pbr.get("baseColorFactor", [1.0])[-1] < 1
-        plain = {"name", "pbrMetallicRoughness", *(["alphaMode"] if is_clear else [])}
-        if is_metal or set(entry) - plain or set(pbr) - plain_pbr:
+        further_keys = {*entry, *pbr} - KEPT_OF_MATERIALS - ({"alphaMode"} if is_clear else set())
+        if further_keys or pbr.get("metallicFactor") != 0.0:  # our own files say 0
             names.append("properties of materials other than color and image")
             break
     if len(tree.get("nodes", [])) > len(tree.get("meshes", [])):
@@ -240,18 +240,15 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
 
 
 class _Document:
-    """A glTF tree and its one buffer, to which accessors are added."""
+    """A glTF tree and the contents of its views, to which accessors are added."""
 
-    def __init__(self, tree: dict[str, Any], binary: bytes | bytearray = b"") -> None:
-        self.tree, self.binary = tree, bytearray(binary)
+    def __init__(self, tree: dict[str, Any], contents: Iterable[bytes | memoryview] = ()) -> None:
+        self.tree, self.contents = tree, list(contents)
 
     def add_view(self, data: bytes, **entry: Any) -> int:
-        self.binary += b"\0" * (-len(self.binary) % 4)
-        views: list[Any] = self.tree.setdefault("bufferViews", [])
-        place = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}
-        views.append({**place, **entry})
-        self.binary += data
-        return len(views) - 1
+        self.contents.append(data)
+        self.tree.setdefault("bufferViews", []).append(entry)
+        return len(self.contents) - 1
 
     def add_accessor(self, rows: np.ndarray, view: int, **entry: Any) -> int:
         accessors: list[Any] = self.tree.setdefault("accessors", [])
@@ -264,11 +261,10 @@ class _Document:
         found = {}
         for name, (values, is_normalized) in columns.items():
             rows = np.ascontiguousarray(values)
-            size = rows.dtype.itemsize * rows.shape[1]
-            step = size + -size % 4  # rows of attributes begin at multiples of four bytes
-            padded = np.zeros((len(rows), step), np.uint8)
-            padded[:, :size] = rows.view(np.uint8).reshape(len(rows), size)
-            view = self.add_view(padded.tobytes(), byteStride=step, target=34962)
+            octets = rows.view(np.uint8).reshape(len(rows), -1)
+            # Rows of attributes begin at multiples of four bytes.
+            padded = np.pad(octets, ((0, 0), (0, -octets.shape[1] % 4)))
+            view = self.add_view(padded.tobytes(), byteStride=padded.shape[1], target=34962)
             facts: dict[str, Any] = {"normalized": True} if is_normalized else {}
             if name == "POSITION":
                 facts |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
@@ -280,22 +276,22 @@ class _Document:
         return self.add_accessor(rows, self.add_view(rows.tobytes(), target=34963))
 
     def pack(self) -> bytes:
-        """Write the document, without the parts of its buffer that nothing uses."""
-        views = self.tree.get("bufferViews", [])
+        """Write the document, without views that nothing uses."""
         users = list(_view_users(self.tree))
-        used = sorted({user["bufferView"] for user in users})
-        kept = bytearray()
-        for index in used:
-            start = views[index].get("byteOffset", 0)
-            views[index]["byteOffset"] = len(kept)
-            kept += self.binary[start : start + views[index]["byteLength"]]
-            kept += b"\0" * (-len(kept) % 4)
-        places = {index: place for place, index in enumerate(used)}
+        views: list[dict[str, Any]] = []
+        places = {}
+        binary = bytearray()
+        for index in sorted({user["bufferView"] for user in users}):
+            data = self.contents[index]
+            places[index] = len(views)
+            place = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(data)}
+            views.append({**self.tree["bufferViews"][index], **place})
+            binary += data
+            binary += b"\0" * (-len(binary) % 4)
         for user in users:
             user["bufferView"] = places[user["bufferView"]]
-        self.tree["bufferViews"] = [views[index] for index in used]
-        self.tree["buffers"] = [{"byteLength": len(kept)}]
-        return pack(self.tree, bytes(kept))
+        self.tree |= {"bufferViews": views, "buffers": [{"byteLength": len(binary)}]}
+        return pack(self.tree, bytes(binary))
 
 
 def _view_users(value: Any) -> Iterator[dict[str, Any]]:
@@ -447,13 +443,12 @@ def _drop_extensions(tree: dict[str, Any], nodes: Iterable[int]) -> list[str]:
     owners = [tree["nodes"][node] for node in nodes]
     meshes = [tree["meshes"][owner["mesh"]] for owner in owners if "mesh" in owner]
     parts = [part for mesh in meshes for part in mesh["primitives"]]
-    dropped: set[str] = set()
+    dropped = set()
     for entry in [*owners, *meshes, *parts, *tree["bufferViews"]]:
-        extensions = entry.pop("extensions", {})
-        kept = {name: value for name, value in extensions.items() if name not in OF_GEOMETRY}
-        dropped |= extensions.keys() - kept.keys()
-        if kept:
-            entry["extensions"] = kept
+        extensions = entry.get("extensions", {})
+        for name in extensions.keys() & OF_GEOMETRY:
+            del extensions[name]
+            dropped.add(name)
     text = json.dumps(tree)
     for key in ("extensionsUsed", "extensionsRequired"):
         names = tree.pop(key, [])
@@ -483,16 +478,10 @@ def _blend(
 
 
 def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document:
-    """Copy a tree, with all buffers and images of other files in one buffer."""
+    """Copy a tree, with the contents of its views, and images of other files as views."""
     tree = copy.deepcopy(gltf.tree)
-    starts, binary = [], bytearray()
-    for data in gltf.buffers:
-        starts.append(len(binary))
-        binary += data + b"\0" * (-len(data) % 4)
-    for view in tree.get("bufferViews", []):
-        view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
-        view["buffer"] = 0
-    document = _Document(tree, binary)
+    count = len(tree.get("bufferViews", []))
+    document = _Document(tree, [view_of(gltf, index)[0] for index in range(count)])
     for entry in tree.get("images", []):
         uri = str(entry.get("uri", "data:"))
         if uri.startswith("data:"):
@@ -543,51 +532,48 @@ def _accessors_of(meshes: list[dict[str, Any]]) -> set[int]:
 def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
     """Write a GLB file with a node for each group and a primitive for each of its materials."""
     document = _Document({"asset": {"version": "2.0", "generator": "eigenshape"}, "scene": 0})
-    tree = document.tree
-    tree |= {"scenes": [{"nodes": []}], "nodes": [], "meshes": []}
+    nodes: list[dict[str, Any]] = []
+    meshes = []
     places, offset = _local_places(mesh)
-    normals = corner_normals(attributes, mesh)
     if attributes.materials:
-        tree["materials"] = [_write_material(document, m) for m in attributes.materials]
-    tables: Columns = {}  # with a row for each corner
+        document.tree["materials"] = [_write_material(document, m) for m in attributes.materials]
+    tables = {}  # with rows for the corners of each face
+    normals = corner_normals(attributes, mesh)
     if normals is not None:
-        tables["NORMAL"] = normals.astype("<f4"), False
+        tables["NORMAL"] = normals
     if attributes.texture_coordinates is not None:
-        flipped = [0, 1] + attributes.texture_coordinates * [1, -1]
-        tables["TEXCOORD_0"] = flipped.astype("<f4"), False
+        tables["TEXCOORD_0"] = [0, 1] + attributes.texture_coordinates * [1, -1]
     if attributes.colors is not None:
-        tints = attributes.colors / 255
-        tints[..., :3] = linear_colors(tints[..., :3])
         # Other programs keep the low byte of colors of 16 bits (trimesh 5.2, MeshLab).
-        tables["COLOR_0"] = tints.astype("<f4"), False
+        tables["COLOR_0"] = attributes.colors / 255
+        tables["COLOR_0"][..., :3] = linear_colors(tables["COLOR_0"][..., :3])
     groups = np.unique(attributes.face_groups)
     for group in groups:
         in_group = np.flatnonzero(attributes.face_groups == group)
         corners = mesh.faces[in_group].ravel()
         rows = {
-            name: (table[in_group].reshape(-1, table.shape[2]), is_normalized)
-            for name, (table, is_normalized) in tables.items()
+            name: table[in_group].reshape(len(corners), -1).astype("<f4")
+            for name, table in tables.items()
         }
         if not tables and len(groups) == 1:  # vertices keep their order, also those without a face
-            first, indices, positions = np.arange(mesh.n_vertices), corners, places
+            first, indices, rows["POSITION"] = np.arange(mesh.n_vertices), corners, places
         else:
-            first, indices = _split_corners([corners, *(values for values, _ in rows.values())])
-            positions = places[corners]
-        table = document.add_columns(_choose_rows({"POSITION": (positions, False), **rows}, first))
+            first, indices = _split_corners([corners, *rows.values()])
+            rows["POSITION"] = places[corners]
+        columns = document.add_columns(
+            {name: (values[first], False) for name, values in rows.items()}
+        )
         materials = attributes.face_materials[in_group]
         primitives: list[dict[str, Any]] = []
         for material in np.unique(materials).tolist():
-            of_part = np.repeat(materials == material, 3)
-            entry = {
-                "attributes": table,
-                "indices": document.add_indices(indices[of_part], len(first)),
-            }
-            primitives.append(entry | ({"material": material} if material >= 0 else {}))
-        name = attributes.groups[group] if group >= 0 else ""
-        tree["scenes"][0]["nodes"].append(len(tree["nodes"]))
-        node = {"mesh": len(tree["meshes"]), **({"name": name} if name else {})}
-        tree["nodes"].append(node | ({"translation": offset.tolist()} if offset.any() else {}))
-        tree["meshes"].append({"primitives": primitives})
+            of_part = indices[np.repeat(materials == material, 3)]
+            part = {"attributes": columns, "indices": document.add_indices(of_part, len(first))}
+            primitives.append(part | ({"material": material} if material >= 0 else {}))
+        node = {"mesh": len(meshes), "name": attributes.groups[group] if group >= 0 else ""}
+        nodes.append(node | ({"translation": offset.tolist()} if offset.any() else {}))
+        meshes.append({"primitives": primitives})
+    scenes = [{"nodes": list(range(len(nodes)))}]
+    document.tree |= {"scenes": scenes, "nodes": nodes, "meshes": meshes}
     return document.pack()
 
 
@@ -617,5 +603,5 @@ def _write_material(document: _Document, material: Material) -> dict[str, Any]:
         images.append({"bufferView": view, "mimeType": kind, "name": material.image_name})
         textures.append({"source": len(images) - 1})
         pbr["baseColorTexture"] = {"index": len(textures) - 1}
-    see_through = {"alphaMode": "BLEND"} if material.color[3] < 1 else {}
+    see_through = {"alphaMode": "BLEND"} if alpha < 1 else {}
     return {"name": material.name, "pbrMetallicRoughness": pbr, **see_through}
