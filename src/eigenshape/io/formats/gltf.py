@@ -17,7 +17,7 @@ import base64
 import json
 import struct
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +31,8 @@ from eigenshape._files import read_regular
 from eigenshape.io.formats.cells import NO_TRIANGLES
 from eigenshape.io.formats.numbers import quote_line
 
+Entry = dict[str, Any]  # an object of the JSON tree
+Column = tuple[np.ndarray, bool]  # numbers, and whether whole ones mean shares of one
 JSON_CHUNK = b"JSON"
 BINARY_CHUNK = b"BIN\0"
 COPIES = 2**22  # most vertices and faces from copies in a small file; they take 200 MB
@@ -55,10 +57,10 @@ COMPRESSIONS = (DRACO, "EXT_meshopt_compression", "KHR_meshopt_compression")
 PLACES = {"TRANSLATION": [0.0] * 3, "ROTATION": [0.0, 0.0, 0.0, 1.0], "SCALE": [1.0] * 3}
 # Beginnings of the names of extensions that are applied, or leave all geometry in its place.
 HARMLESS = (
-    INSTANCES, LEVELS, "KHR_mesh_quantization", "KHR_node_", "KHR_animation_", "KHR_audio", "KHR_lights_",
+    INSTANCES, "KHR_mesh_quantization", "KHR_node_", "KHR_animation_", "KHR_audio", "KHR_lights_",
     "KHR_materials_", "KHR_texture_", "KHR_xmp", "EXT_instance_features", "EXT_lights_", "EXT_materials_",
-    "EXT_mesh_features", "EXT_mesh_manifold", "EXT_structural_metadata", "EXT_texture_", "MSFT_packing_",
-    "MSFT_texture_", "FB_ngon_encoding", "CESIUM_primitive_outline", "GODOT_single_root", "VRM",
+    "EXT_mesh_features", "EXT_mesh_manifold", "EXT_structural_metadata", "EXT_texture_", "MSFT_",
+    "FB_ngon_encoding", "CESIUM_primitive_outline", "GODOT_single_root", "VRM",
 )  # fmt: skip
 
 
@@ -102,12 +104,12 @@ class Gltf:
     the file holds and the shape does not, as they are found.
     """
 
-    tree: dict[str, Any]
+    tree: Entry
     buffers: Sequence[bytes]
     most: int
     notes: list[str] = field(default_factory=list)
 
-    def entry(self, kind: str, index: Any) -> dict[str, Any]:
+    def entry(self, kind: str, index: Any) -> Entry:
         """Return one entry of a list in the tree."""
         entries = _list(self.tree, kind)
         known = type(index) is int and 0 <= index < len(entries)
@@ -117,7 +119,7 @@ class Gltf:
             )
         return entries[index]
 
-    def entries(self, kind: str) -> list[dict[str, Any]]:
+    def entries(self, kind: str) -> list[Entry]:
         """Return all entries of a list in the tree."""
         return [self.entry(kind, index) for index in range(len(_list(self.tree, kind)))]
 
@@ -183,7 +185,7 @@ def _chunks(data: bytes) -> dict[bytes, bytes]:
     return chunks
 
 
-def pack(tree: dict[str, Any], binary: bytes) -> bytes:
+def pack(tree: Entry, binary: bytes) -> bytes:
     """Write a tree and its buffer as one binary file."""
     text = json.dumps(tree, separators=(",", ":")).encode()
     body = _chunk(JSON_CHUNK, text, b" ") + _chunk(BINARY_CHUNK, binary, b"\0")
@@ -286,12 +288,13 @@ def _check_extensions(gltf: Gltf) -> None:
         )
 
 
-def extension(entry: Any, name: str) -> dict[str, Any]:
+def extension(entry: Any, name: str) -> Entry:
     """Return what an extension adds to an entry of the tree, which may be nothing."""
-    return _object(_object(entry, "extensions"), name)
+    return member(member(entry, "extensions"), name)
 
 
-def _object(entry: dict[str, Any], key: str) -> dict[str, Any]:
+def member(entry: Entry, key: str) -> Entry:
+    """Return an object in another one; without it an empty one."""
     value = entry.get(key, {})
     if not isinstance(value, dict):
         raise FileFormatError(f"{key} of a glTF file must be an object; it is {str(value)[:60]!r}.")
@@ -441,9 +444,9 @@ def _bones(gltf: Gltf, index: int, matrices: dict[int, np.ndarray]) -> np.ndarra
     return bones @ columns.transpose(0, 2, 1)
 
 
-def _instances(gltf: Gltf, node: dict[str, Any]) -> np.ndarray:
+def _instances(gltf: Gltf, node: Entry) -> np.ndarray:
     """Return the matrix of each instance of the mesh of a node; the identity if it has none."""
-    named = _object(extension(node, INSTANCES), "attributes")
+    named = member(extension(node, INSTANCES), "attributes")
     if not named:
         return np.eye(4)[None]
     count = max(_whole(gltf.entry("accessors", accessor), "count") for accessor in named.values())
@@ -456,7 +459,7 @@ def _instances(gltf: Gltf, node: dict[str, Any]) -> np.ndarray:
     return _compose(*columns)
 
 
-def _local_matrix(node: dict[str, Any]) -> np.ndarray:
+def _local_matrix(node: Entry) -> np.ndarray:
     if "matrix" in node:
         return _numbers(node, "matrix", [0.0] * 16).reshape(4, 4).T  # stored by columns
     return _compose(
@@ -516,7 +519,7 @@ def families(primitives: list[Any], names: tuple[str, ...] = ("",)) -> list[list
     return list(found.values())
 
 
-def _vertices(gltf: Gltf, part: dict[str, Any], place: Placement) -> tuple[np.ndarray, np.ndarray]:
+def _vertices(gltf: Gltf, part: Entry, place: Placement) -> tuple[np.ndarray, np.ndarray]:
     """Read the vertices of a primitive, and the sides that a skin turns them to."""
     attributes = part["attributes"]
     accessor = gltf.entry("accessors", attributes["POSITION"])
@@ -529,11 +532,9 @@ def _vertices(gltf: Gltf, part: dict[str, Any], place: Placement) -> tuple[np.nd
             vertices = vertices + weight * read_column(gltf, target, "POSITION", 3, count)
     if place.bones is None:
         return vertices, np.ones(count)
-    # Each set has four joints and weights, and the first one must be there.
-    joints = sorted({"JOINTS_0", *(name for name in attributes if name.startswith("JOINTS"))})
-    names = [*joints, *(name.replace(*SKINS) for name in joints)]
-    columns = {name: read_column(gltf, attributes, name, 4, count) for name in names}
-    matrices, n_odd = pose_matrices(columns, place.bones)
+    matrices, n_odd = pose_matrices(
+        attributes, lambda name: read_column(gltf, attributes, name, 4, count), place.bones
+    )
     if n_odd:
         gltf.notes.append(
             f"weights of {n_odd} vertices of a skin do not sum to 1, and were divided by their sum; "
@@ -542,14 +543,18 @@ def _vertices(gltf: Gltf, part: dict[str, Any], place: Placement) -> tuple[np.nd
     return transform_points(matrices, vertices), sides(matrices)
 
 
-def pose_matrices(columns: Mapping[str, np.ndarray], bones: np.ndarray) -> tuple[np.ndarray, int]:
+def pose_matrices(
+    attributes: Iterable[str], read: Callable[[str], np.ndarray], bones: np.ndarray
+) -> tuple[np.ndarray, int]:
     """Return the mean matrix of the joints of each vertex (glTF 2.0, section 3.7.3.3).
 
     Return also how many vertices have weights that do not sum to 1.
     """
-    names = sorted(name for name in columns if name.startswith("JOINTS"))
-    joints = np.hstack([columns[name] for name in names])
-    weights = np.hstack([columns[name.replace(*SKINS)] for name in names])
+    # Each set has four joints and weights, and the first one must be there.
+    sets = sorted({"JOINTS_0", *(name for name in attributes if name.startswith("JOINTS"))})
+    joints, weights = (
+        np.hstack([read(name.replace("JOINTS", kind)) for name in sets]) for kind in SKINS
+    )
     sums = weights.sum(axis=1)
     n_odd = int((np.abs(sums - 1.0) > SAME_SUM).sum())
     weights[sums == 0, 0] = 1.0
@@ -571,7 +576,7 @@ def transform_points(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
     return moved + matrices[..., :3, 3]
 
 
-def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
+def _faces(gltf: Gltf, part: Entry, n_vertices: int) -> np.ndarray:
     """Read the triangles of a primitive: a list, a strip or a fan."""
     corners = np.arange(n_vertices)
     if "indices" in part:
@@ -599,7 +604,7 @@ def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
     return corners[np.column_stack([place, place + 1 + odd, place + 2 - odd])]
 
 
-def read_column(gltf: Gltf, named: dict[str, Any], name: str, width: int, count: int) -> np.ndarray:
+def read_column(gltf: Gltf, named: Entry, name: str, width: int, count: int) -> np.ndarray:
     """Read one of several accessors that have a row each for the same things."""
     rows = read_accessor(gltf, _whole(named, name), width)
     if len(rows) != count:
@@ -611,8 +616,7 @@ def read_column(gltf: Gltf, named: dict[str, Any], name: str, width: int, count:
 
 def read_accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
     """Read an accessor as float64, with as many numbers a row as `width`."""
-    is_normalized = gltf.entry("accessors", index).get("normalized") is True
-    return decode(raw_accessor(gltf, index, width), is_normalized)
+    return decode(*raw_accessor(gltf, index, width))
 
 
 def decode(rows: np.ndarray, is_normalized: bool) -> np.ndarray:
@@ -622,7 +626,7 @@ def decode(rows: np.ndarray, is_normalized: bool) -> np.ndarray:
     return rows.astype(np.float64)
 
 
-def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarray:
+def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> Column:
     """Return the rows of an accessor as they are stored, if possible without a copy; `wanted` numbers each."""
     accessor = gltf.entry("accessors", index)
     name = f"accessors[{index}]"
@@ -639,21 +643,19 @@ def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarra
     else:
         gltf.require_few(count)  # zeros take memory, and none of the file
         rows = np.zeros((count, width), kind)
-    if "sparse" not in accessor:
-        return rows
-    # Some rows are replaced.
-    sparse = accessor["sparse"]
-    n_replaced = _whole(sparse, "count")
-    places, values = (sparse.get(key) for key in ("indices", "values"))
-    kind_of_places = np.dtype(KINDS.get(_whole(places, "componentType"), "V0"))
-    chosen = _stored_rows(gltf, places, kind_of_places, 1, n_replaced, name).ravel()
-    if kind_of_places.kind != "u" or (chosen >= count).any():
-        raise FileFormatError(
-            f"{name} must replace rows that it has, 0..{count - 1}; it replaces {chosen[:5]}."
-        )
-    rows = rows.copy()
-    rows[chosen] = _stored_rows(gltf, values, kind, width, n_replaced, name)
-    return rows
+    if "sparse" in accessor:  # some rows are replaced
+        sparse = accessor["sparse"]
+        n_replaced = _whole(sparse, "count")
+        places, values = (sparse.get(key) for key in ("indices", "values"))
+        kind_of_places = np.dtype(KINDS.get(_whole(places, "componentType"), "V0"))
+        chosen = _stored_rows(gltf, places, kind_of_places, 1, n_replaced, name).ravel()
+        if kind_of_places.kind != "u" or (chosen >= count).any():
+            raise FileFormatError(
+                f"{name} must replace rows that it has, 0..{count - 1}; it replaces {chosen[:5]}."
+            )
+        rows = rows.copy()
+        rows[chosen] = _stored_rows(gltf, values, kind, width, n_replaced, name)
+    return rows, accessor.get("normalized") is True
 
 
 def _stored_rows(
@@ -697,7 +699,7 @@ def _whole(entry: Any, key: str, default: int | None = None) -> int:
     return value
 
 
-def _numbers(entry: dict[str, Any], key: str, default: list[float]) -> np.ndarray:
+def _numbers(entry: Entry, key: str, default: list[float]) -> np.ndarray:
     value = entry.get(key, default)
     known = isinstance(value, list) and len(value) == len(default)
     if not known or not all(type(part) in (int, float) and abs(part) <= LARGEST for part in value):

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int
 from scipy.sparse import csr_array
 
 from eigenshape._errors import FileFormatError
@@ -33,6 +32,8 @@ from eigenshape.io.formats.gltf import (
     LEVELS,
     SURFACES,
     WIDTHS,
+    Column,
+    Entry,
     Gltf,
     Placement,
     Scene,
@@ -40,6 +41,7 @@ from eigenshape.io.formats.gltf import (
     decode_buffer,
     extension,
     families,
+    member,
     pack,
     place_triangles,
     pose_matrices,
@@ -63,9 +65,8 @@ TANGENTS = "tangents, which viewers compute anew"
 MADE_ANEW = ("POSITION", "NORMAL", "TANGENT")
 # Attributes of vertices that are made anew, go to other formats or are named as skins.
 CARRIED = {*MADE_ANEW, "COLOR_0", "JOINTS_0", "WEIGHTS_0"}
-KEPT_OF_MATERIALS = {
-    "name", "pbrMetallicRoughness", "baseColorFactor", "baseColorTexture", "metallicFactor",
-}  # fmt: skip
+PBR = "pbrMetallicRoughness"
+KEPT_OF_MATERIALS = {"name", PBR, "baseColorFactor", "baseColorTexture", "metallicFactor"}
 # Extensions that copy, compress or replace the old geometry, or name its vertices by number.
 OF_GEOMETRY = {
     *COMPRESSIONS, INSTANCES, LEVELS, "EXT_instance_features", "EXT_mesh_manifold", "EXT_mesh_polygon",
@@ -74,7 +75,6 @@ OF_GEOMETRY = {
 # A shape that lies this many times its size from the origin is written about its own middle: three
 # of the 24 binary digits of single precision are worth a node that is moved.
 FAR = 8
-Column = tuple[np.ndarray, bool]  # numbers, and whether whole ones mean shares of one
 Columns = dict[str, Column]
 
 
@@ -82,7 +82,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     """Return the attributes of the triangles of a scene, by face as in the mesh that was read."""
     gltf, scene = _open(source)
     rows_of_corners = scene.piece.rows[scene.piece.faces]
-    found: dict[str, Any] = {}
+    found: Entry = {}
     nodes = list(scene.placements)
     parts, face_parts = _parts(scene)
     face_materials, face_groups = np.full((2, len(face_parts)), -1)
@@ -97,7 +97,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         for key, (name, width) in columns.items():
             if name not in primitive["attributes"]:
                 continue
-            rows = decode(*_column(gltf, primitive["attributes"][name]))
+            rows = decode(*raw_accessor(gltf, primitive["attributes"][name]))
             if key == "colors" and rows.shape[1] == 3:
                 rows = np.pad(rows, ((0, 0), (0, 1)), constant_values=1.0)
             if rows.shape[1] != width:
@@ -137,16 +137,11 @@ def _open(source: SourceFile) -> tuple[Gltf, Scene]:
     return gltf, place_triangles(gltf, source.scene)
 
 
-def _parts(scene: Scene) -> tuple[list[list[int]], Int[np.ndarray, " f"]]:
+def _parts(scene: Scene) -> tuple[list[list[int]], np.ndarray]:
     """Return the node and the number of each primitive that has faces, and each face's primitive in this list."""
     size = scene.piece.primitives.max() + 1
     codes, owners = np.unique(scene.nodes * size + scene.piece.primitives, return_inverse=True)
     return np.transpose(np.divmod(codes, size)).tolist(), owners
-
-
-def _column(gltf: Gltf, index: Any) -> Column:
-    """Return the rows of an accessor as they are stored."""
-    return raw_accessor(gltf, index), gltf.entry("accessors", index).get("normalized") is True
 
 
 def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
@@ -158,50 +153,45 @@ def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
     return rows[corners]
 
 
-def _base_color(material: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = material.get("pbrMetallicRoughness", {})
-    return found
-
-
-def _base_coordinates(gltf: Gltf, primitive: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+def _base_coordinates(gltf: Gltf, primitive: Entry) -> tuple[str, Entry]:
     """Name the texture coordinates of the base color of a primitive, and what transforms them."""
     number = primitive.get("material", -1)
-    pbr = {} if number < 0 else _base_color(gltf.entry("materials", number))
+    pbr = {} if number < 0 else member(gltf.entry("materials", number), PBR)
     texture = pbr.get("baseColorTexture", {})
     transform = extension(texture, "KHR_texture_transform")
     return f"TEXCOORD_{transform.get('texCoord', texture.get('texCoord', 0))}", transform
 
 
-def _upward_coordinates(rows: np.ndarray, transform: dict[str, Any]) -> np.ndarray:
+def _upward_coordinates(rows: np.ndarray, transform: Entry) -> np.ndarray:
     """Scale, turn and shift texture coordinates (KHR_texture_transform), and let v go up."""
     angle = transform.get("rotation", 0.0)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     scaled = rows * transform.get("scale", [1.0, 1.0])
-    moved = scaled @ turn + transform.get("offset", [0.0, 0.0])
-    return np.column_stack([moved[:, 0], 1.0 - moved[:, 1]])
+    moved: np.ndarray = scaled @ turn + transform.get("offset", [0.0, 0.0])
+    return moved * [1, -1] + [0, 1]
 
 
-def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material:
-    pbr = _base_color(entry)
+def _material(gltf: Gltf, source: SourceFile, entry: Entry) -> Material:
+    pbr = member(entry, PBR)
     *light, alpha = pbr.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])
     red, green, blue = screen_colors(np.array(light, dtype=np.float64)).tolist()
     image, image_name = None, ""
+    texture: Entry = {}
     if "baseColorTexture" in pbr:
         texture = gltf.entry("textures", pbr["baseColorTexture"].get("index"))
-        # Images of newer formats, such as WebP, are named by extensions.
-        named = [texture, *texture.get("extensions", {}).values()]
-        number = next((each["source"] for each in named if "source" in each), None)
-        if number is not None:
-            held = gltf.entry("images", number)
-            image, kind = _image(gltf, source, held)
-            uri = held.get("uri", "data:")
-            named_file = Path(str(held.get("name") or ("" if uri.startswith("data:") else uri)))
-            ending = mimetypes.guess_extension(kind) or f".{kind.rpartition('/')[2]}"
-            image_name = f"{named_file.stem or f'image{number}'}{ending}"
+    # Images of newer formats, such as WebP, are named by extensions.
+    named = [texture, *texture.get("extensions", {}).values()]
+    if numbers := [each["source"] for each in named if "source" in each]:
+        held = gltf.entry("images", numbers[0])
+        image, kind = _image(gltf, source, held)
+        uri = held.get("uri", "data:")
+        file = Path(str(held.get("name") or ("" if uri.startswith("data:") else uri)))
+        ending = mimetypes.guess_extension(kind) or f".{kind.rpartition('/')[2]}"
+        image_name = f"{file.stem or f'image{numbers[0]}'}{ending}"
     return Material(str(entry.get("name", "")), (red, green, blue, alpha), image, image_name)
 
 
-def _image(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> tuple[bytes | None, str]:
+def _image(gltf: Gltf, source: SourceFile, entry: Entry) -> tuple[bytes | None, str]:
     """Return the bytes of an image, None if its file is missing, and its type."""
     if "bufferView" in entry:
         return bytes(view_of(gltf, entry["bufferView"])[0]), entry.get("mimeType", "image/png")
@@ -228,7 +218,7 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
     if any(part.get("mode", 4) not in SURFACES for part in primitives):
         names.append("lines and points")
     for entry in tree.get("materials", []):
-        pbr = _base_color(entry)
+        pbr = member(entry, PBR)
         is_clear = pbr.get("baseColorFactor", [1.0])[-1] < 1
         further_keys = {*entry, *pbr} - KEPT_OF_MATERIALS - ({"alphaMode"} if is_clear else set())
         if further_keys or pbr.get("metallicFactor") != 0.0:  # our own files say 0
@@ -242,7 +232,7 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
 class _Document:
     """A glTF tree and the contents of its views, to which accessors are added."""
 
-    def __init__(self, tree: dict[str, Any], contents: Iterable[bytes | memoryview] = ()) -> None:
+    def __init__(self, tree: Entry, contents: Iterable[bytes | memoryview] = ()) -> None:
         self.tree, self.contents = tree, list(contents)
 
     def add_view(self, data: bytes, **entry: Any) -> int:
@@ -265,20 +255,20 @@ class _Document:
             # Rows of attributes begin at multiples of four bytes.
             padded = np.pad(octets, ((0, 0), (0, -octets.shape[1] % 4)))
             view = self.add_view(padded.tobytes(), byteStride=padded.shape[1], target=34962)
-            facts: dict[str, Any] = {"normalized": True} if is_normalized else {}
+            facts: Entry = {"normalized": True} if is_normalized else {}
             if name == "POSITION":
                 facts |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
             found[name] = self.add_accessor(rows, view, **facts)
         return found
 
-    def add_indices(self, indices: Int[np.ndarray, " c"], n_vertices: int) -> int:
+    def add_indices(self, indices: np.ndarray, n_vertices: int) -> int:
         rows = indices.astype("<u2" if n_vertices < 2**16 - 1 else "<u4").reshape(-1, 1)
         return self.add_accessor(rows, self.add_view(rows.tobytes(), target=34963))
 
     def pack(self) -> bytes:
         """Write the document, without views that nothing uses."""
         users = list(_view_users(self.tree))
-        views: list[dict[str, Any]] = []
+        views: list[Entry] = []
         places = {}
         binary = bytearray()
         for index in sorted({user["bufferView"] for user in users}):
@@ -294,7 +284,7 @@ class _Document:
         return pack(self.tree, bytes(binary))
 
 
-def _view_users(value: Any) -> Iterator[dict[str, Any]]:
+def _view_users(value: Any) -> Iterator[Entry]:
     """Give all objects of a tree that name a view; extensions do so by the same key."""
     if isinstance(value, dict):
         if type(value.get("bufferView")) is int:
@@ -331,7 +321,7 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     places = mesh.vertices[mesh.faces]
     found = np.zeros_like(places)  # where the written file puts the corners
     normals = corner_normals(attributes, mesh)
-    written: dict[int, list[dict[str, Any]]] = {}
+    written: dict[int, list[Entry]] = {}
     for node, place in scene.placements.items():
         primitives = gltf.entry("meshes", place.mesh)["primitives"]
         written[node] = [part for part in primitives if part.get("mode", 4) not in SURFACES]
@@ -347,10 +337,9 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
             blends = csr_array((blends.data, inverse.ravel(), blends.indptr))
             columns = _carry_columns(gltf, shared, rows, blends)
             old = decode(*columns[0].pop("POSITION"))
-            has_normals = normals is not None and "NORMAL" in shared["attributes"]
-            normal = (
-                normals[chosen].reshape(-1, 3) if has_normals else np.empty((blends.shape[0], 0))
-            )
+            normal = np.empty((blends.shape[0], 0))
+            if normals is not None and "NORMAL" in shared["attributes"]:
+                normal = normals[chosen].reshape(-1, 3)
             # Corners of the file agree if their rows do, others if all their values do.
             keys = [rows[blends.indices]]
             if blends.nnz > 3 * len(chosen):
@@ -364,8 +353,9 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
             triangles = indices.reshape(-1, 3)
             found[chosen] = put[triangles]
             triangles = turn_back(triangles, turned)  # as the reader does
-            job.lost.extend([TANGENTS] if "TANGENT" in shared["attributes"] else [])
-            changed: dict[str, Any] = {"attributes": document.add_columns(columns[0])}
+            if "TANGENT" in shared["attributes"]:
+                job.lost.append(TANGENTS)
+            changed: Entry = {"attributes": document.add_columns(columns[0])}
             if columns[1:]:
                 changed["targets"] = [document.add_columns(table) for table in columns[1:]]
             for number in np.unique(primitive_numbers[chosen]).tolist():
@@ -381,13 +371,11 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     return document.pack()
 
 
-def _choose_rows(columns: Columns, chosen: Int[np.ndarray, " n"]) -> Columns:
+def _choose_rows(columns: Columns, chosen: np.ndarray) -> Columns:
     return {name: (values[chosen], flag) for name, (values, flag) in columns.items()}
 
 
-def _carry_columns(
-    gltf: Gltf, part: dict[str, Any], rows: Int[np.ndarray, " r"], blends: csr_array
-) -> list[Columns]:
+def _carry_columns(gltf: Gltf, part: Entry, rows: np.ndarray, blends: csr_array) -> list[Columns]:
     """Return the attributes of a primitive at new corners, and those of each of its morph targets.
 
     Normals, but those of targets, and tangents are made anew.
@@ -418,8 +406,7 @@ def _place_vertices(
     table, *targets = columns
     pose = place.matrix[None]
     if place.bones is not None:
-        values = {name: decode(*column) for name, column in table.items()}
-        pose, _ = pose_matrices(values, place.bones)
+        pose, _ = pose_matrices(table, lambda name: decode(*table[name]), place.bones)
     linear = pose[:, :3, :3]
     shifts, turns = (_morph(place, targets, name) for name in ("POSITION", "NORMAL"))
     moves = places - transform_points(pose, old + shifts)
@@ -438,7 +425,7 @@ def _morph(place: Placement, targets: list[Columns], name: str) -> Any:
     return sum(weight * decode(*target[name]) for weight, target in pairs if name in target)
 
 
-def _drop_extensions(tree: dict[str, Any], nodes: Iterable[int]) -> list[str]:
+def _drop_extensions(tree: Entry, nodes: Iterable[int]) -> list[str]:
     """Drop the extensions of some nodes and their meshes that belong to the old geometry, and name them."""
     owners = [tree["nodes"][node] for node in nodes]
     meshes = [tree["meshes"][owner["mesh"]] for owner in owners if "mesh" in owner]
@@ -449,6 +436,8 @@ def _drop_extensions(tree: dict[str, Any], nodes: Iterable[int]) -> list[str]:
         for name in extensions.keys() & OF_GEOMETRY:
             del extensions[name]
             dropped.add(name)
+        if not extensions:
+            entry.pop("extensions", None)
     text = json.dumps(tree)
     for key in ("extensionsUsed", "extensionsRequired"):
         names = tree.pop(key, [])
@@ -466,11 +455,9 @@ def _split_corners(keys: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return first, indices.ravel()
 
 
-def _blend(
-    gltf: Gltf, index: int, name: str, rows: Int[np.ndarray, " r"], blends: csr_array
-) -> Column:
+def _blend(gltf: Gltf, index: int, name: str, rows: np.ndarray, blends: csr_array) -> Column:
     """Interpolate an attribute; joints, whose weights go along, and numbers of things are only chosen."""
-    values, is_normalized = _column(gltf, index)
+    values, is_normalized = raw_accessor(gltf, index)
     values = _take(values, rows, name)
     is_chosen = name.startswith(("JOINTS", "WEIGHTS"))
     is_chosen |= name.startswith("_") and values.dtype.kind in "iu"
@@ -496,7 +483,7 @@ def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document
     return document
 
 
-def _replace_meshes(tree: dict[str, Any], written: dict[int, list[dict[str, Any]]]) -> None:
+def _replace_meshes(tree: Entry, written: dict[int, list[Entry]]) -> None:
     """Give each node a mesh of its new primitives, and empty the accessors that they replace."""
     nodes, meshes = tree["nodes"], tree["meshes"]
     before = _accessors_of(meshes)
@@ -513,16 +500,12 @@ def _replace_meshes(tree: dict[str, Any], written: dict[int, list[dict[str, Any]
         else:  # several nodes share a mesh, and each has its own positions now
             nodes[node]["mesh"] = len(meshes)
             meshes.append(mesh)
-    still_used = _accessors_of(meshes)
-    for animation in tree.get("animations", []):
-        still_used |= {s[key] for s in animation.get("samplers", []) for key in ("input", "output")}
-    still_used |= {skin.get("inverseBindMatrices") for skin in tree.get("skins", [])}
-    for index in before - still_used:
+    for index in before - _accessors_of(meshes):
         for key in ("bufferView", "byteOffset", "sparse", "min", "max"):
             tree["accessors"][index].pop(key, None)  # its data are left out when packed
 
 
-def _accessors_of(meshes: list[dict[str, Any]]) -> set[int]:
+def _accessors_of(meshes: list[Entry]) -> set[int]:
     parts = [part for mesh in meshes for part in mesh["primitives"]]
     tables = [table for part in parts for table in (part["attributes"], *part.get("targets", []))]
     indices = {part["indices"] for part in parts if "indices" in part}
@@ -532,8 +515,8 @@ def _accessors_of(meshes: list[dict[str, Any]]) -> set[int]:
 def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
     """Write a GLB file with a node for each group and a primitive for each of its materials."""
     document = _Document({"asset": {"version": "2.0", "generator": "eigenshape"}, "scene": 0})
-    nodes: list[dict[str, Any]] = []
-    meshes = []
+    nodes: list[Entry] = []
+    meshes: list[Entry] = []
     places, offset = _local_places(mesh)
     if attributes.materials:
         document.tree["materials"] = [_write_material(document, m) for m in attributes.materials]
@@ -556,15 +539,18 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
             for name, table in tables.items()
         }
         if not tables and len(groups) == 1:  # vertices keep their order, also those without a face
-            first, indices, rows["POSITION"] = np.arange(mesh.n_vertices), corners, places
+            first, indices, positions = np.arange(mesh.n_vertices), corners, places
         else:
             first, indices = _split_corners([corners, *rows.values()])
-            rows["POSITION"] = places[corners]
+            positions = places[corners]
         columns = document.add_columns(
-            {name: (values[first], False) for name, values in rows.items()}
+            {
+                name: (values[first], False)
+                for name, values in {"POSITION": positions, **rows}.items()
+            }
         )
         materials = attributes.face_materials[in_group]
-        primitives: list[dict[str, Any]] = []
+        primitives: list[Entry] = []
         for material in np.unique(materials).tolist():
             of_part = indices[np.repeat(materials == material, 3)]
             part = {"attributes": columns, "indices": document.add_indices(of_part, len(first))}
@@ -591,10 +577,10 @@ def _local_places(
     return (mesh.vertices - middle).astype(np.float32), middle
 
 
-def _write_material(document: _Document, material: Material) -> dict[str, Any]:
+def _write_material(document: _Document, material: Material) -> Entry:
     *tint, alpha = material.color
     color = [*linear_colors(np.array(tint)).tolist(), alpha]
-    pbr: dict[str, Any] = {"baseColorFactor": color, "metallicFactor": 0.0}
+    pbr: Entry = {"baseColorFactor": color, "metallicFactor": 0.0}
     if material.image is not None:
         tree = document.tree
         images, textures = tree.setdefault("images", []), tree.setdefault("textures", [])
@@ -604,4 +590,4 @@ def _write_material(document: _Document, material: Material) -> dict[str, Any]:
         textures.append({"source": len(images) - 1})
         pbr["baseColorTexture"] = {"index": len(textures) - 1}
     see_through = {"alphaMode": "BLEND"} if alpha < 1 else {}
-    return {"name": material.name, "pbrMetallicRoughness": pbr, **see_through}
+    return {"name": material.name, PBR: pbr, **see_through}
