@@ -13,6 +13,7 @@ from eigenshape.io.formats.numbers import INT64, Line, lines_of, quote_line, who
 from eigenshape.io.formats.ply import parse_labels
 from eigenshape.io.formats.registry import MESH_FORMATS
 from eigenshape.io.mesh_files import read_mesh
+from eigenshape.io.opening import naming
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 
 LABEL_SUFFIXES = (".seg", ".txt", ".json")  # of files of labels, in the order of search
@@ -180,13 +181,11 @@ def read_labels(path: Path) -> Int[np.ndarray, " f"]:
     and OSError if the system cannot open the file.
     """
     data = read_regular(path, "labels")
-    try:
-        suffix = path.suffix.lower()
+    suffix = path.suffix.lower()
+    with naming(path):
         if suffix == ".ply":
             return parse_labels(data)
         return _from_json(data) if suffix == ".json" else _from_lines(lines_of(data), LABEL)
-    except FileFormatError as err:
-        raise type(err)(f"{path}: {err}") from err
 
 
 def read_map(path: Path) -> Int[np.ndarray, " n"]:
@@ -196,10 +195,8 @@ def read_map(path: Path) -> Int[np.ndarray, " n"]:
     file.
     """
     data = read_regular(path, "vertices that correspond")
-    try:
+    with naming(path):
         return _from_lines(lines_of(data), VERTEX)
-    except FileFormatError as err:
-        raise type(err)(f"{path}: {err}") from err
 
 
 def write_labels(labels: Int[np.ndarray, " f"], path: Path) -> None:

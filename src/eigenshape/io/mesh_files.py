@@ -37,6 +37,10 @@ from eigenshape.io.formats.rounding import loss_in_single
 from eigenshape.io.opening import SourceFile, naming, open_file
 
 KINDS = {2: SEGMENTS, 3: "triangles"}  # of cells, by their number of corners
+REPLACED = {
+    "vertex colors": "vertex colors, since each part has a color of its own",
+    "materials": "materials and images, since each part has a material of its own",
+}
 
 
 @overload
@@ -205,7 +209,7 @@ def require_finite(
     face is without one.
     """
     is_surface = len(simplices) > 0 and simplices.shape[1] == points.shape[1] == 3
-    noun = "vertex" if is_surface else "point"
+    noun, cell = ("vertex", "face") if is_surface else ("point", "cell")
     missing = np.flatnonzero(~np.isfinite(points).all(axis=1))
     stays = ~np.isin(simplices, missing).any(axis=1)
     nothing_stays = len(simplices) > 0 and not stays.any()
@@ -221,14 +225,13 @@ def require_finite(
             f"{PLURALS.get(noun, 'points')} must be finite; {noun} {first} is {points[first].tolist()} "
             f"({missing.size} such). {remedy}"
         )
-    kept = np.delete(np.arange(len(points)), missing)
     if not missing.size:
-        return points, simplices, kept, ()
+        return points, simplices, np.arange(len(points)), ()
+    kept = np.delete(np.arange(len(points)), missing)
     # An index is lower by the number of missing points before it.
     renumbered = simplices[stays] - np.searchsorted(missing, simplices[stays])
     sentence = f"drop_missing left out {count_nouns(missing.size, noun)} without finite coordinates"
     if len(simplices):
-        cell = "face" if is_surface else "cell"
         sentence += f" and {count_nouns(int((~stays).sum()), cell)} at them"
     return points[kept], renumbered, kept, (sentence,)
 
@@ -368,13 +371,12 @@ def save_mesh(
     if face_labels is not None:
         _require_labels(face_labels, mesh, suffix)
     lost: list[str] = []
-    has_part_materials = face_labels is not None and "labels" not in known.traits
-    if has_part_materials or (face_labels is not None and colors is not None):
-        lost += _replaced_by_parts(held, has_part_materials)
-    if face_labels is not None and has_part_materials:
+    if face_labels is not None and "labels" not in known.traits:
+        lost += _replaced_by_parts(held, "vertex colors", "materials")
         gray = np.full((mesh.n_vertices, 3), 200, np.uint8)
         held = label_attributes(held, face_labels, gray if colors is None else colors)
     elif colors is not None:
+        lost += [] if face_labels is None else _replaced_by_parts(held, "vertex colors")
         opaque = np.column_stack([colors, np.full(len(colors), 255, np.uint8)])
         held = replace(held, colors=opaque[mesh.faces], source=None)
     job = WriteJob(mesh, path, suffix, is_binary, held, face_labels, lost)
@@ -396,14 +398,9 @@ def save_mesh(
     return f"{path.name} does not keep: {', '.join(dict.fromkeys(lost))}." if lost else ""
 
 
-def _replaced_by_parts(held: MeshAttributes, has_part_materials: bool) -> list[str]:
+def _replaced_by_parts(held: MeshAttributes, *kinds: str) -> list[str]:
     """Name the looks of a file that those of parts take the place of."""
-    replaced = []
-    if held.contents["vertex colors"]:
-        replaced.append("vertex colors, since each part has a color of its own")
-    if has_part_materials and held.contents["materials"]:
-        replaced.append("materials and images, since each part has a material of its own")
-    return replaced
+    return [REPLACED[kind] for kind in kinds if held.contents[kind]]
 
 
 def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:

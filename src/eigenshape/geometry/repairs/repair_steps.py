@@ -88,15 +88,11 @@ def weld_seams(mesh: MeshT) -> RepairedMesh[MeshT]:
 
 def _merge_vertices(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> RepairedMesh[MeshT]:
     """Replace each group of vertices by its first vertex; these keep their order."""
-    _, first, renumbered = np.unique(group, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.argsort(order)
-    joined = type(mesh)(mesh.points[first[order]], rank[renumbered[mesh.simplices]])
-    return RepairedMesh(
-        joined,
-        (report.format(count_nouns(mesh.n_points - joined.n_points, "vertex")),),
-        first[order],
-    )
+    _, first, number = np.unique(group, return_index=True, return_inverse=True)
+    kept, renumbered = np.unique(first[number], return_inverse=True)
+    joined = type(mesh)(mesh.points[kept], renumbered[mesh.simplices])
+    n_joined = count_nouns(mesh.n_points - joined.n_points, "vertex")
+    return RepairedMesh(joined, (report.format(n_joined),), kept)
 
 
 def drop_degenerate(mesh: Mesh) -> RepairedMesh[Any]:
@@ -187,9 +183,9 @@ def collapse_needles(mesh: MeshT) -> RepairedMesh[MeshT]:
     # Sides of length 0 belong to faces without area, which `drop_degenerate` removes.
     least = np.maximum(NEEDLE * lengths.max(axis=1, keepdims=True), TINY_SIDE * lengths.max())
     short = (lengths > 0) & (lengths < least)
-    in_simplex, side = np.nonzero(short)
     if short.any(axis=1).all():
-        in_simplex, side = in_simplex[:0], side[:0]
+        short[:] = False
+    in_simplex, side = np.nonzero(short)
     one, two = np.triu_indices(mesh.dim + 1, 1)
     starts, ends = mesh.simplices[in_simplex, one[side]], mesh.simplices[in_simplex, two[side]]
     _, group = label_components(mesh.n_points, starts, ends)
@@ -235,10 +231,8 @@ def largest_component(mesh: TriangleMesh) -> RepairedMesh[TriangleMesh]:
     count, _ = vertex_components(mesh)
     keep = faces_of_largest(mesh)
     kept, source = submesh(mesh, keep)
-    removed = (
-        f"{count_nouns(count - 1, 'component')} with {count_nouns(int((~keep).sum()), 'face')}"
-    )
-    report = f"largest_component removed {removed}"
+    report = f"largest_component removed {count_nouns(count - 1, 'component')}"
+    report += f" with {count_nouns(int((~keep).sum()), 'face')}"
     return RepairedMesh(kept, (report,), source)
 
 

@@ -155,10 +155,8 @@ def write(job: WriteJob) -> dict[Path, bytes]:
         lost += [] if fit else ["normals that differ at one vertex"]
     if held.texture_coordinates is not None:
         rows, fit = _of_vertices(mesh, held.texture_coordinates, 1e-6)
-        if fit:
-            of_vertices |= dict(zip(COORDINATES[0], rows.T, strict=True))
-        else:
-            of_faces[WEDGES] = held.texture_coordinates.reshape(-1, 6)
+        of_vertices |= dict(zip(COORDINATES[0], rows.T, strict=True)) if fit else {}
+        of_faces |= {} if fit else {WEDGES: held.texture_coordinates.reshape(-1, 6)}
     numbered = all(re.fullmatch(r"-?\d{1,9}", name) for name in held.groups)
     if labels is not None:
         of_faces[LABEL] = labels.astype(np.int32)
