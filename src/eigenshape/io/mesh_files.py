@@ -142,13 +142,11 @@ def read_mesh(
     with naming(source.path):
         points, simplices = parse_file(source, cells)
         require_surface(points, simplices)
-        kept, faces, _, left_out = require_finite(points, simplices, drop_missing=drop_missing)
+        kept, faces, *_ = require_finite(points, simplices, drop_missing=drop_missing)
         mesh = TriangleMesh(kept, faces)
         if not attributes:
             return mesh
         try:
-            if not left_out:
-                return mesh, _read_attributes(source, mesh)
             # Attributes are listed by the faces of the file, so they are read with all of them.
             whole = TriangleMesh(np.where(np.isfinite(points), points, 0.0), simplices)
             return mesh, carry_attributes(_read_attributes(source, whole), mesh)
@@ -255,7 +253,7 @@ def require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
         )
     n_corners, dim = simplices.shape[1], points.shape[1]
     if (n_corners, dim) != (3, 3):
-        what = {2: "segments", 3: "triangles", 4: "tetrahedra"}[n_corners]
+        what = KINDS.get(n_corners, "tetrahedra")
         remedies = {
             4: ' cells="triangles" reads the triangles beside them, if there are any.',
             3: " es.io.read_surface, or eigenshape repair, takes them at z = 0.",
@@ -367,7 +365,7 @@ def save_mesh(
             f"binary={binary} is for {', '.join(kinds)}; the suffix is {suffix}."
         )
     if colors is not None:
-        _require_colors(colors, mesh, suffix)
+        _require_array(colors, "colors", f"({mesh.n_vertices}, 3) uint8", suffix)
     if face_labels is not None:
         _require_labels(face_labels, mesh, suffix)
     lost: list[str] = []
@@ -403,26 +401,18 @@ def _replaced_by_parts(held: MeshAttributes, *kinds: str) -> list[str]:
     return [REPLACED[kind] for kind in kinds if held.contents[kind]]
 
 
-def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
-    require_type(colors, np.ndarray, "colors")
-    if (
-        suffix not in WITH_COLORS
-        or colors.dtype != np.uint8
-        or colors.shape != (mesh.n_vertices, 3)
-    ):
+def _require_array(values: np.ndarray, name: str, wanted: str, suffix: str) -> None:
+    """Raise an error if values are not of the wanted shape and type, or the format does not take them."""
+    require_type(values, np.ndarray, name)
+    found = f"{values.shape} {values.dtype}"
+    if suffix not in WITH_COLORS or not found.startswith(wanted):
         raise InvalidParameterError(
-            f"colors must be ({mesh.n_vertices}, 3) uint8 and go to {', '.join(WITH_COLORS)}; they are {colors.shape} "
-            f"{colors.dtype} and go to {suffix}."
+            f"{name} must be {wanted} and go to {', '.join(WITH_COLORS)}; they are {found} and go to {suffix}."
         )
 
 
 def _require_labels(labels: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
-    require_type(labels, np.ndarray, "face_labels")
-    if suffix not in WITH_COLORS or labels.shape != (mesh.n_faces,):
-        raise InvalidParameterError(
-            f"face_labels must be ({mesh.n_faces},) and go to {', '.join(WITH_COLORS)}; they are {labels.shape} and "
-            f"go to {suffix}."
-        )
+    _require_array(labels, "face_labels", f"({mesh.n_faces},)", suffix)
     beyond = np.flatnonzero(labels != labels.astype(np.int32))
     if beyond.size:
         raise InvalidParameterError(

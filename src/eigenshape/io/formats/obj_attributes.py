@@ -37,8 +37,8 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     coordinates = np.array(
         [[*map(float, row.split()[1:3]), 0.0][:2] for row in _rows(sheet, "vt")] or [[0.0, 0.0]]
     )
-    places, polygon_of, _, corners = _cut_polygons(sheet)
-    _, textures, normals = np.moveaxis(corners[places], 2, 0)
+    places, polygon_of = _cut_polygons(sheet)
+    _, textures, normals = np.moveaxis(sheet.corners[places], 2, 0)
     if textures.max() > len(coordinates):
         raise FileFormatError(
             f"A corner must name one of {len(coordinates)} texture coordinates; one names {textures.max()}."
@@ -46,7 +46,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     groups, face_groups = _switches(sheet, ("g ", "o "))
     names, face_materials = _switches(sheet, ("usemtl ",))
     defined, others = _read_materials(sheet, source)
-    if len(polygon_of) > len(sheet.polygons):
+    if len(places) >= len(sheet.starts):
         others.append("polygons, of which triangles are made")
     if _rows(sheet, "o") and _rows(sheet, "g"):
         others.append("names of objects beside those of groups")
@@ -69,21 +69,10 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     )
 
 
-def _cut_polygons(
-    sheet: ObjSheet,
-) -> tuple[
-    Int[np.ndarray, "f 3"], Int[np.ndarray, " f"], Int[np.ndarray, " p1"], Int[np.ndarray, "k 3"]
-]:
-    """Return triangles and their polygons, and where the corners of polygons begin, and they.
-
-    A triangle names three of these corners.
-    """
-    corners = np.array([corner for polygon in sheet.polygons for corner in polygon])
-    starts = np.cumsum([0, *map(len, sheet.polygons)])
-    places, polygon_of, _ = cut_polygons(
-        sheet.vertices[corners[:, 0]], starts, np.arange(len(corners))
-    )
-    return places, polygon_of, starts, corners
+def _cut_polygons(sheet: ObjSheet) -> tuple[Int[np.ndarray, "f 3"], Int[np.ndarray, " f"]]:
+    """Return three places among the corners of a sheet for each triangle, and its polygon."""
+    points = sheet.vertices[sheet.corners[:, 0]]
+    return cut_polygons(points, sheet.starts, np.arange(len(points)))[:2]
 
 
 def _rows(sheet: ObjSheet, keyword: str) -> list[str]:
@@ -264,7 +253,8 @@ def _remaining_rows(
     sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh
 ) -> tuple[list[str | list[list[int]]], list[int]]:
     """Return the lines and faces of a file that are left, and the faces that it does not have."""
-    places, polygon_of, starts, corners = _cut_polygons(sheet)
+    places, polygon_of = _cut_polygons(sheet)
+    corners, starts = sheet.corners, sheet.starts
     # The new corners at the three corners of each triangle of the file that is still there
     file_corners = attributes.corners.indices[attributes.corners.indptr[:-1]].reshape(-1, 3)
     order = np.argsort(file_corners % 3, axis=1)
@@ -315,8 +305,7 @@ def _vertex_lines(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMes
     shared = min(mesh.n_vertices, len(sheet.vertices))
     stays = (attributes.mesh.vertices[:shared] == sheet.vertices[:shared]).all(axis=1)
     tails = {index: sheet.tails[index] for index in np.flatnonzero(stays).tolist()}
-    places, _, _, corners = _cut_polygons(sheet)
-    file_vertices = corners[places, 0].ravel()
+    file_vertices = sheet.corners[_cut_polygons(sheet)[0], 0].ravel()
     starts = attributes.corners.indptr
     singles = np.flatnonzero(np.diff(starts) == 1)
     sources = file_vertices[attributes.corners.indices[starts[singles]]]
@@ -336,8 +325,7 @@ def _normals(
         fan = [(row[0][0], one[0], two[0]) for one, two in pairwise(row[1:])]
         for vertex, _, normal in row:
             if normal >= 0:
-                key = (vertex, sheet.normals[normal])
-                number = numbers.setdefault(key, len(numbers))
+                number = numbers.setdefault((vertex, sheet.normals[normal]), len(numbers))
                 triangles += fan
                 owners += [number] * len(fan)
     if not numbers:
