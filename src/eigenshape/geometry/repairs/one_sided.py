@@ -73,8 +73,7 @@ def cut_edges(
     # Groups are numbered by their first corner; all but the first of a vertex become new ones.
     owner = vertices[first_corner]
     number = owner.copy()
-    order = np.lexsort((first_corner, owner))
-    further = np.sort(order[1:][owner[order][1:] == owner[order][:-1]])
+    further = np.delete(np.arange(len(owner)), np.unique(owner, return_index=True)[1])
     number[further] = n + np.arange(len(further))
     source = np.concatenate([np.arange(n), owner[further]])
     opened = TriangleMesh(mesh.vertices[source], number[group].reshape(-1, 3))
