@@ -116,6 +116,24 @@ def wholes(numbers: Shaped[np.ndarray, " k"], what: str) -> Int[np.ndarray, " k"
     return numbers.astype(np.int64)
 
 
+def find_keys(keys: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the place of each value among the keys, or -1."""
+    if not len(keys):
+        return np.full(len(values), -1)
+    order = np.argsort(keys, kind="stable")
+    found = order[np.searchsorted(keys, values, sorter=order).clip(0, len(keys) - 1)]
+    return np.where(keys[found] == values, found, -1)
+
+
+def require_distinct(numbers: Int[np.ndarray, " k"], what: str) -> None:
+    """Raise an error if a number occurs twice."""
+    different, counts = np.unique(numbers, return_counts=True)
+    if (counts > 1).any():
+        raise FileFormatError(
+            f"{what} must differ; {different[counts.argmax()]} occurs twice or more."
+        )
+
+
 def quote_line(line: Line) -> str:
     """Quote a line, shortened if it is long."""
     return repr(line[1].strip()[:60].decode("latin-1"))
@@ -129,6 +147,8 @@ def rows_text(prefix: str, rows: np.ndarray) -> list[str]:
 # Compression ratios: a regular lattice of tetrahedra has 9 with zlib and 36 with LZMA, zeros 1,000.
 MOST_TIMES = 40
 ALWAYS = 2**25  # bytes that a file of any size may unpack to
+# Bytes for a volume: labels of a head, 256 voxels a side in 32 bits, are 64 MiB, and pack 200 times.
+VOLUME_SIZE = 2**28
 LZMA_MEMORY = 2**27  # bytes; level 9, the most that compressors use, needs 65 MiB
 ZLIB, LZMA, LZ4 = "vtkZLibDataCompressor", "vtkLZMADataCompressor", "vtkLZ4DataCompressor"
 COMPRESSORS = (ZLIB, LZMA, LZ4)

@@ -24,7 +24,9 @@ from eigenshape.io.formats.neuro.shared import (
     NO_PARCEL,
     UNNAMED,
     Arrays,
-    find_keys,
+    drop_nameless,
+    find_labels,
+    label_table,
     narrow,
     require_nibabel,
     shared_keys,
@@ -119,11 +121,10 @@ def parse_parcels(data: bytes, mesh: TriangleMesh, folder: Path | None = None) -
     for label in root.findall("./LabelTable/Label"):
         name, facts = (label.text or "").strip(), label.attrib
         shades = [facts[each] for each in ("Red", "Green", "Blue") if each in facts]
-        color = []
+        words = [*shades, facts.get("Alpha", "1")] if shades and name != NO_PARCEL else []
         try:
             keys.append(int(facts.get("Key", facts.get("Index", ""))))  # Index in files of 2008
-            if shades and name != NO_PARCEL:
-                color = [float(word) for word in (*shades, facts.get("Alpha", "1"))]
+            color = list(map(float, words))
         except ValueError:
             color = [np.nan]
         if len(color) not in (0, 4) or not all(0 <= share <= 1 for share in color):
@@ -133,25 +134,16 @@ def parse_parcels(data: bytes, mesh: TriangleMesh, folder: Path | None = None) -
         names.append(name)
         if name != NO_PARCEL:
             colors.append(color)
-    parcels = tuple(name for name in names if name != NO_PARCEL)
-    if not parcels:
+    if not colors:
         raise FileFormatError(
             "A GIFTI file of labels must have a table of names and colors; it has none. "
             "es.io.read_fields reads its numbers, such as those of a mask."
         )
-    places = find_keys(np.array(keys), labels)
-    odd = np.flatnonzero((places < 0) & (labels != 0))
-    if odd.size:
-        raise FileFormatError(
-            f"Labels of a GIFTI file must stand in its table; that of vertex {odd[0]} is "
-            f"{labels[odd[0]]} ({odd.size} such)."
-        )
-    is_parcel = np.array([name != NO_PARCEL for name in names])
-    numbers = np.append(np.where(is_parcel, np.cumsum(is_parcel) - 1, -1), -1)
-    hues = Parcellation([], parcels).colors
-    chosen = [color or hue for color, hue in zip(colors, hues.tolist(), strict=True)]
+    places = find_labels("Labels of a GIFTI file", np.array(keys), labels)
+    found = Parcellation(*drop_nameless(places, names))
+    chosen = [color or hue for color, hue in zip(colors, found.colors.tolist(), strict=True)]
     notes = shared_keys("keys", np.array(keys), names, labels)
-    return Parcellation(numbers[places], parcels, chosen), *notes
+    return Parcellation(found.labels, found.names, chosen), *notes
 
 
 def structure_of(data: bytes) -> str:
@@ -284,23 +276,18 @@ def _format(
     gifti = require_nibabel("nibabel.gifti")
     table = gifti.GiftiLabelTable()
     if parcellation is not None:
-        rows = zip((NO_PARCEL, *parcellation.names), [[0] * 4, *parcellation.colors], strict=True)
-        for key, (name, color) in enumerate(rows):
-            label = gifti.GiftiLabel(key, *map(float, color))
+        for key, (name, color) in label_table(parcellation).items():
+            label = gifti.GiftiLabel(key, *color)
             label.label = name
             table.labels.append(label)
     named = {STRUCTURE: structure} if structure else {}
     image = gifti.GiftiImage(labeltable=table, meta=gifti.GiftiMetaData(named))
     for intent, name, values in arrays:
-        for column in (
-            [values] if intent in (POINTS, TRIANGLES) else values.reshape(len(values), -1).T
-        ):
-            # Of surfaces, Connectome Workbench reads the structure of the points.
-            meta = gifti.GiftiMetaData(
-                named if intent == POINTS else {"Name": name} if name else {}
-            )
-            image.add_gifti_data_array(
-                gifti.GiftiDataArray(narrow(name, column), intent=intent, meta=meta)
-            )
+        # Of surfaces, Connectome Workbench reads the structure of the points.
+        pairs = named if intent == POINTS else {"Name": name} if name else {}
+        is_surface = intent in (POINTS, TRIANGLES)
+        for column in [values] if is_surface else values.reshape(len(values), -1).T:
+            meta, numbers = gifti.GiftiMetaData(pairs), narrow(name, column)
+            image.add_gifti_data_array(gifti.GiftiDataArray(numbers, intent=intent, meta=meta))
     text: bytes = image.to_bytes()
     return text
