@@ -109,19 +109,19 @@ def unpack_gzip(data: bytes, always: int = ALWAYS) -> bytes:
     if not data.startswith(GZIP):
         return data
     most = always + MOST_TIMES * len(data)
-    pieces: list[bytes] = []
+    unpacked = bytearray()
     left = data
     try:
         while left:
             unpacker = zlib.decompressobj(wbits=31)
-            pieces.append(unpacker.decompress(left, most + 1 - sum(map(len, pieces))))
-            require_reasonable(sum(map(len, pieces)), len(data), always)
+            unpacked += unpacker.decompress(left, most + 1 - len(unpacked))
+            require_reasonable(len(unpacked), len(data), always)
             if not unpacker.eof:
                 raise FileFormatError("A packed file must be whole; it ends too early.")
             left = unpacker.unused_data.lstrip(b"\0")
     except zlib.error as err:
         raise FileFormatError(f"A packed file must be whole; it is damaged: {err}.") from err
-    return b"".join(pieces)
+    return bytes(unpacked)
 
 
 def _read_open(file: bytes | BinaryFile) -> tuple[str, bytes]:

@@ -11,12 +11,13 @@ Refused: versions 1 and 3; a mesh of Ansys, with the call of meshio that convert
 """
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.cells import CellLists, Cells, require_splittable
+from eigenshape.io.formats.cells import CellLists, ParsedShape, require_splittable
 from eigenshape.io.formats.numbers import (
     Cursor,
     find_keys,
@@ -34,6 +35,7 @@ from eigenshape.io.formats.vtk_cells import (
     TRIANGLE,
     VERTEX,
     WEDGE,
+    TypedCells,
     sort_cells,
 )
 
@@ -59,10 +61,11 @@ LEFT_OUT = {
 }
 RULE = "Nodes and elements of a gmsh file must be as it declares them"
 
+Nodes = tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n width"]]  # tags, and places
 Rows = list[tuple[int, Int[np.ndarray, "_ _"]]]  # gmsh's number of a type, and tags of nodes
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...]]:
+def parse(data: bytes) -> ParsedShape:
     """Return points, cells by kind, and notes.
 
     Raise FileFormatError if a section is missing or occurs twice, or nodes and elements are not as
@@ -130,9 +133,7 @@ def _count(section: Cursor) -> int:
     return whole(line, (1, line), "The count of a section")
 
 
-def _tagged_nodes(
-    section: Cursor, count: int, width: int = 3
-) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n width"]]:
+def _tagged_nodes(section: Cursor, count: int, width: int = 3) -> Nodes:
     """Read nodes of version 2 and 4.0: a tag and coordinates for each node."""
     if section.is_text:
         table = section.take("<f8", (1 + width) * count).reshape(-1, 1 + width)
@@ -182,46 +183,47 @@ def _plain_elements(section: Cursor, count: int) -> Rows:
     return rows
 
 
-def _node_blocks(
-    section: Cursor, size: str, version: float
-) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
-    """Read nodes of version 4: counts, then blocks of a head, tags and coordinates.
-
-    In version 4.0 each tag stands before its coordinates.
-    """
+def _blocks(
+    section: Cursor, size: str, version: float, what: str
+) -> Iterator[tuple[list[int], int]]:
+    """Yield the head of each block of version 4, and the number of its rows."""
     n_blocks, total, *_ = section.wholes(size, 4 if version > 4 else 2).tolist()
-    tags, points = [np.empty(0, dtype=np.int64)], [np.empty((0, 3))]
+    found = 0
     for _ in range(n_blocks):
         head = section.wholes("<i4", 3).tolist()
+        height = int(section.wholes(size, 1)[0])
+        found += height
+        yield head, height
+    section.require_end()
+    if found != total:
+        raise FileFormatError(f"{RULE}; it declares {total} {what} and holds {found}.")
+
+
+def _node_blocks(section: Cursor, size: str, version: float) -> Nodes:
+    """Read blocks of tags and coordinates; in version 4.0 each tag stands before its coordinates."""
+    tags, points = [np.empty(0, dtype=np.int64)], [np.empty((0, 3))]
+    for head, height in _blocks(section, size, version, "nodes"):
         dim = head[0] if version > 4 else head[1]
         # Places on a curve or surface follow the coordinates.
         width = 3 + (dim if head[2] and 0 <= dim <= 3 else 0)
-        (height,) = section.wholes(size, 1).tolist()
         if version > 4:
-            tags.append(section.wholes(size, height))
+            found = section.wholes(size, height)
             places = section.take("<f8", width * height).reshape(-1, width)
         else:
             found, places = _tagged_nodes(section, height, width)
-            tags.append(found)
+        tags.append(found)
         points.append(places[:, :3])
-    section.require_end()
-    _require_total(sum(map(len, tags)), total, "nodes")
     return np.concatenate(tags), np.concatenate(points)
 
 
 def _element_blocks(section: Cursor, size: str, version: float) -> Rows:
-    """Read elements of version 4: counts, then blocks of a head and rows of tag and nodes."""
-    n_blocks, total, *_ = section.wholes(size, 4 if version > 4 else 2).tolist()
+    """Read blocks of rows of tag and nodes."""
     rows: Rows = []
-    for _ in range(n_blocks):
-        _, _, kind = section.wholes("<i4", 3).tolist()
-        (height,) = section.wholes(size, 1).tolist()
+    for (_, _, kind), height in _blocks(section, size, version, "elements"):
         if height:
             width = 1 + _n_nodes(kind)
             block = section.wholes(size if version > 4 else "<i4", height * width)
             rows.append((kind, block.reshape(-1, width)[:, 1:]))
-    section.require_end()
-    _require_total(sum(len(block) for _, block in rows), total, "elements")
     return rows
 
 
@@ -231,12 +233,7 @@ def _n_nodes(kind: int) -> int:
     return ELEMENTS[kind][1]
 
 
-def _require_total(found: int, declared: int, what: str) -> None:
-    if found != declared:
-        raise FileFormatError(f"{RULE}; it declares {declared} {what} and holds {found}.")
-
-
-def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> tuple[CellLists, Int[np.ndarray, " c"]]:
+def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> TypedCells:
     """Return the elements and VTK's numbers of their types.
 
     Nodes have their place in the file instead of their tags.
@@ -247,6 +244,7 @@ def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> tuple[CellLists, Int[np.n
         raise FileFormatError(
             f"Node tags of a gmsh file must be 1 or more; the least is {tags.min()}."
         )
+    rows = [(kind, nodes) for kind, nodes in rows if ELEMENTS[kind][0] != VERTEX]
     require_distinct(tags, "Node tags of a gmsh file")
     lists = CellLists.join(
         [CellLists(nodes.shape[1] * np.arange(len(nodes) + 1), nodes.ravel()) for _, nodes in rows]

@@ -53,19 +53,15 @@ def _parse(data: bytes) -> tuple[Any, Arrays]:
         maps, models = image.header.get_axis(0), image.header.get_axis(1)
         values = np.asarray(image.dataobj)
         values = values if values.dtype.kind == "f" else values.astype(np.float64)
-        structures = [
-            (name.removeprefix(PREFIX).lower(), place, part)
-            for name, place, part in models.iter_structures()
-        ]
         tables: Arrays = {}
-        for structure, place, part in structures:
+        for name, place, part in models.iter_structures():
             table = held = values[:, place].T
             if part.surface_mask.all():
                 n_vertices = next(iter(part.nvertices.values()))
                 require_reasonable(8 * n_vertices * len(values), len(data))
                 table = np.full((n_vertices, len(values)), np.nan, values.dtype)
                 table[part.vertex] = held
-            tables[structure] = table
+            tables[name.removeprefix(PREFIX).lower()] = table
         if not hasattr(maps, "name"):
             return maps, {f"{structure}:{SERIES}": table for structure, table in tables.items()}
         found = {

@@ -19,9 +19,8 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.neuro.shared import (
     UNNAMED,
     Arrays,
-    count_vertices,
     narrow,
-    one_table,
+    require_axes,
     volume_function,
 )
 from eigenshape.io.formats.numbers import Cursor
@@ -144,36 +143,36 @@ def parse_volume(data: bytes) -> tuple[Shaped[np.ndarray, "a b c"], Float[np.nda
 
 def _read_mgh(data: bytes, *, is_volume: bool) -> Shaped[np.ndarray, "a b c frames"]:
     cursor = Cursor(data, "An MGH file")
-    version, *shape, n_frames, kind = cursor.wholes(">i4", 6).tolist()
-    if is_volume:
-        rule, fits = "a volume must have one frame", n_frames == 1
-    else:
-        rule = "functions on vertices must be n x 1 x 1 x frames"
-        fits = count_vertices(shape) > 0
-    if version != 1 or kind not in MGH_NUMBERS or not fits or min(*shape, n_frames) < 1:
+    version, *axes, kind = cursor.wholes(">i4", 6).tolist()
+    if version != 1 or kind not in MGH_NUMBERS:
         raise FileFormatError(
-            f"An MGH file of {rule}; version {version}, type {kind} and "
-            f"{' x '.join(map(str, shape))} x {n_frames} were found. es.io.read_volume reads "
-            "volumes, es.io.read_fields functions."
+            f"An MGH file must be of version 1 and of numbers; it is of version {version} and type {kind}."
         )
+    require_axes("An MGH file", axes, is_volume=is_volume)
     cursor.place = MGH_HEADER
-    values = cursor.take(MGH_NUMBERS[kind], math.prod(shape) * n_frames)
+    values = cursor.take(MGH_NUMBERS[kind], math.prod(axes))
     # The first axis is the fastest in the file.
     native = values.astype(values.dtype.newbyteorder("="))
-    return native.reshape(*shape, n_frames, order="F")
+    return native.reshape(axes, order="F")
 
 
 def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
     """Write one function, or the columns of a table as frames of an MGH file."""
-    values = one_table(of_vertices, f"A file in {suffix}")
+    if len(of_vertices) != 1:
+        raise FileFormatError(
+            f"A file in {suffix} holds one function, without a name; there are {len(of_vertices)}. "
+            "Write each to a file of its own."
+        )
+    (values,) = (narrow(name, table) for name, table in of_vertices.items())
+    table = values.reshape(mesh.n_vertices, -1)
+    n_frames = table.shape[1]
     if suffix == ".curv":
-        if values.ndim > 1:
+        if n_frames > 1:
             raise FileFormatError(
-                f"A file in .curv holds one number a vertex; there are {values.shape[1]}. Write .mgh."
+                f"A file in .curv holds one number a vertex; there are {n_frames}. Write .mgh."
             )
         counts = np.array([mesh.n_vertices, mesh.n_faces, 1], ">i4").tobytes()
-        return CURVATURE + counts + narrow(UNNAMED, values).astype(">f4").tobytes()
-    n_frames = values.shape[1] if values.ndim > 1 else 1
+        return CURVATURE + counts + values.astype(">f4").tobytes()
     shape = [1, mesh.n_vertices, 1, 1, n_frames, MGH_WORD[values.dtype.kind], 0]
     head = np.array(shape, ">i4").tobytes().ljust(MGH_HEADER, b"\0")
     data = head + values.T.astype(values.dtype.newbyteorder(">")).tobytes()

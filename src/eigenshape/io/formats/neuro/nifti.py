@@ -16,7 +16,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.neuro.shared import (
     UNNAMED,
     Arrays,
-    count_vertices,
+    require_axes,
     require_nibabel,
     volume_function,
 )
@@ -82,16 +82,9 @@ def _load(data: bytes, *, is_volume: bool) -> tuple[np.ndarray, np.ndarray]:
     header = kind.header_class(data[:length], check=False)
     # nibabel returns the number of vertices that FreeSurfer stores elsewhere if 16 bits are too few.
     axes, bits = list(header.get_data_shape()), int(header["bitpix"])
-    if is_volume:
-        rule = "a volume must have three axes and one frame"
-        fits = len(axes) >= 3 and max(axes[3:], default=1) == 1
-    else:
-        rule = "functions on vertices must be n x 1 x 1, or that and frames"
-        fits = count_vertices([*axes, 1, 1, 1][:3]) > 0
-    if not fits or min(axes) < 1 or bits < 1:
-        raise FileFormatError(f"A NIfTI file of {rule}; it has {axes}, of {bits} bits each.")
+    require_axes("A NIfTI file", axes, is_volume=is_volume)
     size = math.prod(axes) * bits // 8
-    if size > len(data):
+    if not 0 < size <= len(data):
         raise FileFormatError(
             f"A NIfTI file must hold what it declares; {size} bytes do not fit into its {len(data)}."
         )

@@ -66,25 +66,24 @@ def narrow(name: str, values: np.ndarray) -> np.ndarray:
     return short
 
 
-def one_table(of_vertices: Arrays, what: str) -> np.ndarray:
-    """Return the one function that a file without names can hold."""
-    if len(of_vertices) != 1:
-        raise FileFormatError(
-            f"{what} holds one function, without a name; there are {len(of_vertices)}. "
-            "Write each to a file of its own."
-        )
-    (item,) = of_vertices.items()
-    return narrow(*item)
+def require_axes(what: str, axes: list[int], *, is_volume: bool) -> None:
+    """Raise an error if axes are not those of one volume, or of functions on vertices.
 
-
-def count_vertices(shape: Sequence[int]) -> int:
-    """Return the number of vertices of functions that are stored as a volume, or 0 for a volume.
-
-    They lie along its first axis. FreeSurfer factors a number that is too large for a header, as in
-    163842 = 27307 x 1 x 6, where the first axis is the fastest.
+    Vertices lie along the first axis. FreeSurfer factors a number of them that is too large for a
+    header, as in 163842 = 27307 x 1 x 6, where the first axis is the fastest. Frames follow.
     """
-    n, height, depth = shape
-    return n * depth if height == 1 and (depth == 1 or depth < n) else 0
+    if is_volume:
+        rule = "a volume must have three axes and one frame"
+        fits = len(axes) >= 3 and max(axes[3:], default=1) == 1
+    else:
+        rule = "functions on vertices must be n x 1 x 1, or that and frames"
+        width, height, depth = [*axes, 1, 1, 1][:3]
+        fits = height == 1 and (depth == 1 or depth < width)
+    if not fits or min(axes) < 1:
+        raise FileFormatError(
+            f"{what} of {rule}; it has {axes}. es.io.read_volume reads volumes, es.io.read_fields "
+            "functions."
+        )
 
 
 def volume_function(values: np.ndarray) -> np.ndarray:
