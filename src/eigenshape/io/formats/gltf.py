@@ -328,15 +328,18 @@ def _choose_scene(gltf: Gltf, wanted: str | int | None) -> int | None:
 
 def _copy_piece(piece: Piece, matrices: np.ndarray) -> Piece:
     """Place copies of triangles."""
-    copies = _merge_pieces([piece] * len(matrices))
+    count, n_vertices = len(matrices), len(piece.vertices)
     points = transform_points(matrices[:, None], piece.vertices).reshape(-1, 3)
-    faces = turn_back(copies.faces, np.repeat(sides(matrices), len(piece.vertices)))
-    return copies._replace(vertices=points, faces=faces)
+    starts = np.repeat(n_vertices * np.arange(count), len(piece.faces))
+    faces = np.tile(piece.faces, (count, 1)) + starts[:, None]
+    signs = np.repeat(sides(matrices), n_vertices)
+    rows, primitives = np.tile(piece.rows, count), np.tile(piece.primitives, count)
+    return Piece(points, turn_back(faces, signs), rows, primitives)
 
 
-def turn_back(faces: np.ndarray, sides: np.ndarray) -> np.ndarray:
+def turn_back(faces: np.ndarray, signs: np.ndarray) -> np.ndarray:
     """Reverse the triangles whose vertices a reflection turns over, as the format demands."""
-    return np.where(sides[faces].sum(axis=1, keepdims=True) < 0, faces[:, ::-1], faces)
+    return np.where(signs[faces].sum(axis=1, keepdims=True) < 0, faces[:, ::-1], faces)
 
 
 def sides(matrices: np.ndarray) -> np.ndarray:
