@@ -10,7 +10,7 @@ from scipy.sparse import csr_array, eye_array
 
 from eigenshape._arrays import ReadOnly, record
 from eigenshape._text import html_repr
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import number_places
 from eigenshape.io.opening import SourceFile
@@ -190,15 +190,9 @@ def corner_normals(
     groups = number_places(np.column_stack([places, np.rint(old * SAME_NORMAL)]))
     vectors = np.repeat(area_vectors(mesh.vertices[mesh.faces]), 3, axis=0)
     sums = np.column_stack([np.bincount(groups, weights=column) for column in vectors.T])
-    normals = unit_rows(sums[groups])
+    normals = unit_vectors(sums[groups])
     # A corner of faces without area keeps its old normal.
     return np.where(normals.any(axis=1, keepdims=True), normals, old).reshape(-1, 3, 3)
-
-
-def unit_rows(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """Give vectors the length 1, and leave those of length 0."""
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(lengths > 0, lengths, 1.0)
 
 
 def linear_colors(colors: Float[np.ndarray, "*rows"]) -> Float[np.ndarray, "*rows"]:

@@ -4,17 +4,17 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.sparse import csr_array
 
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.distances.closest_loops import nearest_around
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import disjoint_union, number_places, sorted_rows
-from eigenshape.io.attributes import MeshAttributes, unit_rows
+from eigenshape.io.attributes import MeshAttributes
 
 # Faces are searched this many times as far from the middle of a new face as its corners are.
 REACH = 1.5
@@ -66,21 +66,20 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
     # The numbers of the places where the corners of all faces lie, the old faces first
     both = disjoint_union(old, mesh)
     places = number_places(both.vertices)[both.faces]
-    starts, is_old = _nearest_faces(old, mesh, places)
+    starts, left = _nearest_faces(old, mesh, places)
     # A face at the places of an old one has its very values; corners of others lie on old faces.
     faces, weights = np.column_stack([starts] * 3), np.zeros((mesh.n_faces, 3, 3))
     old_order = np.argsort(places[: old.n_faces][starts], axis=1, kind="stable")
     order = np.argsort(places[old.n_faces :], axis=1, kind="stable")
     weights[np.arange(mesh.n_faces)[:, None], order, old_order] = 1.0
-    left = np.flatnonzero(~is_old)
     if left.size:
         new_corners = mesh.vertices[mesh.faces[left]]
         neighbors = _neighbors(attributes, places[: old.n_faces])
         faces[left], weights[left] = _corner_places(old, new_corners, starts[left], neighbors)
     columns = (3 * faces[:, :, None] + np.arange(3)).ravel()
     rows = np.repeat(np.arange(3 * mesh.n_faces), 3)
-    shape = (3 * mesh.n_faces, 3 * old.n_faces)
-    matrix = csr_array((weights.ravel(), (rows, columns)), shape=shape)
+    entries = (weights.ravel(), (rows, columns))
+    matrix = csr_array(entries, shape=(3 * mesh.n_faces, 3 * old.n_faces))
     matrix.eliminate_zeros()
     carried: dict[str, Any] = {}
     for name in ("texture_coordinates", "normals", "colors"):
@@ -88,7 +87,7 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
         if values is not None:
             table = interpolate(matrix, values.reshape(-1, values.shape[2]))
             if name == "normals" and matrix.nnz > len(table):  # some are means
-                table = unit_rows(table)
+                table = unit_vectors(table)
             carried[name] = table.reshape(-1, 3, values.shape[2])
     fields = {}
     for name, values in attributes.fields.items():
@@ -124,8 +123,8 @@ def interpolate(corners: csr_array, values: np.ndarray, *, blend: bool = True) -
 
 def _nearest_faces(
     old: TriangleMesh, new: TriangleMesh, places: Int[np.ndarray, "g 3"]
-) -> tuple[Int[np.ndarray, " f"], Bool[np.ndarray, " f"]]:
-    """Return the old face at the places of each new one, or the nearest, and whether it is there.
+) -> tuple[Int[np.ndarray, " f"], Int[np.ndarray, " k"]]:
+    """Return the old face at the places of each new one, and the new ones that have only the nearest.
 
     On a sheet of two sides it is the right side.
     """
@@ -142,17 +141,16 @@ def _nearest_faces(
     found = first[new_sides ^ 1]
     for same in (first[new_sides], olds[new_sides, _ranks(new_sides)]):
         found = np.where(same >= 0, same, found)
-    is_old = found >= 0
-    left = np.flatnonzero(~is_old)
+    left = np.flatnonzero(found < 0)
     if left.size:
         corners = new.vertices[new.faces[left]]
         nearest = closest_points(old, corners.mean(axis=1)).simplices
         twins = first[old_sides[nearest] ^ 1]
-        normals = unit_rows(area_vectors(corners))
-        old_normals = unit_rows(area_vectors(old.vertices[old.faces[nearest]]))
+        normals = unit_vectors(area_vectors(corners))
+        old_normals = unit_vectors(area_vectors(old.vertices[old.faces[nearest]]))
         looks_away = np.einsum("fi,fi->f", normals, old_normals) < 0
         found[left] = np.where(looks_away & (twins >= 0), twins, nearest)
-    return found, is_old
+    return found, left
 
 
 def _ranks(sides: Int[np.ndarray, " g"]) -> Int[np.ndarray, " g"]:
@@ -201,7 +199,7 @@ def _neighbors(
     across[order] = order[following]
     turned = at[across] != at[here]
     one, two = np.where(turned, ahead[across], across), np.where(turned, across, ahead[across])
-    is_smooth: Bool[np.ndarray, " e"] = np.ones(count, dtype=bool)
+    is_smooth = np.ones(count, dtype=bool)
     for name, step in SEAMS.items():
         values = getattr(attributes, name)
         if values is not None:

@@ -26,15 +26,15 @@ def find_labels(path: Path) -> Path:
 
     Raise FileFormatError if there is no such file.
     """
-    for suffix in LABEL_SUFFIXES:
-        beside = path.with_suffix(suffix)
+    files = [path.with_suffix(suffix) for suffix in LABEL_SUFFIXES]
+    for beside in files:
         if beside.exists():
             return beside
     if path.suffix.lower() == ".ply":
         return path
-    beside_names = ", ".join(path.with_suffix(suffix).name for suffix in LABEL_SUFFIXES)
+    names = ", ".join(beside.name for beside in files)
     raise FileFormatError(
-        f"{path} must have labels beside it, in one of the files {beside_names}; there is none. "
+        f"{path} must have labels beside it, in one of the files {names}; there is none. "
         "Write one label a line, as `eigenshape segment -o` does."
     )
 
@@ -178,8 +178,7 @@ def read_labels(path: Path) -> Int[np.ndarray, " f"]:
     Raise FileFormatError if a line or an entry is not a whole number, or if there is no such list,
     and OSError if the system cannot open the file.
     """
-    data = read_regular(path, "labels")
-    suffix = path.suffix.lower()
+    data, suffix = read_regular(path, "labels"), path.suffix.lower()
     with naming(path):
         if suffix == ".ply":
             return parse_labels(data)

@@ -111,7 +111,7 @@ def _surface_of(source: SourceFile) -> RepairedMesh[TriangleMesh]:
             return RepairedMesh(surface, (*report, taken), kept[boundary_vertices(solid)])
         if simplices.shape[1] == 3 and points.shape[1] == 2:
             points = np.column_stack([points, np.zeros(len(points))])
-            report = (*report, "a mesh in the plane was taken at z = 0")
+            report += ("a mesh in the plane was taken at z = 0",)
         require_surface(points, simplices)
         return RepairedMesh(TriangleMesh(points, simplices), report, kept)
     cloud = PointCloud(points)

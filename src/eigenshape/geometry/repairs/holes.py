@@ -49,11 +49,10 @@ def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[Tr
             taken = np.array(graph[loop][:, loop].toarray(), dtype=bool)
             if added:
                 faces = np.concatenate(added)
-                place_of = {vertex: place for place, vertex in enumerate(loop.tolist())}
                 drawn = np.concatenate([faces[:, :2], faces[:, 1:], faces[:, ::2]])
-                for one, other in drawn[np.isin(drawn, loop).all(axis=1)].tolist():
-                    here, there = place_of[one], place_of[other]
-                    taken[here, there] = taken[there, here] = True
+                drawn = drawn[np.isin(drawn, loop).all(axis=1)]
+                here, there = (drawn[:, :, None] == loop).argmax(axis=2).T
+                taken[here, there] = taken[there, here] = True
             triangles = triangulate(points, taken)
             added += [loop[triangles]] if len(triangles) else []
             n_open += not len(triangles)

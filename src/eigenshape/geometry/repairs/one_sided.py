@@ -67,8 +67,7 @@ def cut_edges(
     first = len(vertices) + 2 * len(cut)
     rows = np.concatenate([ends[kept].ravel(), corners])
     columns = np.concatenate([nodes[kept].ravel(), first + vertices[corners]])
-    size = first + n
-    group = label_components(size, rows, columns)[1][: len(vertices)]
+    group = label_components(first + n, rows, columns)[1][: len(vertices)]
     _, first_corner, group = np.unique(group, return_index=True, return_inverse=True)
     # Groups are numbered by their first corner; all but the first of a vertex become new ones.
     owner = vertices[first_corner]

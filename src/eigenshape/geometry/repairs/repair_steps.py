@@ -131,9 +131,7 @@ def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     n_flips = 0
     while True:
         table = edge_table(mesh)
-        is_flat = np.zeros(mesh.n_faces, dtype=bool)
-        is_flat[degenerate_simplices(mesh)] = True
-        flat = np.flatnonzero(is_flat)
+        flat = degenerate_simplices(mesh)
         points, _ = size_one(mesh.vertices)
         sides = np.stack([np.roll(mesh.faces[flat], -turn, axis=1) for turn in (1, 2)], axis=2)
         lengths = np.linalg.norm(points[sides[..., 0]] - points[sides[..., 1]], axis=2)
@@ -151,7 +149,7 @@ def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
         two = np.where(between == a[:, None], m[:, None], between)
         keys = np.minimum(m, d) * mesh.n_vertices + np.maximum(m, d)
         known = table.edges[:, 0] * mesh.n_vertices + table.edges[:, 1]
-        good = has_two & ~is_flat[neighbor] & ~np.isin(keys, known)
+        good = has_two & ~np.isin(neighbor, flat) & ~np.isin(keys, known)
         for halves in (one, two):
             if len(halves):
                 good[degenerate_simplices(TriangleMesh(mesh.vertices, halves))] = False
@@ -244,8 +242,7 @@ def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
 
 def drop_duplicate_points(cloud: PointCloud) -> RepairedCloud:
     """Keep the first of all points of a cloud at the same place."""
-    _, source = np.unique(number_places(cloud.points), return_index=True)
-    source = np.sort(source)
+    source = np.sort(np.unique(number_places(cloud.points), return_index=True)[1])
     removed = count_nouns(cloud.n_points - len(source), "point")
     report = f"drop_duplicate_points removed {removed} at the places of others"
     return RepairedCloud(PointCloud(cloud.points[source], cloud.dim), (report,), source)

@@ -119,10 +119,7 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
         # tetrahedra cover each point of the solid an odd number of times, and each point of a
         # cavity and outside an even number of times. With the volume of the solid that is once
         # and never.
-        table = facet_table(found)
-        odd = table.facets[table.n_simplices % 2 == 1]
-        faces = np.unique(np.sort(surface.faces, axis=1), axis=0)
-        if np.array_equal(odd, faces) and abs(filled - volume) <= 1e-6 * volume:
+        if _is_bounded_by(found, surface) and abs(filled - volume) <= 1e-6 * volume:
             return found
     raise InvalidShapeError(
         f"Tetrahedra must fill what the surface encloses, {volume:g}, and nothing else; "
@@ -160,3 +157,10 @@ def _require_apart(mesh: TriangleMesh) -> None:
             f"{mesh.vertices[two].tolist()} ({len(doubles)} such). "
             'Try repair(mesh, ["weld"]), or --repair weld on the command line.'
         )
+
+
+def _is_bounded_by(solid: SimplicialMesh, surface: TriangleMesh) -> bool:
+    """Tell whether the triangles at an odd number of tetrahedra are those of the surface."""
+    table = facet_table(solid)
+    odd = table.facets[table.n_simplices % 2 == 1]
+    return np.array_equal(odd, np.unique(np.sort(surface.faces, axis=1), axis=0))

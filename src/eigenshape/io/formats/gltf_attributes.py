@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from eigenshape._errors import FileFormatError
+from eigenshape.geometry.measure import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
@@ -22,7 +23,6 @@ from eigenshape.io.attributes import (
     linear_colors,
     plain_attributes,
     screen_colors,
-    unit_rows,
 )
 from eigenshape.io.carrying import interpolate
 from eigenshape.io.formats.gltf import (
@@ -414,8 +414,8 @@ def _place_vertices(
         local = (old + np.einsum("...ij,...j->...i", np.linalg.pinv(linear), moves)).astype("<f4")
     table["POSITION"] = local, False
     if normals.size:
-        normals = unit_rows(np.einsum("...ji,...j->...i", linear, normals))
-        table["NORMAL"] = unit_rows(normals - turns).astype("<f4"), False
+        normals = unit_vectors(np.einsum("...ji,...j->...i", linear, normals))
+        table["NORMAL"] = unit_vectors(normals - turns).astype("<f4"), False
     return np.broadcast_to(sides(pose), len(local)), transform_points(pose, local + shifts)
 
 

@@ -139,6 +139,11 @@ def rows_text(prefix: str, rows: np.ndarray) -> list[str]:
     return [prefix + " ".join(map(repr, row)) for row in rows.tolist()]
 
 
+def end_lines(lines: Sequence[str]) -> bytes:
+    """Return the content of a file of some lines."""
+    return ("\n".join(lines) + "\n").encode()
+
+
 # Compression ratios: a regular lattice of tetrahedra has 9 with zlib and 36 with LZMA, zeros 1,000.
 MOST_TIMES = 40
 ALWAYS = 2**25  # bytes that a file of any size may unpack to

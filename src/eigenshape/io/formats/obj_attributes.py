@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.polygons import cut_polygons
 from eigenshape.io.attributes import (
@@ -20,9 +20,8 @@ from eigenshape.io.attributes import (
     WriteJob,
     corner_normals,
     plain_attributes,
-    unit_rows,
 )
-from eigenshape.io.formats.numbers import rows_text
+from eigenshape.io.formats.numbers import end_lines, rows_text
 from eigenshape.io.formats.obj import ObjSheet, read_sheet
 from eigenshape.io.opening import SourceFile
 
@@ -54,14 +53,13 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         others.append("smoothing groups")
     others += sheet.dropped
     has_normals = (normals >= 0).any()
-    colors = _colors(sheet)
     return replace(
         plain_attributes(mesh),
         face_materials=face_materials[polygon_of],
         face_groups=face_groups[polygon_of],
         texture_coordinates=coordinates[textures - 1] if textures.any() else None,
         normals=np.array([*sheet.normals, (0.0, 0.0, 0.0)])[normals] if has_normals else None,
-        colors=None if colors is None else colors[mesh.faces],
+        colors=_colors(sheet, mesh),
         materials=tuple(defined.get(name, Material(_unicode(name))) for name in names),
         groups=tuple(map(_unicode, groups)),
         others=tuple(others),
@@ -92,14 +90,14 @@ def _switches(sheet: ObjSheet, keywords: tuple[str, ...]) -> tuple[list[str], np
     return list(names), np.array(numbers, dtype=np.int64)
 
 
-def _colors(sheet: ObjSheet) -> np.ndarray | None:
-    """Return the colors behind coordinates, if there are any; vertices without one are white."""
+def _colors(sheet: ObjSheet, mesh: TriangleMesh) -> np.ndarray | None:
+    """Return the colors behind coordinates at corners, if there are any; white where there is none."""
     tails = [tail.split() for tail in sheet.tails]
     if 3 not in map(len, tails):
         return None
     rows = [[*tail, "1"] if len(tail) == 3 else ["1"] * 4 for tail in tails]
     shares = np.nan_to_num(np.array(rows, float)).clip(0, 1)
-    return np.rint(255 * shares).astype(np.uint8)
+    return np.rint(255 * shares).astype(np.uint8)[mesh.faces]
 
 
 def _unicode(name: str) -> str:
@@ -135,11 +133,13 @@ def _material_files(sheet: ObjSheet, source: SourceFile) -> tuple[str, list[str]
     return text, missing
 
 
-def _image_of(rest: str, folder: Path) -> Path | None:
-    """Return the image that a line of a material names, behind its options."""
-    return find_beside(_unicode(rest), folder) or find_beside(
-        _unicode(rest.rsplit(maxsplit=1)[-1]), folder
-    )
+def _find_image(rest: str, folder: Path, lost: list[str]) -> Path | None:
+    """Return the image that a line of a material names, behind its options, or note that it is lost."""
+    name = _unicode(rest)
+    path = find_beside(name, folder) or find_beside(name.rsplit(maxsplit=1)[-1], folder)
+    if path is None:
+        lost.append(f"the image {rest[:80]!r}, which is not in the folder of the file")
+    return path
 
 
 def _read_materials(sheet: ObjSheet, source: SourceFile) -> tuple[dict[str, Material], list[str]]:
@@ -156,12 +156,8 @@ def _read_materials(sheet: ObjSheet, source: SourceFile) -> tuple[dict[str, Mate
         alpha = float(values["d"].split()[-1]) if "d" in values else 1.0 - clear
         image, image_name = None, ""
         if "map_kd" in values:
-            path = _image_of(values["map_kd"], source.folder)
-            if path is None:
-                lost.append(
-                    f"the image {values['map_kd'][:80]!r}, which is not in the folder of the file"
-                )
-            else:
+            path = _find_image(values["map_kd"], source.folder, lost)
+            if path:
                 image, image_name = read_regular(path, "an image"), path.name
         found[name] = Material(_unicode(name), (red, green, blue, alpha), image, image_name)
     return found, lost
@@ -185,9 +181,8 @@ def write(job: WriteJob) -> Files:
     files: Files = {}
 
     def link(match: re.Match[str]) -> str:
-        image = _image_of(match[2], source.folder)
+        image = _find_image(match[2], source.folder, job.lost)
         if image is None:
-            job.lost.append(f"the image {match[2][:80]!r}, which is not in the folder of the file")
             return match[0]
         copy = add_image(files, job.path, image.name, read_regular(image, "an image"))
         return match[1] + copy.name.encode().decode("latin-1")
@@ -332,7 +327,7 @@ def _normals(
         return np.empty((0, 3)), numbers
     vectors = area_vectors(vertices[np.array(triangles)])
     sums = np.column_stack([np.bincount(owners, weights=column) for column in vectors.T])
-    units, old = unit_rows(sums), np.array([normal for _, normal in numbers])
+    units, old = unit_vectors(sums), np.array([normal for _, normal in numbers])
     return np.where(units.any(axis=1, keepdims=True), units, old), numbers
 
 
@@ -361,7 +356,7 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Fil
             if material.image is not None:
                 image = add_image(files, path, material.image_name, material.image)
                 text.append(f"map_Kd {image.name}")
-        files[library] = ("\n".join(text) + "\n").encode()
+        files[library] = end_lines(text)
     vertices = rows_text("v ", mesh.vertices)
     if attributes.colors is not None:
         tints = np.ones((mesh.n_vertices, 3))
@@ -376,9 +371,8 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Fil
         if table is None:
             columns.append(np.zeros_like(columns[0]))
             continue
-        distinct, numbers = np.unique(
-            table.reshape(-1, table.shape[2]), axis=0, return_inverse=True
-        )
+        rows = table.reshape(-1, table.shape[2])
+        distinct, numbers = np.unique(rows, axis=0, return_inverse=True)
         lines += rows_text(f"{keyword} ", distinct)
         columns.append(numbers.ravel() + 1)
     corners = [_corner_text(*numbers) for numbers in np.column_stack(columns).tolist()]
@@ -387,11 +381,11 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Fil
         group, number = int(attributes.face_groups[face]), int(of_faces[face])
         if group != state[0]:
             lines.append(f"g {attributes.groups[group] or f'group_{group}'}")
-        if number != state[1] and number >= 0:
+        if number != state[1]:
             lines.append(f"usemtl {names[number]}")
         state = group, number
         lines.append("f " + " ".join(corners[3 * face : 3 * face + 3]))
-    files[path] = ("\n".join(lines) + "\n").encode()
+    files[path] = end_lines(lines)
     return files
 
 

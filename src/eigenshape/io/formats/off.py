@@ -17,6 +17,7 @@ from eigenshape.io.formats.cells import polygon_triangles
 from eigenshape.io.formats.numbers import (
     Line,
     coordinates,
+    end_lines,
     lines_of,
     number,
     quote_line,
@@ -160,9 +161,10 @@ def _polygons(numbers: list[int], n_faces: int, *, has_colors: bool) -> list[lis
 
 def format_text(mesh: TriangleMesh) -> bytes:
     """Write a mesh so that it reads back exactly."""
-    lines = [
-        f"OFF\n{mesh.n_vertices} {mesh.n_faces} 0",
-        *rows_text("", mesh.vertices),
-        *rows_text("3 ", mesh.faces),
-    ]
-    return ("\n".join(lines) + "\n").encode()
+    return end_lines(
+        [
+            f"OFF\n{mesh.n_vertices} {mesh.n_faces} 0",
+            *rows_text("", mesh.vertices),
+            *rows_text("3 ", mesh.faces),
+        ]
+    )

@@ -19,13 +19,13 @@ from jaxtyping import Int
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import (
-    NO_TRIANGLES,
     list_corners,
     polygon_triangles,
     strip_triangles,
 )
 from eigenshape.io.formats.numbers import (
     Line,
+    end_lines,
     lines_of,
     number,
     number_table,
@@ -91,7 +91,6 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
     vertices = np.column_stack(
         [np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES]
     )
-    triangles = [NO_TRIANGLES]
     polygons = read_lists(tables, "face")
     are_equal = isinstance(polygons, np.ndarray)
     for index, corners in enumerate(polygons[:1] if are_equal else polygons):
@@ -99,9 +98,8 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
             raise FileFormatError(
                 f"A face must have three corners or more; face {index} is {list(map(int, corners))}."
             )
-    if len(polygons):
-        corners = polygons.astype(np.int64) if are_equal else polygons
-        triangles.append(polygon_triangles(vertices, corners))
+    corners = polygons.astype(np.int64) if are_equal else polygons
+    triangles = [polygon_triangles(vertices, corners)]
     for strip in read_lists(tables, "tristrips"):
         corners = np.asarray(strip, dtype=np.int64)
         pieces = np.split(corners, np.flatnonzero(corners == -1))  # -1 separates strips
@@ -342,14 +340,9 @@ def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
     return np.repeat(values, n_triangles)
 
 
-def format_text(
-    mesh: TriangleMesh,
-    of_vertices: Table | None = None,
-    of_faces: Table | None = None,
-    comment: str = "",
-) -> bytes:
-    """Write a mesh, and columns of vertices and faces by name, as text that reads back exactly."""
-    tables = _columns(mesh, of_vertices, of_faces)
+def format_text(mesh: TriangleMesh, *more: Table, comment: str = "") -> bytes:
+    """Write a mesh, and more columns of vertices and of faces, as text that reads back exactly."""
+    tables = _columns(mesh, *more)
     rows: list[str] = []
     for columns in tables.values():
         words = [
@@ -359,17 +352,12 @@ def format_text(
             for values in columns.values()
         ]
         rows += map(" ".join, zip(*words, strict=True))
-    return _header_text(tables, "ascii", comment) + ("\n".join(rows) + "\n").encode()
+    return _header_text(tables, "ascii", comment) + end_lines(rows)
 
 
-def format_binary(
-    mesh: TriangleMesh,
-    of_vertices: Table | None = None,
-    of_faces: Table | None = None,
-    comment: str = "",
-) -> bytes:
-    """Write a mesh, and columns of vertices and faces by name, in binary that reads back exactly."""
-    return _pack(_columns(mesh, of_vertices, of_faces), comment)
+def format_binary(mesh: TriangleMesh, *more: Table, comment: str = "") -> bytes:
+    """Write a mesh, and more columns of vertices and of faces, in binary that reads back exactly."""
+    return _pack(_columns(mesh, *more), comment)
 
 
 def format_points(points: np.ndarray, _suffix: str) -> bytes:
@@ -377,12 +365,12 @@ def format_points(points: np.ndarray, _suffix: str) -> bytes:
     return _pack({"vertex": dict(zip(AXES, points.T, strict=True))})
 
 
-def _columns(
-    mesh: TriangleMesh, of_vertices: Table | None, of_faces: Table | None
-) -> dict[str, Table]:
-    corners = {CORNERS[0]: mesh.faces.astype(np.int32)}
+def _columns(mesh: TriangleMesh, *more: Table) -> dict[str, Table]:
     places = dict(zip(AXES, mesh.vertices.T, strict=True))
-    return {"vertex": places | (of_vertices or {}), "face": corners | (of_faces or {})}
+    tables = {"vertex": places, "face": {CORNERS[0]: mesh.faces.astype(np.int32)}}
+    for table, columns in zip(tables.values(), more, strict=False):
+        table.update(columns)
+    return tables
 
 
 def _pack(tables: dict[str, Table], comment: str = "") -> bytes:
@@ -405,4 +393,4 @@ def _header_text(tables: dict[str, Table], order: str, comment: str) -> bytes:
         for name, values in columns.items():
             kind = WRITTEN_TYPES[values.dtype.str[1:]]
             lines.append(f"property {'list uchar ' if values.ndim == 2 else ''}{kind} {name}")
-    return ("\n".join([*lines, "end_header"]) + "\n").encode()
+    return end_lines([*lines, "end_header"])

@@ -174,12 +174,11 @@ def write(job: WriteJob) -> dict[Path, bytes]:
     if material and material.image is not None:  # one image for all faces
         place = add_image(files, job.path, material.image_name, material.image)
         comment = f"TextureFile {place.name}"
-        name = Path(material.image_name).stem
-        is_plain = material.name == name and material.color == Material().color
-        kinds = [] if is_plain else ["materials"]
+        plain = replace(material, name=Path(material.image_name).stem, color=Material.color)
+        kinds = [] if material == plain else ["materials"]
     job.lose(kinds if numbered and labels is None else [*kinds, "names of groups"])
     format_columns = format_binary if job.binary else format_text
-    return {**files, job.path: format_columns(mesh, of_vertices, of_faces, comment)}
+    return {**files, job.path: format_columns(mesh, of_vertices, of_faces, comment=comment)}
 
 
 def _kind(values: np.ndarray) -> type[np.generic]:
