@@ -171,17 +171,16 @@ def test_a_unit_that_the_file_names_is_converted(scans, output, tmp_path):
 
 
 def test_landmarks_that_fit_no_specimen_are_refused(scans, tmp_path):
-    def refused(source):
+    def refused(source, code=2):
         options = ("-o", tmp_path / "out", "--landmarks", source)
-        return run("collection", scans, *options, code=2).stderr
+        return run("collection", scans, *options, code=code).stderr
 
     table = tmp_path / "table.csv"
     es.morphometrics.write_landmarks({"hnad 0": landmarks(0)}, table)
     assert "Landmarks must be of specimens" in refused(table)
     (tmp_path / "empty").mkdir()
-    assert "A folder of landmarks must hold files that end in .mrk.json" in refused(
-        tmp_path / "empty"
-    )
+    message = "A folder of landmarks must hold files that end in .mrk.json"
+    assert message in refused(tmp_path / "empty", code=1)
     (tmp_path / "twice").mkdir()
     for suffix in (".fcsv", ".mrk.json"):
         es.morphometrics.write_landmarks(landmarks(0), tmp_path / "twice" / f"hand 0{suffix}")

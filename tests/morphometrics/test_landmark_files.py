@@ -320,7 +320,8 @@ def test_files_of_programs_that_place_landmarks_are_read(tmp_path):
     found = read("a.pts", EDITOR, tmp_path)["a"]
     assert found.names == ("S000", "C000 001", "S001")
     np.testing.assert_array_equal(found.points, [[1, 2, 3], [4, 5, 6], [np.nan] * 3])
-    found = read("a.landmarkAscii", AMIRA, tmp_path)["a"]
+    (tmp_path / "a.landmarkAscii").write_bytes(AMIRA.replace("\n", "\r\n").encode())
+    found = es.morphometrics.read_landmarks(tmp_path / "a.landmarkAscii")
     assert found.points.tolist() == [[1, 2, 3], [4, 5, 6]]
     two = (
         AMIRA.replace("@1\n#", "@1\nMarkers { float[3] Coordinates2 } @2\n#") + "@2\n7 8 9\n1 1 1\n"
