@@ -27,6 +27,8 @@ def triangulate_polygons(
     Polygons on a line, those with a corner that is not finite or not a point, and those in other
     dimensions than 2 and 3 become fans.
 
+    Raise InvalidShapeError if a polygon crosses itself, or folds back so that it has no area.
+
     Parameters
     ----------
     points : (n, d) float
@@ -42,11 +44,6 @@ def triangulate_polygons(
         Indices of points, polygon by polygon.
     owners : (t,) int
         The polygon of each triangle.
-
-    Raises
-    ------
-    InvalidShapeError
-        If a polygon crosses itself, or folds back so that it has no area.
     """
     triangles, owners, crossed = cut_polygons(points, starts, corners)
     if crossed.size:

@@ -388,9 +388,9 @@ def save_mesh(
             job.lose(held.contents)
             module = known.load()
             files = {path: (module.format_binary if is_binary else module.format_text)(mesh)}
+        lost += loss_in_single(mesh) if is_binary and "single" in known.traits else []
     except FileFormatError as err:
         raise FileFormatError(f"{path} cannot hold the mesh. {err}") from err
-    lost += loss_in_single(mesh) if is_binary and "single" in known.traits else []
     for place, data in files.items():
         replace_file(place, data)
     return f"{path.name} does not keep: {', '.join(dict.fromkeys(lost))}." if lost else ""
