@@ -37,8 +37,8 @@ def rounding_loss(mesh: TriangleMesh, found: Float[np.ndarray, "f 3 3"]) -> list
     change = abs(after.sum() - before.sum()) / before.sum()
     if not max(change, moves.max()) <= MOST_CHANGE:
         raise FileFormatError(
-            f"A file must keep the area and the places of vertices to {MOST_CHANGE:.0%}; rounding to single "
-            f"precision changes the area by {change:.2g} and a place by {moves.max():.2g} of the size. "
+            f"A file must keep the area and the places of vertices to {MOST_CHANGE:.0%}; rounding, or a "
+            f"node that flattens, changes the area by {change:.2g} and a place by {moves.max():.2g} of the size. "
             "Write .ply, which keeps all digits."
         )
     n_flat = int(((after == 0) & (before > 0)).sum())
