@@ -23,6 +23,8 @@ Answer = list[tuple[str, np.ndarray]] | str
 PICTURES_AND_FILES = ("draw", "figure_", "part_colors", "view", "write_", "read_", "open_", "save")
 # What says nothing of these axes, or has tests of its own because it takes seconds.
 LEFT_OUT = {
+    "BrainPrint.distances": "takes another of its kind",
+    "Registration.after": "takes another of its kind",
     "CarriedLandmarks.save": "bends a collection, which takes seconds; tests/collections",
     "Collection.number": "takes a name",
     "Collection.read_specimen": "takes a name",
