@@ -86,6 +86,7 @@ FIGURES = {
     "search": Figure("bench_search.py --queries 20 --qdrant 0", STORE),
     "retrieval": Figure("bench_retrieval.py --repeats 1", DESCRIBING),
     "deform": Figure("bench_deform.py --repeats 1", ("deformation",)),
+    "characters": Figure("bench_characters.py --repeats 1", ("deformation", "io")),
     "kernel": Figure("bench_kernel.py --repeats 1", ("operators",)),
     "approximate": Figure(
         "bench_approximate.py --cases dragon sphere-160k kernel-20k",
@@ -121,9 +122,11 @@ FIGURES = {
         "bench_torch.py --only gradients --only memory --only awkward --only damaged",
         ("torch", "spectral/tools", *SOLVER),
     ),
+    "interop": Figure("bench_interop.py", ("io",)),
     "million": Figure("bench_search.py --sizes 1000000 --queries 10 --qdrant 0 --faiss 0", STORE),
 }
-LARGE = {"million"}  # measured only if it is named: an hour and 65 GB of disk
+# Measured only if they are named: an hour and 65 GB of disk; nine programs, of which most are not installed here
+LARGE = {"million", "interop"}
 
 
 def load(name: str) -> dict[str, Any] | None:

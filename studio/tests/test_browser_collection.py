@@ -17,7 +17,15 @@ def report(tmp_path_factory):
     spread = np.full((3, 1), 0.1)
     doubtful = np.array([[False], [False], [True]])
     carried = CarriedLandmarks(
-        collection.names, ("top",), collection.points[:, :1], spread, doubtful
+        collection.names,
+        ("top",),
+        collection.points[:, :1],
+        spread,
+        doubtful,
+        given=np.ones((3, 1), dtype=bool),
+        distance=np.zeros((3, 1)),
+        disagreement=np.zeros((3, 1)),
+        confidence=np.ones((3, 1)),
     )
     path = folder / "report.html"
     steps.write_collection_report(collection, carried, path, "balls", lambda share, name: None)

@@ -1,5 +1,7 @@
 """A second shape, its map, landmarks and a collection: what the page gets of them."""
 
+from tempfile import gettempdir
+
 import numpy as np
 import pytest
 from balls import collection_of_balls
@@ -176,7 +178,7 @@ def test_a_correction_is_made_and_taken_back(poses):
 def test_landmarks_are_placed_saved_and_loaded():
     ball = stretched_ball()
     page = Page(Workspace(ball))
-    points = {"points": (1.5 * ball.vertices[[3, 5]]).astype("<f8").ravel()}
+    points = {"points": (1.05 * ball.vertices[[3, 5]]).astype("<f8").ravel()}
     found, _ = page.call("finish", kind="landmarks", names=["nose", "tail"], _arrays=points)
     assert "moved to the surface" in found["warnings"][0]
     placed = found["state"]["landmarks"]
@@ -191,6 +193,14 @@ def test_landmarks_are_placed_saved_and_loaded():
         assert [each["name"] for each in again] == ["nose", "tail"]
         for one, two in zip(placed, again, strict=True):
             np.testing.assert_allclose(one["point"], two["point"], atol=1e-12)
+    text = (
+        b'{"markups": [{"coordinateUnits": "m", "controlPoints": [{"position": [0, 0, 0.001]}]}]}'
+    )
+    file = {"file": np.frombuffer(text, "|u1")}
+    found, _ = Page(Workspace(es.icosphere(1))).call(
+        "finish", kind="landmarks", name="a.mrk.json", _arrays=file
+    )
+    assert found["warnings"][0] == "a.mrk.json: its points are in m and were converted to mm"
     two_shapes = page.call(
         "finish", kind="open", name="b.ply", _arrays={"file": file_of(es.icosphere(1))}
     )
@@ -198,13 +208,17 @@ def test_landmarks_are_placed_saved_and_loaded():
     assert page.call("finish", kind="choose", shape=0)[0]["state"]["landmarks"] == again
 
 
+FAR_POINTS = b"Version 1.0\n3\na .01 0 0\nb 0 .01 0\nc 0 0 .01\n"
 WRONG = [
     ({}, {}, "names must be a list"),
     ({"names": ["a"]}, {}, "three coordinates for each"),
     ({"names": ["a", "a"]}, {"points": [0.0] * 6}, "must differ"),
     ({"names": [""]}, {"points": [0.0] * 3}, "must be a text"),
     ({"names": ["a"]}, {"points": [0.0, 0.0, np.inf]}, "must be finite"),
-    ({"name": "a.obj"}, {"file": b"v 0 0 0"}, "Files of landmarks end in"),
+    ({"name": "a.obj"}, {"file": b"v 0 0 0"}, "Files of landmarks that are read end in"),
+    ({"name": "a.pp"}, {"file": b"<a"}, "a.pp must hold landmarks"),
+    ({"names": ["a"]}, {"points": [9.0, 0.0, 0.0]}, "must lie on the surface of their specimen"),
+    ({"name": "a.pts"}, {"file": FAR_POINTS}, "100 times as large they would lie on it"),
 ]
 
 
@@ -215,7 +229,9 @@ def test_wrong_landmarks_are_refused(meta, arrays, reason):
         name: np.frombuffer(value, "|u1") if isinstance(value, bytes) else np.array(value, "<f8")
         for name, value in arrays.items()
     }
-    assert reason in page.error("finish", meta, given, kind="landmarks")["message"]
+    message = page.error("finish", meta, given, kind="landmarks")["message"]
+    assert reason in message
+    assert gettempdir() not in message
     assert "at least one" in page.error("array", name="landmarks/0/fcsv")["message"]
     assert "side 0 or 1" in page.error("array", name="landmarks/2/fcsv")["message"]
     assert (

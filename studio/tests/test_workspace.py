@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import stretched_ball
+from scipy.sparse import eye_array
 
 import eigenshape as es
+from eigenshape.geometry.topology import submesh
 from eigenshape_studio.opening import open_workspace
 from eigenshape_studio.shape.loading import Loaded
 from eigenshape_studio.tab.history import Shape
@@ -17,6 +19,12 @@ from eigenshape_studio.wire import decode, encode
 
 TURN = {"type": "rotation", "pivot": [0, 0.9, 0], "axis": [0, 0, 2], "angle": 0.6}
 PULL = {"type": "translation", "vector": [0, 0.4, 0.1]}
+# A PNG file of one black pixel; what it shows is not read here.
+IMAGE = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b55"
+    "0000000a49444154789c6360000000020001"
+    "48afa4710000000049454e44ae426082"
+)
 ROTATION, TRANSLATION = es.Rotation([0, 0.9, 0], [0, 0, 2], 0.6), es.Translation([0, 0.4, 0.1])
 
 
@@ -541,3 +549,99 @@ def test_functions_of_the_file_are_there_to_choose_from(tmp_path, suffix):
     workspace = open_workspace([tmp_path / f"a{suffix}"])
     assert [facts["name"] for facts in workspace.state()["values"]] == ["height (mm)"]
     workspace.close()
+
+
+def textured_ball():
+    """Return a ball that is cut open where a texture begins, and its attributes: two materials."""
+    ball = es.icosphere(2)
+    right = ball.vertices[ball.faces].mean(axis=1)[:, 0] > 0
+    halves = [submesh(ball, half)[0] for half in (right, ~right)]
+    cut = es.geometry.disjoint_union(*halves)
+    corners = cut.vertices[cut.faces]
+    none = np.full(cut.n_faces, -1)
+    attributes = es.io.MeshAttributes(
+        cut,
+        eye_array(3 * cut.n_faces, format="csr"),
+        none + 1,
+        np.repeat([0, 1], [half.n_faces for half in halves]),
+        none,
+        texture_coordinates=corners[:, :, :2] / 2 + 0.5,
+        materials=(
+            es.io.Material("skin", image=IMAGE, image_name="skin.png"),
+            es.io.Material("red", color=(1.0, 0.0, 0.0, 1.0)),
+        ),
+    )
+    return cut, attributes
+
+
+def require_skin(page, places):
+    """Check what the page draws against the texture: half of the ball has the image, half is red."""
+    rows, corners = page.array("skin/rows"), page.array("skin/corners").reshape(-1, 3)
+    faces = page.array("faces").reshape(-1, 3)
+    np.testing.assert_array_equal(rows[corners, 0], faces)
+    np.testing.assert_allclose(rows[corners, 1:3], places, atol=1e-6)
+    has_image = rows[corners, 6] == 1
+    assert (has_image == has_image[:, :1]).all()
+    assert 0 < has_image.sum() < has_image.size
+    np.testing.assert_array_equal(np.unique(rows[corners][has_image][:, 3:6], axis=0), [[255] * 3])
+    np.testing.assert_array_equal(
+        np.unique(rows[corners][~has_image][:, 3:6], axis=0), [[255, 0, 0]]
+    )
+    assert page.array("skin/0").tobytes() == IMAGE
+    # The corners of a vertex on the border of both look different, so it is split there.
+    assert len(rows) > page.workspace.mesh.n_vertices
+
+
+def test_a_textured_file_is_joined_shown_and_saved_with_its_texture(tmp_path):
+    cut, attributes = textured_ball()
+    es.write_mesh(cut, tmp_path / "ball.glb", attributes=attributes)
+    workspace = open_workspace([tmp_path / "ball.glb"])
+    page = Page(workspace)
+    state = workspace.state()
+    assert (state["n_vertices"], state["n_images"]) == (162, 1)
+    n_double = cut.n_vertices - 162
+    assert state["notes"] == [f"weld_seams joined {n_double} vertices along seams"]
+    require_skin(page, attributes.texture_coordinates)
+    assert "There are 1 images; '1' is none" in page.error("array", name="skin/1")["message"]
+    (tmp_path / "again.glb").write_bytes(page.array("file/glb").tobytes())
+    _, kept = es.read_mesh(tmp_path / "again.glb", attributes=True)
+    np.testing.assert_allclose(kept.texture_coordinates, attributes.texture_coordinates, atol=1e-6)
+    assert kept.materials[0].image == IMAGE
+    workspace.close()
+
+
+def test_a_textured_file_may_be_dropped(page, tmp_path):
+    cut, attributes = textured_ball()
+    es.write_mesh(cut, tmp_path / "ball.glb", attributes=attributes)
+    data = np.frombuffer((tmp_path / "ball.glb").read_bytes(), np.uint8)
+    facts, _ = page.call("finish", {"kind": "open", "name": "ball.glb"}, {"file": data})
+    assert facts["state"]["n_images"] == 1
+    assert any("weld_seams joined" in warning for warning in facts["warnings"])
+    require_skin(page, attributes.texture_coordinates)
+
+
+def test_colors_of_a_file_are_a_skin_without_an_image(tmp_path):
+    ball = es.icosphere(1)
+    colors = np.arange(3 * ball.n_vertices, dtype=np.uint8).reshape(-1, 3)
+    es.write_mesh(ball, tmp_path / "a.ply", colors=colors)
+    workspace = open_workspace([tmp_path / "a.ply"])
+    assert workspace.state()["n_images"] == 0
+    rows = Page(workspace).array("skin/rows")
+    np.testing.assert_array_equal(rows[:, 3:6], colors[rows[:, 0].astype(int)])
+    workspace.close()
+
+
+def test_what_has_no_look_has_no_skin(page):
+    assert page.workspace.state()["n_images"] == -1
+    error = page.error("array", name="skin/rows")["message"]
+    assert "must hold colors or a texture; it does not" in error
+
+
+def test_an_island_of_a_region_is_told_when_it_is_bound(page, top):
+    away = es.geometry.geodesic_distances(page.workspace.mesh, [top])[0]
+    island = np.flatnonzero((away > 0.3) & (away < 0.4))[:1]
+    regions = {"region0": np.union1d(top, island).astype("<u4")}
+    facts, _ = page.call("rig", {"n_modes": None, "n_regions": 1, "fixed": False}, regions)
+    assert f"of which vertex {island[0]} follows by 0." in facts["warnings"][0]
+    facts, _ = page.call("rig", {"n_modes": None, "n_regions": 1, "fixed": False}, {"region0": top})
+    assert facts["warnings"] == []

@@ -64,7 +64,7 @@ def page_data(output):
 
 def test_landmarks_of_all_specimens_are_a_table(output):
     text = (output / "landmarks.csv").read_text()
-    assert text.startswith("specimen,landmark,x,y,z,spread,doubtful\n")
+    assert text.startswith("specimen,landmark,x,y,z,spread,doubtful,given,distance,disagreement,")
     table = es.morphometrics.read_specimens(output / "landmarks.csv")
     assert sorted(table) == ["hand 0", "hand 1", "hand 2", ODD]
     assert np.array_equal(table["hand 0"].points, landmarks(0).points)
@@ -126,18 +126,45 @@ def test_it_is_said_where_mirror_images_cannot_be_told(output):
     )
 
 
-def test_landmarks_in_another_frame_are_noted(scans, output, tmp_path):
+def test_landmarks_in_another_frame_or_unit_are_refused_before_the_fits(scans, tmp_path):
     moved = es.morphometrics.Landmarks(NAMES, landmarks(0).points * [-1, -1, 1] + 5.0)
-    es.morphometrics.write_landmarks(
-        {"hand 0": moved, "broken": landmarks(1)}, tmp_path / "table.csv"
-    )
-    # The same table has landmarks of a specimen that failed.
-    done = run(
-        "collection", scans, "-o", output, "--landmarks", tmp_path / "table.csv",
-        "--workers", 1, code=3,
-    )  # fmt: skip
-    assert "in another frame or unit than the mesh" in done.stderr
-    assert "landmarks: those of broken are not used: it failed" in done.stderr
+    small = es.morphometrics.Landmarks(NAMES, landmarks(1).points / 1000)
+    table = tmp_path / "table.csv"
+    es.morphometrics.write_landmarks({"hand 0": moved, "hand 1": small}, table)
+    options = ("-o", tmp_path / "out", "--landmarks", table)
+    error = run("collection", scans, *options, code=2).stderr
+    assert "of 'hand 0' lie farther from it" in error
+    assert "in another frame or of another specimen" in error
+    assert "1000 times as large they would lie on it" in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_landmarks_of_a_specimen_that_fails_or_in_another_order_are_named(scans, output, tmp_path):
+    given = {f"hand {i}": landmarks(i) for i in range(3)} | {"broken": landmarks(1)}
+    given["hand 2"] = es.morphometrics.Landmarks(NAMES, landmarks(2).points[::-1])
+    table = tmp_path / "table.csv"
+    es.morphometrics.write_landmarks(given, table)
+    options = ("-o", output, "--landmarks", table, "--workers", 1)
+    facts = run_json("collection", scans, *options, code=3)
+    assert any("those of broken are not used: it failed" in text for text in facts["warnings"])
+    assert any(text.startswith("landmarks: 4 of 4 of hand 2") for text in facts["warnings"])
+    assert facts["doubtful"]["hand 2"] == NAMES
+    assert facts["given"]["hand 2"][NAMES[0]]["distance"] < 1e-6
+    assert facts["given"]["hand 2"][NAMES[0]]["disagreement"] > 0.1
+
+
+def test_a_unit_that_the_file_names_is_converted(scans, output, tmp_path):
+    small = es.morphometrics.Landmarks(NAMES, landmarks(0).points / 1000)
+    path = tmp_path / "hand 0.mrk.json"
+    es.morphometrics.write_landmarks(small, path)
+    path.write_text(path.read_text().replace('"LPS",', '"LPS", "coordinateUnits": "m",'))
+    options = ("-o", output, "--landmarks", tmp_path, "--workers", 1)
+    done = run("collection", scans, *options, code=3)
+    assert "its points are in m and were converted to mm" in done.stderr
+    table = es.morphometrics.read_specimens(output / "landmarks.csv")
+    np.testing.assert_allclose(table["hand 0"].points, landmarks(0).points, rtol=1e-14)
+    error = run("collection", scans, *options, "--unit", "m", code=2).stderr
+    assert "1000 times as large they would lie on it" in error
 
 
 def test_landmarks_that_fit_no_specimen_are_refused(scans, tmp_path):

@@ -18,11 +18,13 @@ from typer.testing import CliRunner
 
 from eigenshape.cli import app
 from eigenshape.geometry.cloud import PointCloud
+from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
+from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.io.mesh_files import write_mesh
-from eigenshape.io.shape_files import write_points
+from eigenshape.io.shape_files import read_shape, write_points
 from eigenshape.io.surface_files import read_surface
 from eigenshape.operators.catalog import OPERATORS
 from eigenshape.shapes.surfaces import icosphere
@@ -216,3 +218,46 @@ def test_a_cloud_that_becomes_no_surface_has_a_spectrum(data):
     assert "The points alone have a spectrum" in message
     assert "eigenshape spectrum" in message
     assert answer("spectrum", path, "-k", "5")[0] is None
+
+
+def test_a_cavity_that_faces_out_is_turned_and_stays_empty(tmp_path):
+    pytest.importorskip("netgen.meshing", reason="the extra tetrahedralize is missing")
+    ball, path, output = icosphere(2), tmp_path / "hollow.off", str(tmp_path / "hollow.vtu")
+    write_mesh(disjoint_union(ball, TriangleMesh(ball.vertices / 2, ball.faces)), path)
+    message, applied = answer("tetrahedralize", path, "-o", output)
+    assert (message, applied) == (None, {"--repair": "orient"})
+    assert simplex_volumes(read_shape(output)).sum() == pytest.approx(7 / 8 * enclosed_volume(ball))
+
+
+@pytest.mark.data
+def test_the_hollow_ball_is_turned_by_what_info_proposes(data):
+    path = str(data / "everyday" / "D_hollow_ball.off")
+    names = json.loads(CliRunner().invoke(app, ["info", path, "--json"]).stdout)["repairs_to_try"]
+    assert names == ["orient"]
+    done = CliRunner().invoke(app, ["info", path, "--json", "--repair", ",".join(names)])
+    assert json.loads(done.stdout)["enclosed_volume"] == pytest.approx(28.329, abs=1e-3)
+    assert json.loads(done.stdout)["repairs_to_try"] == []
+
+
+@pytest.mark.data
+def test_a_seam_that_is_open_by_rounding_is_closed_by_what_info_proposes(data):
+    path = str(data / "everyday" / "E_tube.obj")
+    facts = json.loads(CliRunner().invoke(app, ["info", path, "--json"]).stdout)
+    assert (facts["edges_on_seams"], facts["repairs_to_try"]) == (10, ["weld_seams"])
+    options = ["spectrum", path, "-k", "3", "--json"]
+    done = CliRunner().invoke(app, options)
+    assert "note: this shape is open along seams (10 sides)" in done.stderr
+    assert "--repair weld_seams closes them" in " ".join(done.stderr.split())
+    done = CliRunner().invoke(app, [*options, "--repair", "weld_seams"])
+    assert "joined 11 vertices along seams, which were open by up to 2.4e-16" in done.stderr
+    assert "note:" not in done.stderr
+    np.testing.assert_allclose(json.loads(done.stdout)["eigenvalues"][1:], 1, rtol=1e-6)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".ply", ".obj"])
+def test_a_soup_of_faces_finds_out_why_its_spectrum_is_too_large(tmp_path, monkeypatch, suffix):
+    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 2.0**25)
+    path = tmp_path / f"flat{suffix}"
+    write_mesh(soup(icosphere(3)), path)
+    message, applied = answer("spectrum", path, "--below", "20")
+    assert (message, applied) == (None, {"--repair": "auto,largest_component"})

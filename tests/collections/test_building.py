@@ -141,8 +141,75 @@ def test_a_missing_landmark_is_carried_and_a_wrong_one_is_doubtful(built, tmp_pa
     assert carried.doubtful[:2].any(axis=0).tolist() == [True, True, False, False, False, False]
     carried.save(tmp_path / "landmarks.csv")
     rows = (tmp_path / "landmarks.csv").read_text().splitlines()
-    assert rows[0] == "specimen,landmark,x,y,z,spread,doubtful"
+    header = "specimen,landmark,x,y,z,spread,doubtful,given,distance,disagreement,confidence"
+    assert rows[0] == header
     assert len(rows) == 1 + 3 * len(chosen)
+    row = next(row.split(",") for row in rows if row.startswith("ball 1,landmark 0,"))
+    assert row[6:8] == ["1", "1"]
+    assert float(row[9]) > 0.1  # from where ball 0 puts it
+    # What is carried from doubtful ones alone is doubtful, too.
+    assert carried.doubtful[2].tolist() == [True, True, False, False, False, False]
+
+
+@pytest.fixture(scope="module")
+def five(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("five")
+    balls = {f"ball {i}": make_specimen(i) for i in range(5)}
+    return es.collections.build_collection(balls, folder, template="ball 0")
+
+
+CHOSEN = [0, 1, 5, 100, 200, 300, 400, 500]
+BAD = {
+    "labels in another order": lambda points, _: points[::-1],
+    "another specimen": lambda points, number: make_specimen(number + 7).vertices[CHOSEN] * 1.03,
+    "moved a little": lambda points, _: points + 0.05,
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("what", BAD)
+def test_of_two_bad_specimens_of_five_both_are_doubtful(what, five):
+    names = [str(row) for row in CHOSEN]
+    points = [make_specimen(i).vertices[CHOSEN] for i in range(5)]
+    for number in (0, 3):
+        points[number] = BAD[what](points[number], number)
+    given = {f"ball {i}": es.morphometrics.Landmarks(names, points[i]) for i in range(5)}
+    carried = es.collections.carry_landmarks(five, given)
+    assert carried.doubtful[[0, 3]].mean() > 0.8
+    assert carried.doubtful[[1, 2, 4]].mean() < 0.3
+    assert carried.given.all()
+
+
+@pytest.mark.long
+def test_bad_landmarks_do_not_move_what_is_carried_from_others(five):
+    names = [str(row) for row in CHOSEN]
+    points = [make_specimen(i).vertices[CHOSEN] for i in range(3)]
+    good = {f"ball {i}": es.morphometrics.Landmarks(names, points[i]) for i in (1, 2)}
+    bad = {"ball 0": es.morphometrics.Landmarks(names, points[0][::-1])}
+    with_bad = es.collections.carry_landmarks(five, good | bad)
+    without = es.collections.carry_landmarks(five, good)
+    np.testing.assert_allclose(with_bad.points[3:], without.points[3:], atol=1e-12)
+    assert with_bad.doubtful[0].all()
+    assert not with_bad.doubtful[3:].any()
+    assert not with_bad.given[3:].any()
+    assert np.isnan(with_bad.disagreement[3:]).all()
+    assert (with_bad.disagreement[0] > 0.2).all()
+    assert with_bad.distance[0].max() < 1e-12
+    # From one specimen alone all are as doubtful as its own.
+    beside = {"ball 0": es.morphometrics.Landmarks(names, points[0] + 0.05)}
+    assert es.collections.carry_landmarks(five, beside).doubtful.all()
+
+
+@pytest.mark.long
+def test_landmarks_beside_their_surfaces_are_refused_with_every_specimen(five):
+    names = [str(row) for row in CHOSEN]
+    points = [make_specimen(i).vertices[CHOSEN] for i in range(3)]
+    points[0], points[2] = points[0] / 1000, points[2] * [-1, -1, 1]
+    given = {f"ball {i}": es.morphometrics.Landmarks(names, points[i]) for i in range(3)}
+    with pytest.raises(
+        es.InvalidParameterError, match=r"of 'ball 0' .* 1000 times .* of 'ball 2' .* as -x, -y, z"
+    ):
+        es.collections.carry_landmarks(five, given)
 
 
 def test_landmarks_that_cannot_be_carried_are_refused(built):

@@ -10,7 +10,8 @@ from eigenshape.deformation.rig import rig_shape
 from eigenshape.geometry.topology import boundary_edges
 from eigenshape.io.mesh_files import read_mesh
 
-pytestmark = pytest.mark.data
+# Two of the files have seams, which are named: see `test_seams_are_named`.
+pytestmark = [pytest.mark.data, pytest.mark.filterwarnings("ignore:Both sides of a seam")]
 
 MESHES = [  # several components, boundary loops, non-manifold edges, four vertices
     "geometrycentral/platonic_shelf.obj",

@@ -1,4 +1,5 @@
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.rig import eigen_skeleton, pose_rig, project_on_modes, rig_shape
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.simplices import dual_volumes
-from eigenshape.geometry.topology import disjoint_union
+from eigenshape.geometry.topology import disjoint_union, submesh
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.graph import graph_laplacian
@@ -107,3 +109,19 @@ def test_what_cannot_be_rigged_is_refused():
     flat = TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     with pytest.raises(InvalidShapeError, match="face 0"):
         rig_shape(flat)
+
+
+def test_seams_are_named():
+    """A lump that is cut open along x = 0.1, as an exporter of textures does; the remedy joins it."""
+    whole = lump(2)
+    behind = whole.vertices[whole.faces].mean(axis=1)[:, 0] < 0.1
+    front, back = submesh(whole, ~behind)[0], submesh(whole, behind)[0]
+    cut = disjoint_union(front, back)
+    message = r"edges \[\d+, \d+\] and \[\d+, \d+\] lie on each other and do not \(\d+ such\)"
+    with pytest.warns(UserWarning, match=message):
+        rig_shape(cut)
+    joined = repair(cut, ["weld_seams"]).mesh
+    assert joined.n_vertices == whole.n_vertices
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rig_shape(joined)

@@ -116,6 +116,9 @@ def test_rows_of_four_indices_must_be_said_to_be_tetrahedra_or_quads():
     quads = from_arrays(SQUARE, [[0, 1, 2, 3]], cells="quads")
     assert isinstance(quads, TriangleMesh)
     assert quads.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    dart = [[0, 0, 0], [0.2, 0.2, 0], [1, 0, 0], [0, 1, 0]]
+    cut = from_arrays(dart, [[2, 1, 3, 0]], cells="quads")
+    assert es.geometry.surface_area(cut) == pytest.approx(0.2)
     solid = box(1, 2, 1)
     assert from_arrays(solid.points, solid.simplices, cells="tetrahedra").dim == 3
     flat = from_arrays(np.array(SQUARE)[:, :2], [[0, 1, 2, 3]], cells="quads")

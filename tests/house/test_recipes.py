@@ -104,6 +104,7 @@ def test_an_operator_is_documented_by_its_entry(halved):
 # Options with a number or name that the library has as the default of an argument or a field.
 DEFAULTS = {
     "collection timeout": (es.retrieval.Workers, "timeout"),
+    "collection unit": (es.morphometrics.read_specimens, "unit"),
     "compress bits": (es.spectral.compress_mesh, "bits"),
     "condense timeout": (es.retrieval.Workers, "timeout"),
     "condense tolerance": (es.features.condense, "tolerance"),

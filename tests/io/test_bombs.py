@@ -15,7 +15,7 @@ from tetrahedra import TETRAHEDRON
 
 from eigenshape import FileFormatError, read_shape
 from eigenshape.io.formats import off
-from eigenshape.io.formats.numbers import LZMA, ZLIB, unpack_block
+from eigenshape.io.formats.numbers import LZ4, LZMA, ZLIB, unpack_block
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 
 GIGABYTES = 2**32 - 2**24
@@ -199,6 +199,40 @@ def test_blocks_unpack_to_what_they_declare_or_not_at_all(compressor):
         unpack_block(block, 1001, compressor)
     with pytest.raises(FileFormatError, match="A compressed block must be whole; one is damaged"):
         unpack_block(b"nonsense", 1000, compressor)
+
+
+# Token, literal bytes, distance of a copy: abcabcabca, with four more bytes of lengths where they are full
+LZ4_BLOCKS = {
+    bytes([0x33, *b"abc", 3, 0, 0x10, ord("x")]): b"abcabcabcax",
+    bytes([0x1F, ord("a"), 1, 0, 255, 2, 0]): b"a" * (1 + 4 + 15 + 255 + 2),
+    bytes([0xF0, 5, *b"abcdefghijklmnopqrst"]): b"abcdefghijklmnopqrst",
+    bytes([0x00]): b"",
+}
+
+
+@pytest.mark.parametrize("block", LZ4_BLOCKS)
+def test_lz4_copies_what_was_unpacked_before(block):
+    whole = LZ4_BLOCKS[block]
+    assert unpack_block(block, len(whole), LZ4) == whole
+    with pytest.raises(FileFormatError, match=f"declares, {len(whole) + 1}; it unpacks to"):
+        unpack_block(block, len(whole) + 1, LZ4)
+    for end in range(len(block)):
+        with pytest.raises(FileFormatError, match="A compressed block must "):
+            unpack_block(block[:end], len(whole) + 1, LZ4)
+    if whole:
+        with pytest.raises(
+            FileFormatError, match=f"declares, {len(whole) - 1}; it unpacks to more"
+        ):
+            unpack_block(block, len(whole) - 1, LZ4)
+
+
+def test_lz4_does_not_copy_from_before_the_beginning_or_beyond_its_size():
+    for distance in (0, 2):
+        with pytest.raises(FileFormatError, match="damaged: a copy begins before the first byte"):
+            unpack_block(bytes([0x10, ord("a"), distance, 0, 0]), 9, LZ4)
+    # A length of 255 million, of which 101 bytes are made.
+    with pytest.raises(FileFormatError, match="declares, 100; it unpacks to more"):
+        unpack_block(bytes([0x1F, ord("a"), 1, 0]) + b"\xff" * 10**6 + b"\0\0", 100, LZ4)
 
 
 def test_too_little_memory_has_a_name(tmp_path, monkeypatch):

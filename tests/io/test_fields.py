@@ -7,7 +7,7 @@ import pyvista
 import vtk
 
 import eigenshape as es
-from eigenshape import FileFormatError, InvalidParameterError
+from eigenshape import FileFormatError, InvalidParameterError, InvalidShapeError
 from eigenshape.io import read_fields, write_fields
 
 BALL = es.icosphere(1)
@@ -98,6 +98,22 @@ def test_legacy_sections_of_other_writers(tmp_path):
     assert found["part"].tolist() == [7]
 
 
+def test_polygons_in_npz_files(tmp_path):
+    x, y = [0, 3, 3, 1, 1, 0], [0, 0, 1, 1, 3, 3]
+    points = np.column_stack([x, y, np.zeros(6)])
+    faces = [[0, 1, 2, 3, 4, 5], [5, 4, 3, 2, 1, 0]]
+    fields = {"face_part": [4, 5], "vertex_heat": x}
+    np.savez(tmp_path / "a.npz", vertices=points, faces=faces, **fields)
+    mesh, attributes = es.read_mesh(tmp_path / "a.npz", attributes=True)
+    assert mesh.n_faces == 2 * 4
+    assert es.geometry.surface_area(mesh) == 2 * 5.0
+    assert attributes.fields["part"].tolist() == [4, 4, 4, 4, 5, 5, 5, 5]
+    assert attributes.fields["heat"].tolist() == x
+    np.savez(tmp_path / "a.npz", vertices=points, faces=[[0, 1, 2, 3], [0, 1, 2, -1]])
+    with pytest.raises(InvalidShapeError, match=r"must index vertices 0\.\.5; face \d is .*-1"):
+        es.read_mesh(tmp_path / "a.npz")
+
+
 def test_what_is_no_field_is_refused(tmp_path):
     with pytest.raises(InvalidParameterError, match="42 vertices or 80 faces; 'heat' has 3"):
         write_fields(BALL, tmp_path / "a.vtu", {"heat": [1, 2, 3]})
@@ -111,7 +127,7 @@ def test_what_is_no_field_is_refused(tmp_path):
         ({"vertices": BALL.vertices}, "it lacks faces"),
         (
             {"vertices": BALL.vertices, "faces": BALL.vertices},
-            r"and faces \(f, 3\) of whole numbers",
+            r"and faces \(f, 3\), or \(f, k\) of polygons, of whole numbers",
         ),
         ({"vertices": np.array([None])}, "must hold arrays of numbers; Object arrays"),
     ):

@@ -13,7 +13,7 @@ from eigenshape.io.formats.registry import format_of
 def read_or_refuse(parse, data):
     try:
         with np.errstate(all="ignore"):
-            mesh = TriangleMesh(*parse(data))
+            mesh = TriangleMesh(*parse(data)[:2])
     except EigenshapeError:
         return None
     assert np.isfinite(mesh.vertices).all()

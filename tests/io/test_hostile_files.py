@@ -1,6 +1,7 @@
 """Files made to hurt: declarations larger than the file, places outside it, and values where none are thought of."""
 
 import builtins
+import copy
 import io
 import json
 import os
@@ -13,6 +14,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from test_glb import GOOD, changed, packed, primitive, unpacked
+from test_glb_places import moving_file
 from test_ply import HEADER, TEXT_ROWS, binary_rows, simple
 from tetrahedra import FILES
 
@@ -41,7 +43,7 @@ LIES = {
 def read_or_refuse(parse, data):
     try:
         with np.errstate(all="ignore"):
-            mesh = TriangleMesh(*parse(data))
+            mesh = TriangleMesh(*parse(data)[:2])
     except EigenshapeError:
         return None
     assert np.isfinite(mesh.vertices).all()
@@ -189,7 +191,7 @@ RICH = {
     ),
     "obj rich": (
         obj.parse,
-        b"v 0 0 0 1\nv 1 0 \\\n0\nvt 0 0\nv 0 1 0\nf 1/1 2//2 -1/1/1\nf 1 2 3 2\n",
+        b"v 0 0 0 1\nv 1 0 \\\n0\nvt 0 0\nv 0 1 0\nf 1/1 2//2 -1/1/1\nf 1 2 3 1\n",
     ),
 }
 WORDS = [
@@ -241,6 +243,8 @@ ODD = st.one_of(
     st.floats(), st.text(max_size=3), st.lists(st.integers(-1, 4), max_size=4), st.just({}), st.just([[[]]]),
 )  # fmt: skip
 PLACES = places(unpacked()[0])
+MOVING = moving_file()
+PLACES_OF_MOVING = places(MOVING.tree)
 
 
 @pytest.mark.long
@@ -249,6 +253,19 @@ PLACES = places(unpacked()[0])
 @example(where=("bufferViews", 0, "byteStride"), to=10**30)
 def test_any_value_anywhere_in_the_tree_of_a_glb_file(where, to):
     read_or_refuse(gltf.parse, changed(*where, to=to))
+
+
+@pytest.mark.long
+@settings(max_examples=600, deadline=None)
+@given(where=st.sampled_from(PLACES_OF_MOVING), to=ODD)
+def test_any_value_anywhere_in_what_moves_geometry(where, to):
+    tree = copy.deepcopy(MOVING.tree)
+    *path, last = where
+    place = tree
+    for key in path:
+        place = place[key]
+    place[last] = to
+    read_or_refuse(gltf.parse, packed(tree, MOVING.binary))
 
 
 @pytest.mark.long

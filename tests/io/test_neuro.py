@@ -1,6 +1,7 @@
 """Files of brains and neurons, beside nibabel: what we read and write is what it writes and reads, to the last bit."""
 
 import base64
+import contextlib
 import gzip
 import re
 from importlib import resources
@@ -25,7 +26,7 @@ from eigenshape.io import (
     write_fields,
     write_parcellation,
 )
-from eigenshape.io.formats.neuro import annotations, cifti, gifti, nifti, swc
+from eigenshape.io.formats.neuro import annotations, cifti, gifti, mni_obj, nifti, swc
 from eigenshape.io.formats.neuro import freesurfer as fs
 
 CORTICES = Path(str(resources.files("neuromodes") / "data"))
@@ -326,7 +327,7 @@ def test_an_annotation_of_the_first_version_is_read():
         return np.array(values, ">i4").tobytes()
 
     data = numbers(2, 0, 255, 1, 0, 1, 1, 2) + b"a\0" + numbers(2) + b"x\0" + numbers(255, 0, 0, 0)
-    found = annotations.parse_parcels(data, TETRAHEDRON)
+    (found,) = annotations.parse_parcels(data, TETRAHEDRON)
     assert found.labels.tolist() == [0, -1]
     assert found.names == ("x",)
 
@@ -338,15 +339,18 @@ def test_nibabel_reads_our_labels_and_we_read_its(tmp_path):
     assert image.labeltable.get_labels_as_dict() == dict(enumerate(("???", *PARCELS.names)))
     path = OF_NIBABEL / "rh.aparc.annot.gii"
     image = nib.load(path)
-    found = gifti.parse_parcels(path.read_bytes(), TETRAHEDRON)
+    (found,) = gifti.parse_parcels(path.read_bytes(), TETRAHEDRON)
     names = image.labeltable.get_labels_as_dict()
     keys = [label.key for label in image.labeltable.labels]
     assert found.names == tuple(names.values())
     assert np.array_equal(np.append(keys, 0)[found.labels], image.darrays[0].data)
     colors = [label.rgba for label in image.labeltable.labels]
     assert np.array_equal(found.colors, colors)
-    with pytest.raises(FileFormatError, match=r"must have a key and a color; '[?]{3}' has"):
-        gifti.parse_parcels((OF_NIBABEL / "label.gii").read_bytes(), TETRAHEDRON)
+    # An old file, which has Index in place of Key, and no colors
+    old = OF_NIBABEL / "label.gii"
+    (found,) = gifti.parse_parcels(old.read_bytes(), TETRAHEDRON)
+    assert found.names == ("Positive", "Negative")
+    assert np.array_equal(found.labels, nib.load(old).darrays[0].data - 1)
 
 
 def test_a_label_file_is_one_parcel(tmp_path):
@@ -356,7 +360,7 @@ def test_a_label_file_is_one_parcel(tmp_path):
         freesurfer.read_label(tmp_path / "a.label"), np.flatnonzero(cap.labels == 0)
     )
     assert np.array_equal(read_parcellation(tmp_path / "a.label", BALL).labels, cap.labels)
-    found = annotations.parse_parcels(b"#!ascii none\n0\n", TETRAHEDRON)
+    (found,) = annotations.parse_parcels(b"#!ascii none\n0\n", TETRAHEDRON)
     assert found.labels.tolist() == [-1] * 4
 
 
@@ -401,6 +405,32 @@ def test_a_skeleton_is_a_graph(tmp_path):
     assert shape.simplices.tolist() == [[1, 0], [2, 1], [3, 1]]
     assert shape.points.tolist() == [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]]
     assert es.solve_spectrum(es.cotangent_laplacian(shape), 2).eigenvalues[0] < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("data", "segments", "note"),
+    [
+        (b"0 0 0 0 -5 nan -1\n1 6 0 0 5 NaN 0\n", [[1, 0]], None),  # of skeletor
+        (b"5 1 0 0 0 1 9\n9 1 1 0 0 1 -1\n", [[0, 1]], None),  # the parent comes later
+        (
+            b"1 1 0 0 0 1 -1 7\n2 1 1 0 0 1 1 8\n",
+            [[1, 0]],
+            "columns after the seventh were left out",
+        ),
+        (
+            b"1 1 0 0 0 1 1\n2 1 1 0 0 1 1\n",
+            [[1, 0]],
+            r"were read as roots; point 1 is one \(1 such\)",
+        ),
+    ],
+)
+def test_skeletons_of_other_programs(tmp_path, data, segments, note):
+    path = tmp_path / "a.swc"
+    path.write_bytes(data)
+    with (
+        pytest.warns(UserWarning, match=rf"a\.swc: .*{note}") if note else contextlib.nullcontext()
+    ):
+        assert es.read_shape(path).simplices.tolist() == segments
 
 
 # Volumes.
@@ -536,7 +566,12 @@ def words(start, *values):
         (
             gifti.parse,
             SURFACE.replace(b"GZipBase64Binary", b"ExternalFileBinary"),
-            "Save it with the data inside",
+            "'' from byte 0 on, which is not there. Save it with the data inside",
+        ),
+        (
+            gifti.parse,
+            SURFACE.replace(b"GZipBase64Binary", b"Zip"),
+            "is 'Zip'. Save it with the data",
         ),
         (gifti.parse, SURFACE.replace(b"GZipBase64Binary", b"ASCII"), "must be of numbers"),
         (gifti.parse, SURFACE.replace(b"GZipBase64Binary", b"Base64Binary"), "takes 48 bytes, not"),
@@ -629,7 +664,12 @@ def words(start, *values):
             CIFTI.replace(b"BrainModel", b"BrainNodel"),
             "functions on brain models",
         ),
-        (swc.parse, b"1 1 0 0 0 2.0\n", "rows of seven numbers"),
+        (
+            swc.parse,
+            b"# a\n1 1 0 0 0 2.0\n",
+            "rows of seven numbers.*; the first is b'1 1 0 0 0 2.0'",
+        ),
+        (swc.parse, b"1 1 0 x 0 2.0 -1\n", "rows of seven numbers.*; the first is b'1 1 0 x"),
         (swc.parse, b"", "rows of seven numbers"),
         (swc.parse, SKELETON.replace(b"7 3", b"2 3"), "must differ; 2 occurs twice"),
         (swc.parse, SKELETON.replace(b"0.5 2", b"0.5 4"), "that of point 9 is 4"),
@@ -741,6 +781,8 @@ def _no_module(name):
     raise ImportError(name)
 
 
+QUADRANGLES = b"\xff\xff\xff\0\0\4\0\0\1" + b"\0\1" * 12 + b"\0\0\0\0\0\1\0\0\2\0\0\3"
+MNI = b"P 0.3 0.3 0.4 10 1 3\n0 0 0\n1 0 0\n0 1 0\n" + b"0 0 1\n" * 3 + b"1\n0 1 1 1 1\n3\n0 1 2\n"
 NUMBERS = np.arange(24, dtype=np.int16).reshape(2, 3, 4)
 VOLUMES = [kind(NUMBERS, np.eye(4)).to_bytes() for kind in (nib.MGHImage, nib.Nifti1Image)]
 FILES = {
@@ -760,6 +802,17 @@ FILES = {
     "packed volume": (fs.parse_volume, packed(VOLUMES[0])),
     "nifti": (nifti.parse_volume, VOLUMES[1]),
     "packed nifti": (nifti.parse_volume, packed(VOLUMES[1])),
+    "quadrangles": (fs.parse, QUADRANGLES),
+    "surface in text": (
+        fs.parse,
+        b"#!ascii version of a\n3 1\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 1 2 0\n",
+    ),
+    "old functions": (fs.parse_fields, b"\0\0\4\0\0\4" + b"\1\2" * 4),
+    "mni": (mni_obj.parse, MNI),
+    "nifti functions": (
+        nifti.parse_fields,
+        nib.Nifti1Image(FOUR[:, None, None], np.eye(4)).to_bytes(),
+    ),
 }
 
 

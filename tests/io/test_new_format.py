@@ -1,5 +1,6 @@
 """The recipe "Add a mesh format" of CONTRIBUTING.md, followed; and the lists of formats, which are one."""
 
+import importlib.util
 import os
 import re
 import subprocess
@@ -93,7 +94,8 @@ def test_the_recipe_gives_a_format_that_all_readers_know(followed, tmp_path_fact
 def test_the_docs_list_the_formats_with_what_they_can():
     text = (ROOT / "docs" / "files.md").read_text()
     lines = [line for line in text.splitlines() if line.startswith("|")]
-    rows = {cells[0]: cells for cells in map(cells_of, lines) if cells[0].startswith(".")}
+    table = [cells for cells in map(cells_of, lines) if cells[0].startswith(".")]
+    rows = {cells[0]: cells for cells in table[: len(FORMATS)]}  # a second table follows
     assert list(rows) == [known.suffix for known in FORMATS]
     for known in FORMATS:
         _, _, read, written, besides = rows[known.suffix]
@@ -112,12 +114,22 @@ def test_the_docs_list_the_formats_with_what_they_can():
             "`write_fields`": {"fields", "maps"},
             "`write_parcellation`": {"parcels"},
         }
-        if known.suffix in {".dtseries.nii", ".dlabel.nii"}:  # maps in them are only read
+        # Maps in most files of NIfTI are only read.
+        if known.suffix in {".dtseries.nii", ".dlabel.nii", ".nii", ".nii.gz"}:
             del writers["`write_fields`"]
         names = [name for name, traits in writers.items() if traits & set(known.traits)]
         assert written == ", ".join(names), known.suffix
         assert bool(besides) == bool({"attributes", "fields"} & set(known.traits)), known.suffix
         assert ("fields" in known.traits) <= ("fields" in besides)
+
+
+def test_the_table_of_what_becomes_of_files_is_that_of_the_readers():
+    spec = importlib.util.spec_from_file_location("format_table", ROOT / "docs/format_table.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.page_with_table() == (ROOT / "docs" / "files.md").read_text()
+    assert module.format_table().count("\n") == 2 + len({known.module for known in FORMATS})
+    assert module.format_table() in module.page_with_table()
 
 
 def cells_of(line):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES
 
-from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh
+from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh, read_mesh
 from eigenshape.io.formats.off import parse
 
 ROWS = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"
@@ -22,6 +22,9 @@ COLUMNS = "0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 9 9 9\n0 0 1 9 9 9\n3 0 2 1\n3 0 1 3\
         f"NOFF\n4 4 6\n{COLUMNS}",
         f"COFF\n4 4 6\n{COLUMNS}",
         f"STCNOFF\n4 4 6\n{COLUMNS}",
+        f"NCOFF\n4 4 6\n{COLUMNS}",
+        f"CNOFF\n4 4 6\n{COLUMNS}",
+        f"noff\n4 4 6\n{COLUMNS}",
         f"OFF\n4 4 6\n{ROWS}".replace("3 0 2 1\n", "3 0 2 1 255 0 0\n").replace(
             "3 0 1 3\n", "3 0 1 3 .5 .5 .5 1\n"
         ),
@@ -29,9 +32,23 @@ COLUMNS = "0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 9 9 9\n0 0 1 9 9 9\n3 0 2 1\n3 0 1 3\
     ],
 )
 def test_variants_give_the_tetrahedron(text):
-    vertices, faces = parse(text.encode())
+    vertices, faces, *_ = parse(text.encode())
     np.testing.assert_array_equal(vertices, VERTICES)
     np.testing.assert_array_equal(faces, FACES)
+
+
+def test_columns_and_colors_that_are_not_read_are_named(tmp_path):
+    text = "NCOFF\n3 1 0\n0 0 0 255 0 0 255 0 0 1\n1 0 0 255 0 0 255 0 0 1\n"
+    text += "0 1 0 255 0 0 255 0 0 1\n3 0 1 2 .5 .5 .5\n"  # as MeshLab writes it
+    message = r"a\.off: colors, normals and texture coordinates are not read"
+    for each in (
+        text,
+        text.replace(" .5 .5 .5", ""),
+        "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 9\n",
+    ):
+        (tmp_path / "a.off").write_text(each)
+        with pytest.warns(UserWarning, match=message):
+            assert read_mesh(tmp_path / "a.off").faces.tolist() == [[0, 1, 2]]
 
 
 @pytest.mark.parametrize(
@@ -46,11 +63,18 @@ def test_comments_in_any_encoding_do_no_harm(remark):
     np.testing.assert_array_equal(parse(b"\xef\xbb\xbf" + data)[1], FACES)
 
 
-def test_polygons_become_fans_in_order():
-    text = b"OFF\n5 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n-1 1 0\n5 0 1 2 3 4\n4 4 3 2 1\n"
-    assert parse(text)[1].tolist() == [[0, 1, 2], [0, 2, 3], [0, 3, 4], [4, 3, 2], [4, 2, 1]]
-    squares = b"OFF\n5 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n-1 1 0\n4 0 1 2 3\n4 4 3 2 1\n"
-    assert parse(squares)[1].tolist() == [[0, 1, 2], [0, 2, 3], [4, 3, 2], [4, 2, 1]]
+def test_polygons_become_triangles_in_order():
+    text = b"OFF\n5 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n-1 1 0\n5 0 1 2 3 4\n4 4 0 1 2\n"
+    assert parse(text)[1].tolist() == [[0, 1, 2], [0, 2, 3], [0, 3, 4], [4, 0, 1], [4, 1, 2]]
+    squares = b"OFF\n5 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n-1 1 0\n4 0 1 2 3\n4 4 0 1 3\n"
+    assert parse(squares)[1].tolist() == [[0, 1, 2], [0, 2, 3], [4, 0, 1], [4, 1, 3]]
+
+
+def test_no_triangle_of_a_polygon_lies_outside_or_on_a_line():
+    dart = b"OFF\n5 2 0\n0 0 0\n1 0 0\n.2 .2 0\n0 1 0\n.5 0 0\n4 0 1 2 3\n4 0 4 1 2\n"
+    assert parse(dart)[1].tolist() == [[0, 1, 2], [0, 2, 3], [2, 0, 4], [2, 4, 1]]
+    with pytest.raises(InvalidShapeError, match=r"cross themselves.*face 1 .*\[0, 1, 3, 2\]"):
+        parse(dart.replace(b"4 0 4 1 2", b"4 0 1 3 2").replace(b".2 .2", b"1 1"))
 
 
 @pytest.mark.parametrize(
@@ -62,7 +86,9 @@ def test_polygons_become_fans_in_order():
         ("OFF BINARY\n", "must hold 32-bit counts, x, y and z of each vertex"),
         ("OFF\n", "must declare vertices and faces; line 2 is ''"),
         ("OFF\n\n4\n", "must declare vertices and faces; line 3 is '4'"),
-        ("nOFF\n3\n4 4 6\n", "must declare vertices and faces; line 2 is '3'"),
+        ("nOFF\n3\n4 4 6\n", "three coordinates a vertex; it begins with 'nOFF'. Save it as OFF"),
+        ("4nOFF\n3\n4 4 6\n", "three coordinates a vertex; it begins with '4nOFF'"),
+        ("4OFF\n3\n4 4 6\n", "three coordinates a vertex; it begins with '4OFF'"),
         ("OFF\n-4 12 6\n" + ROWS, "A count must not be negative; line 2"),
         ("OFF\n4.0 4 6\n" + ROWS, r"A count must be a whole number; line 2 has '4\.0'"),
         ("OFF\n4 4_0 6\n" + ROWS, "A count must be a whole number; line 2 has '4_0'"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tetrahedra import FACES, FILES, TETRAHEDRON, VERTICES
 
-from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh
+from eigenshape import FileFormatError, InvalidShapeError, TriangleMesh, read_mesh
 from eigenshape.io.formats.ply import format_binary, format_text, parse
 
 HEADER = """ply
@@ -36,7 +36,7 @@ TEXT_ROWS = """0 0 0 255 0
 7 3 0 1 3 2 0.5 0.5
 7 4 1 2 3 0 1 .5
 """
-WANTED = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [1, 3, 0]]
+WANTED = [[0, 2, 1], [0, 1, 3], [0, 1, 2], [0, 2, 3]]  # the fan of the last would fold
 
 
 def binary_rows(order):
@@ -62,6 +62,29 @@ def test_what_is_not_asked_for_is_passed_over(order, remark, newline):
     vertices, faces = parse(head + rows[order])
     np.testing.assert_array_equal(vertices, VERTICES)
     assert faces.tolist() == WANTED
+
+
+def test_whole_numbers_of_64_bits_as_meshio_writes_them(tmp_path):
+    text = simple(corners="list uint8 int64 vertex_indices").replace(
+        "element face", "property int64 lab\nproperty uint64 big\nelement face"
+    )
+    text = text.replace("0 0 0\n1 0 0\n0 1 0\n", f"0 0 0 1 5\n1 0 0 2 6\n0 1 0 {2**40} 7\n")
+    (tmp_path / "a.ply").write_text(text)
+    mesh, attributes = read_mesh(tmp_path / "a.ply", attributes=True)
+    assert mesh.faces.tolist() == [[0, 1, 2]]
+    assert attributes.fields["lab"].tolist() == [1, 2, 2**40]
+    assert attributes.fields["big"].tolist() == [5, 6, 7]
+    body = struct.pack("<9dB3q", 0, 0, 0, 1, 0, 0, 0, 1, 0, 3, 0, 1, 2)
+    head = simple("", "list uint8 uint64 vertex_indices").replace("float", "double")
+    head = head.replace("ascii", "binary_little_endian").split("0 0 0\n")[0]
+    assert parse(head.encode() + body)[1].tolist() == [[0, 1, 2]]
+
+
+def test_faces_under_another_name_are_named():
+    text = simple().replace("element face", "element polygon")
+    _, faces, note = parse(text.encode())
+    assert faces.shape == (0, 3)
+    assert note == "the element polygon, which has vertex_indices, is not read"
 
 
 def test_rows_that_begin_with_a_line_feed_belong_to_the_rows():

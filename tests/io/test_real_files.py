@@ -6,6 +6,7 @@ import re
 import pytest
 
 from eigenshape import EigenshapeError, read_mesh
+from eigenshape.geometry import surface_area
 
 pytestmark = pytest.mark.data
 
@@ -145,6 +146,7 @@ CLASSICS = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:.*are not read")
 def test_every_awkward_file_gives_the_right_mesh_or_a_named_error(data):
     files = {
         path.relative_to(data / "nasty").as_posix(): path
@@ -167,6 +169,11 @@ def test_classics(data):
     for name, counts in CLASSICS.items():
         mesh = read_mesh(files[name])
         assert (mesh.n_vertices, mesh.n_faces) == counts, name
+
+
+def test_everyday_polygons(data):
+    for name, area in (("A_prism.obj", 14), ("A_dart.off", 1.5), ("H_quads.npz", 22)):
+        assert surface_area(read_mesh(data / "everyday" / name)) == pytest.approx(area), name
 
 
 def test_point_sets_are_no_meshes(data):

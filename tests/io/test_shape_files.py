@@ -1,4 +1,5 @@
 import struct
+import warnings
 
 import meshio
 import numpy as np
@@ -116,15 +117,6 @@ def test_solids_are_split_into_tetrahedra(tmp_path, suffix):
         read_shape(inverted)
 
 
-def test_other_cells_are_named(tmp_path):
-    path = written(tmp_path / "a.vtk", CUBE.points[:6], [("triangle6", [[0, 1, 2, 3, 4, 5]])])
-    with pytest.raises(
-        FileFormatError,
-        match=r"hexahedra, wedges or pyramids; it holds quadratic triangle\. Save it with those",
-    ):
-        read_shape(path)
-
-
 POLYDATA = {
     "text": b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0\n1 1 0 2 1 5\n"
     b"LINES 2 7\n2 0 1\n3 1 2 3\nPOINT_DATA 4\nSCALARS a float\n",
@@ -146,14 +138,14 @@ def test_polylines(tmp_path, kind):
     np.testing.assert_array_equal(found.points, CURVE)
 
 
-def test_polygons_become_fans(tmp_path):
+def test_polygons_become_triangles(tmp_path):
     flat = (
         POLYDATA["text"]
-        .replace(b"LINES 2 7\n2 0 1\n3 1 2 3", b"POLYGONS 1 5\n4 0 1 2 3")
+        .replace(b"LINES 2 7\n2 0 1\n3 1 2 3", b"POLYGONS 1 5\n4 0 1 3 2")
         .replace(b" 5\nP", b" 0\nP")
     )
     (tmp_path / "a.vtk").write_bytes(flat)
-    assert read_shape(tmp_path / "a.vtk").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert read_shape(tmp_path / "a.vtk").faces.tolist() == [[0, 1, 3], [0, 3, 2]]
 
 
 @pytest.mark.parametrize(
@@ -161,7 +153,7 @@ def test_polygons_become_fans(tmp_path):
     [
         (
             (b"LINES 2 7\n2 0 1", b"LINES 2 7\n9 0 1"),
-            "Cells of a VTK file must fill 7 numbers; cell 0 of 2 does not",
+            "A VTK file must hold 2 cells in 7 numbers; 1 cells take 10",
         ),
         ((b"POINTS 4 float", b"POINTS 4000 float"), "12000 items at byte .* do not fit into its"),
         ((b"POINTS 4 float", b"POINTS 8 float"), "A VTK file must hold 24 numbers at byte"),
@@ -171,7 +163,7 @@ def test_polygons_become_fans(tmp_path):
         ),
         (
             (b"LINES 2 7", b"LINES two 7"),
-            "A VTK file must count its cells by whole numbers; it says b'two'",
+            "A VTK file must count what it holds by whole numbers; it says b'two'",
         ),
         (
             (b"LINES 2 7\n2 0 1\n3 1 2 3\nPOINT_DATA 4\nSCALARS a float\n", b"LINES 2 9\n2 0"),
@@ -179,9 +171,9 @@ def test_polygons_become_fans(tmp_path):
         ),
         (
             (b"LINES", b"TRIANGLE_STRIPS"),
-            "A cell of TRIANGLE_STRIPS must have 3 points or more; cell 0 has 2",
+            "A VTK cell of type 6 must have 3 points or more; cell 0 has 2",
         ),
-        ((b"3 1 2 3", b"3 1 2 9"), r"simplices must index points 0\.\.3; simplex 2 is \[2, 9\]"),
+        ((b"3 1 2 3", b"3 1 2 9"), "must join its 4 points, counted from 0; cell 1 joins point 9"),
     ],
 )
 def test_broken_polydata_is_named(tmp_path, change, match):
@@ -273,8 +265,14 @@ EXPECTED = [[0, 0, 0], [1, 0, 0], [0, 1.5, 0]]
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_of_points(tmp_path, name):
     (tmp_path / name).write_bytes(TABLES[name])
-    assert read_shape(tmp_path / name).points.tolist() == EXPECTED
-    assert read_points(tmp_path / name, dim=1).dim == 1
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        assert read_shape(tmp_path / name).points.tolist() == EXPECTED
+        assert read_points(tmp_path / name, dim=1).dim == 1
+    more = b" 7" in TABLES[name]
+    assert [
+        str(each.message).endswith("1 columns after x, y and z are not read") for each in said
+    ] == [True, True] * more
 
 
 def test_a_binary_point_set(tmp_path):
@@ -318,6 +316,7 @@ def pcd(kind):
     return PCD + b"DATA binary_compressed\n" + struct.pack("<II", len(packed), len(plain)) + packed
 
 
+@pytest.mark.filterwarnings("ignore:.*the fields .* are not read")
 @pytest.mark.parametrize("kind", ["ascii", "binary", "binary_compressed"])
 def test_point_cloud_data(tmp_path, kind):
     (tmp_path / "a.pcd").write_bytes(pcd(kind))
@@ -399,6 +398,10 @@ def test_missing_returns_are_refused_or_dropped_when_asked(tmp_path):
         (b"3\n0 0 0\n", "it declares 3 and holds 1"),
         (b"# nothing\n", "A file of points must hold points; it holds none"),
         (b"0 0\n", "A vertex must have three numbers; line 1 is '0 0'"),
+        (
+            b"Version 1.0\nS001 1 2 3\n",
+            "landmarks of Landmark Editor. es.morphometrics.read_landmarks",
+        ),
     ],
 )
 def test_broken_tables_are_named(tmp_path, content, match):

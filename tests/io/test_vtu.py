@@ -41,17 +41,19 @@ def binaries(tmp_path_factory):
             "must be plain XML; it has a DOCTYPE",
         ),
         (("</VTKFile>", ""), "must be whole XML; no element found"),
+        (("VTKFile", "VTKfile"), "A VTK file in XML must be a VTKFile; it is a VTKfile"),
+        (("Piece", "Part"), "A VTK file must hold pieces with points; it holds none"),
         (
-            ("UnstructuredGrid", "PolyData"),
-            "of the type UnstructuredGrid; it is a VTKFile of 'PolyData'",
+            ("UnstructuredGrid", "ImageData"),
+            "must hold an unstructured grid or PolyData; it holds 'ImageData'. In PyVista",
         ),
         (
             ("LittleEndian", "Middle"),
-            "byte_order of a VTU file must be LittleEndian or BigEndian; it is 'Middle'",
+            "byte_order of a VTK file must be LittleEndian or BigEndian; it is 'Middle'",
         ),
         (
             ('NumberOfPoints="4"', 'NumberOfPoints="-4"'),
-            "must hold pieces that count points and cells",
+            "Pieces of a VTK file must count what they hold; NumberOfPoints is '-4'",
         ),
         (
             ('NumberOfPoints="4"', 'NumberOfPoints="5"'),
@@ -62,7 +64,7 @@ def binaries(tmp_path_factory):
             "must have 1 to 3 coordinates each; they have '4'",
         ),
         (("<Points>", "<Pointy>"), "must be whole XML"),
-        (("Points>", "Pointy>"), "A VTU file must have points; it has none"),
+        (("Points>", "Pointy>"), "A VTK file must have points; a piece has none"),
         (('type="Float64"', 'type="String"'), "must be of numbers; 'an array' is of 'String'"),
         (("1 0 0", "1 0 zero"), "must be of numbers; 'an array' is not: could not convert"),
         (
@@ -73,9 +75,9 @@ def binaries(tmp_path_factory):
         ((">4<", ">5<"), "'connectivity' must have 5 numbers and has 4"),
         (
             ("0 1 2 3", "0 1 2 3.5"),
-            r"connectivity of a VTU file must be whole numbers; number 3 is 3\.5",
+            r"connectivity of a VTK file must be whole numbers; number 3 is 3\.5",
         ),
-        ((">10<", ">5<"), "A VTK cell of type 5 must have 3 corners; cell 0 has 4"),
+        ((">10<", ">5<"), "A VTK cell of type 5 must have 3 points; cell 0 has 4"),
         (
             ('"connectivity" format="ascii"', '"connectivity" format="appended"'),
             "must have an offset; that of 'conne",
@@ -101,7 +103,7 @@ def test_broken_binaries_are_named(binaries):
     with pytest.raises(FileFormatError, match="'Points' takes 240 bytes, not"):
         parse(binaries["raw"].replace(b'NumberOfPoints="12"', b'NumberOfPoints="10"'))
     with pytest.raises(
-        FileFormatError, match="A VTU file must hold what it declares; 'Points' takes 240 bytes"
+        FileFormatError, match="A VTK file must hold what it declares; 'Points' takes 240 bytes"
     ):
         parse(binaries["zlib"].replace(b'NumberOfPoints="12"', b'NumberOfPoints="10"'))
     for name in ("base64", "raw", "zlib"):
@@ -110,8 +112,8 @@ def test_broken_binaries_are_named(binaries):
             FileFormatError, match=r"must hold what it declares; '.*' lacks|must be in base64"
         ):
             parse(binaries[name][: end - 60] + binaries[name][end:])
-    with pytest.raises(FileFormatError, match="or not at all; it is by 'vtkLZ4DataCompressor'"):
-        parse(binaries["lz4"])
+    with pytest.raises(FileFormatError, match="or not at all; it is by 'vtkZip'"):
+        parse(binaries["lz4"].replace(b"vtkLZ4DataCompressor", b"vtkZip"))
 
 
 def test_a_count_of_blocks_beyond_the_file(binaries):

@@ -6,7 +6,8 @@ import numpy as np
 
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import plain_attributes
-from eigenshape.io.formats import gltf, gltf_attributes, obj, obj_attributes, off, ply, stl
+from eigenshape.io.formats import gltf, gltf_attributes, obj, obj_attributes, off, ply, stl, vtp
+from eigenshape.io.formats.cells import select_cells
 
 VERTICES = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
@@ -47,6 +48,13 @@ OFF_BINARY += np.array(OFF_NUMBERS, ">i4").tobytes()
 STRIP = ply.format_text(TETRAHEDRON).replace(b"element face 4", b"element tristrips 1")
 STRIP = STRIP[: STRIP.index(b"3 0 2 1")] + b"6 0 2 1 3 0 2\n"
 
+
+def parse_vtp(data):
+    """Read points and triangles."""
+    points, cells, *_ = vtp.parse(data)
+    return points, select_cells(points, cells, None)
+
+
 FILES = {
     "off": (off.parse, off.format_text(TETRAHEDRON)),
     "off binary": (off.parse, OFF_BINARY),
@@ -63,10 +71,11 @@ FILES = {
     "ply strip": (ply.parse, STRIP),
     "stl text": (stl.parse, stl.format_text(TETRAHEDRON)),
     "stl binary": (stl.parse, stl.format_binary(TETRAHEDRON)),
+    "vtp": (parse_vtp, vtp.format_fields(TETRAHEDRON, {}, {})),
     "glb": (gltf.parse, gltf_attributes.write_new(PLAIN, TETRAHEDRON)),
 }
 
 
 def read(parse, data):
     """Read bytes as a file would be read."""
-    return TriangleMesh(*parse(data))
+    return TriangleMesh(*parse(data)[:2])  # what follows are notes

@@ -3,7 +3,10 @@
 import meshio
 import numpy as np
 import pytest
+from meshio._mesh import num_nodes_per_cell
+from meshio.gmsh.common import _gmsh_to_meshio_type as gmsh_types
 
+from eigenshape.io.formats.gmsh import ELEMENTS
 from eigenshape.io.formats.registry import format_of
 
 KINDS = {
@@ -75,3 +78,25 @@ def test_points_and_cells_are_those_of_meshio(tmp_path, form, dtype, kinds):
         if block in blocks:
             expected = [part.data for part in theirs.cells if part.type == kind]
             np.testing.assert_array_equal(blocks[block], np.concatenate(expected))
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_curved_elements_have_the_corners_of_meshio(tmp_path, binary):
+    rng = np.random.default_rng(0)
+    for kind in ELEMENTS:
+        name = gmsh_types[kind]
+        n_nodes = num_nodes_per_cell[name]
+        assert ELEMENTS[kind][1] == n_nodes
+        # meshio 5.3 ends in a KeyError where it writes wedges and pyramids of second order.
+        if name in ("vertex", "wedge15", "pyramid13"):
+            continue
+        points, cells = rng.normal(size=(n_nodes, 3)), [(name, rng.permutation(n_nodes)[None])]
+        path = tmp_path / f"{kind}.msh"
+        meshio.write_points_cells(path, points, cells, file_format="gmsh22", binary=binary)
+        theirs = meshio.read(path)
+        found, blocks, *notes = format_of(".msh").load().parse(path.read_bytes())
+        (corners,) = blocks.values()
+        expected = theirs.points[theirs.cells[0].data[0, : corners.shape[1]]]
+        np.testing.assert_array_equal(found[corners[0]], expected)
+        assert len(found) == corners.shape[1]
+        assert len(notes) == (n_nodes > corners.shape[1])

@@ -28,6 +28,7 @@ def collection(
     *,
     output: Path,
     landmarks: Path | None = None,
+    unit: str = "mm",
     template: str | None = None,
     unmirrored: bool = False,
     workers: Annotated[int | None, typer.Option(min=1)] = None,
@@ -50,12 +51,15 @@ def collection(
     ----------
     folder
         Folder of surfaces of one form, such as bones. Landmarks beside a surface of the same name
-        (NAME.mrk.json, NAME.fcsv) are taken as known.
+        (NAME.mrk.json, NAME.fcsv, NAME.pp, NAME.landmarkAscii) are taken as known.
     output
         Write the collection to this folder, which is created if it does not exist.
     landmarks
         Known landmarks, instead of those in the folder: a table (.csv, .tps, .txt of Morphologika)
-        that names specimens, or a folder of files NAME.mrk.json or NAME.fcsv.
+        that names specimens, or a folder of files such as NAME.mrk.json.
+    unit
+        Unit of the surfaces: m, cm, mm, um, nm or inch. Landmarks whose file names another one are
+        converted to it.
     template
         Name of the specimen that is fitted to all others first. By default that of the collection in
         the output folder, or of a new one the specimen with the median area.
@@ -74,7 +78,7 @@ def collection(
         pip install 'eigenshape[cluster]' on all machines, and files that all of them see.
     """
     # Files that cannot be read are found now, and not after hours.
-    labelled = steps.find_landmarks(folder, landmarks, output)
+    labelled = steps.find_landmarks(folder, landmarks, output, unit)
     with (
         steps.worker_processes(workers, timeout, memory, scheduler) as processes,
         progress_bar("collection") as progress,
@@ -90,8 +94,7 @@ def collection(
     known = {name: points for name, points in labelled.items() if name in built.names}
     written = [output / "mean.ply", output / "specimens.csv"]
     carried = None
-    warnings = [f"landmarks: {text}" for text in steps.landmarks_outside(built, known)]
-    warnings += [
+    warnings = [
         f"landmarks: those of {name} are not used: it failed"
         for name in labelled
         if name not in known
@@ -99,6 +102,7 @@ def collection(
     warnings += steps.unsure_sides(built)
     if known:
         carried = es.collections.carry_landmarks(built, known)
+        warnings += [f"landmarks: {text}" for text in steps.mostly_doubtful(carried)]
         carried.save(output / "landmarks.csv")
         written.append(output / "landmarks.csv")
     with progress_bar("report") as progress:
@@ -117,6 +121,7 @@ def collection(
                 "methods": dict(zip(built.names, built.methods, strict=True)),
                 "labelled": list(known),
                 "doubtful": doubtful,
+                "given": {} if carried is None else steps.given_landmarks(carried),
                 "notes": {name: notes for name, notes in built.notes.items() if notes},
                 "warnings": warnings,
                 "failures": built.failures,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import err, print_json, print_table, print_written, progress_bar
-from eigenshape.cli.inputs import numbers_of
+from eigenshape.cli.inputs import SEAMS, numbers_of
 from eigenshape.deformation.modes import Mode
 
 REGIONS = (
@@ -38,7 +39,7 @@ def deform(
     edits: Path | None = None,
     edits_mesh: Path | None = None,
     save_edits: Path | None = None,
-    repair: str = "none",
+    repair: str = SEAMS,
     output: Path | None = None,
     picture: Path | None = None,
     view: str = "auto",
@@ -60,7 +61,7 @@ def deform(
     rotate : ROTATION
         Turn the region about an axis, in degrees: 'x by 90', '0,1,1 by 30', or 'z by 45 @
         0,0.1,0' about a point. By default the axis passes through the middle of the region's
-        boundary.
+        boundary; if the region is in several patches, each turns about its own.
     move : X,Y,Z
         Move the region by this vector.
     fixed
@@ -108,13 +109,16 @@ def deform(
         if region:
             chosen = parse_region(region, session.mesh, progress)
             stays = parse_region(fixed, session.mesh, progress) if fixed else None
-            handle = (
-                parse_rotation(rotate, session.mesh, chosen)
-                if rotate
-                else es.Translation(_three(move, "A move"))
-            )
-            turned_or_moved = es.deformation.Move(chosen, handle)
-            session.apply(es.deformation.Edit((turned_or_moved,), stays, n_modes, mode))
+            patches = [chosen]
+            if rotate and "@" not in rotate:
+                # Fingers bend at their own knuckles, not all about the middle of the palm.
+                patches = steps.regions_of_patches(session.mesh, chosen)
+            moves = []
+            for patch in patches:
+                turn = parse_rotation(rotate, session.mesh, patch) if rotate else None
+                handle = turn or es.Translation(_three(move, "A move"))
+                moves.append(es.deformation.Move(patch, handle))
+            session.apply(es.deformation.Edit(tuple(moves), stays, n_modes, mode))
     _print(session, surface, as_json=as_json)
     if output:
         steps.save_like(mesh, surface, output, session.mesh.vertices)
@@ -127,7 +131,9 @@ def deform(
         if len(session.edits) == 1:
             (edit,) = session.edits
             regions = [move.region for move in edit.moves]
-            bound = es.deformation.bind(rig, regions, fixed=edit.fixed, n_modes=edit.n_modes)
+            with warnings.catch_warnings():  # said when the edit was made
+                warnings.simplefilter("ignore")
+                bound = es.deformation.bind(rig, regions, fixed=edit.fixed, n_modes=edit.n_modes)
             follows: Any = bound.shares.sum(axis=0)
         else:
             moved = ((session.mesh.vertices - surface.vertices) ** 2).sum(axis=1) ** 0.5

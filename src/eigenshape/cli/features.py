@@ -23,7 +23,7 @@ from eigenshape.cli.console import (
     print_written,
     progress_bar,
 )
-from eigenshape.cli.inputs import HeatMethod, numbers_of, repair_names, require_one_rule
+from eigenshape.cli.inputs import SEAMS, HeatMethod, numbers_of, repair_names, require_one_rule
 from eigenshape.retrieval.heat.recipe import PRESETS
 
 COLUMNS = {
@@ -44,7 +44,7 @@ def features(
     largest_gap: bool = False,
     method: HeatMethod = "scale-free",
     accuracy: float | None = None,
-    repair: str = "none",
+    repair: str = SEAMS,
     output: Path | None = None,
     picture: Path | None = None,
     view: str = "auto",

@@ -8,6 +8,9 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.repairs.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
 from eigenshape.io.formats.registry import MESH_FORMATS, POINT_FORMATS, WRITTEN
 
+# The repair of verbs that bend or cut a surface: it would come apart along the seams of a texture,
+# where each vertex is there twice.
+SEAMS = "weld_seams"
 KNOWN_REPAIRS = tuple(dict.fromkeys((*MESH_REPAIRS, *CLOUD_REPAIRS)))
 # What is said of a parameter of this name in each verb whose docstring says nothing else. After the
 # colon stands what help calls the value.
@@ -25,8 +28,9 @@ index
     Folder of the index.
 repair : NAMES
     Repairs to apply first, in this order, separated by commas: {", ".join(KNOWN_REPAIRS)}. auto does what is
-    needed, but fills no hole and drops no component; none does nothing, so that a shape that
-    needs repair is refused.
+    needed, but fills no hole and drops no component; weld_seams joins vertices that are double
+    along seams, as those of textures; none does nothing, so that a shape that needs repair is
+    refused.
 cells
     Kind of cells to read, if the file holds several kinds or does not name the kind.
 scene : NAME

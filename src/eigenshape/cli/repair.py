@@ -14,6 +14,7 @@ from eigenshape.cli.console import (
     print_table,
     print_written,
 )
+from eigenshape.cli.inputs import SEAMS
 from eigenshape.io.formats.registry import CellKind
 
 
@@ -103,7 +104,7 @@ def decimate(
     output: Path,
     n_faces: int | None = None,
     ratio: float | None = None,
-    repair: str = "none",
+    repair: str = SEAMS,
     as_json: bool = False,
 ) -> None:
     """Write a mesh with fewer faces and the same topology, by collapsing edges.
@@ -126,11 +127,7 @@ def decimate(
             "The number of faces must be given by one of --n-faces and --ratio."
         )
     surface = steps.load_surface(mesh, repair)
-    # Vertices are double along seams of textures, where the surface would come apart.
-    joined = es.repair(surface, ["weld_seams"])
-    if joined.mesh.n_vertices < surface.n_vertices:
-        print_repairs(joined.report)
-    done = es.geometry.decimate(joined.mesh, n_faces, ratio=ratio)
+    done = es.geometry.decimate(surface, n_faces, ratio=ratio)
     steps.save_like(mesh, done.mesh, output)
     if as_json:
         facts = {"n_vertices": done.mesh.n_vertices, "n_faces": done.mesh.n_faces}

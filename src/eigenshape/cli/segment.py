@@ -12,7 +12,7 @@ import eigenshape as es
 from eigenshape._errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, progress_bar
-from eigenshape.cli.inputs import HeatMethod, require_one_rule
+from eigenshape.cli.inputs import SEAMS, HeatMethod, require_one_rule
 from eigenshape.features.contrast import contrast_at
 
 COLUMNS = {
@@ -34,7 +34,7 @@ def segment(
     level: float | None = None,
     largest_gap: bool = False,
     smooth: Annotated[bool | None, typer.Option("--smooth/--no-smooth")] = None,
-    repair: str = "none",
+    repair: str = SEAMS,
     output: Path | None = None,
     picture: Path | None = None,
     view: str = "auto",

@@ -10,7 +10,7 @@ import eigenshape as es
 from eigenshape._extras import import_extra
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_address, print_written, progress_bar
-from eigenshape.cli.inputs import memory_bytes
+from eigenshape.cli.inputs import SEAMS, memory_bytes
 
 
 def studio(
@@ -140,7 +140,7 @@ def report(
     n_modes: Annotated[int, typer.Option(min=1, max=200)] = 20,
     view: str = "auto",
     up: str = "auto",
-    repair: str = "none",
+    repair: str = SEAMS,
 ) -> None:
     """Write a shape with its spectrum, heat and parts to one HTML file that any browser opens.
 

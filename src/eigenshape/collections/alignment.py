@@ -14,11 +14,10 @@ from eigenshape._typing import ArrayLike
 from eigenshape.collections.spread_points import (
     join_normals,
     main_pieces,
-    mean_radius,
     spread_points,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import rotations_and_stretches
+from eigenshape.geometry.measure import mean_radius, rotations_and_stretches
 from eigenshape.geometry.mesh import TriangleMesh
 
 # Lengths are in units of the root mean square distance of a surface from its middle. All numbers

@@ -12,23 +12,28 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._files import as_path, replace_file
 from eigenshape._threads import one_blas_thread
 from eigenshape.collections.collection import Collection
-from eigenshape.collections.spread_points import mean_radius
 from eigenshape.geometry.distances.closest import closest_points
+from eigenshape.geometry.measure import mean_radius
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.morphometrics.landmark_files import csv_text
 from eigenshape.morphometrics.landmarks import Landmarks, require_same_names
+from eigenshape.morphometrics.placement import require_on_surfaces
 
 # Expected error of a landmark from a single labelled specimen, where there is no second one to
 # judge by, in root mean square radii: that of the tuning half of experiments/ch7_collection.
 ERROR_OF_ONE = 0.038
 # Labelled specimens that the mean error of all landmarks counts for in the error of each
 N_PRIOR = 2.0
-FAR = 0.05  # gap from which a person should look, in root mean square radii
+# Gap, or distance of a given landmark, from which a person should look, in root mean square radii
+FAR = 0.05
 # Confidence below which the specimen has no such place; on whole skulls it is 0.1 or more
 NO_PLACE = 0.02
-# Median errors between a given landmark and its carried place, from which a person should look
+# Median distances between a given landmark and those of other specimens, on the mean, from which a
+# person should look. The median counts as at most `ERROR_OF_ONE`, since many wrong ones raise it.
 WRONG_LABEL = 5.0
+COLUMNS = ["specimen", "landmark", "x", "y", "z", "spread", "doubtful"]
+EVIDENCE = ["given", "distance", "disagreement", "confidence"]
 
 
 @record
@@ -46,8 +51,19 @@ class CarriedLandmarks(ReadOnly):
         Expected error of each, the root of its mean square, in length; 0 for given ones. It is what
         is found when the landmarks of each labelled specimen are carried from all others.
     doubtful : (s, k) bool
-        Where a person should look: the specimen has no such place, or a given landmark lies far
-        from where the others put it.
+        Where a person should look: the specimen has no such place; a given landmark lies far from
+        the surface, from the map, or from where other specimens put it, or all of the specimen lie
+        as landmarks of another one do; or nothing but doubtful ones was carried there.
+    given : (s, k) bool
+        Which were given.
+    distance : (s, k) float
+        Of a given landmark from the surface; of a carried one the distance by which it was
+        moved to the surface. In length.
+    disagreement : (s, k) float
+        Distance of a given landmark, in length, within which half of the other labelled specimens
+        put it. NaN where it is carried, or no other specimen has it.
+    confidence : (s, k) float
+        That of the map at the landmark, 0 to 1, as of `Collection`.
 
     See Also
     --------
@@ -64,11 +80,15 @@ class CarriedLandmarks(ReadOnly):
     ...     np.zeros((1, 1, 3)),
     ...     np.zeros((1, 1)),
     ...     np.zeros((1, 1), dtype=bool),
+    ...     np.ones((1, 1), dtype=bool),
+    ...     np.zeros((1, 1)),
+    ...     np.zeros((1, 1)),
+    ...     np.ones((1, 1)),
     ... )
     >>> found.save("landmarks.csv")
     >>> print(Path("landmarks.csv").read_text().strip())
-    specimen,landmark,x,y,z,spread,doubtful
-    hand,tip,0.0,0.0,0.0,0.0,0
+    specimen,landmark,x,y,z,spread,doubtful,given,distance,disagreement,confidence
+    hand,tip,0.0,0.0,0.0,0.0,0,1,0.0,0.0,1.0
     """
 
     specimens: tuple[str, ...]
@@ -76,9 +96,16 @@ class CarriedLandmarks(ReadOnly):
     points: Float[np.ndarray, "s k 3"]
     spread: Float[np.ndarray, "s k"]
     doubtful: Bool[np.ndarray, "s k"]
+    given: Bool[np.ndarray, "s k"]
+    distance: Float[np.ndarray, "s k"]
+    disagreement: Float[np.ndarray, "s k"]
+    confidence: Float[np.ndarray, "s k"]
 
     def save(self, path: str | Path) -> None:
-        """Write a table of comma-separated values: specimen, landmark, x, y, z, spread, doubtful.
+        """Write a table of comma-separated values, a row for each landmark of each specimen.
+
+        Its columns are specimen, landmark, x, y, z, spread, doubtful, given, distance,
+        disagreement (NA where there is none) and confidence.
 
         Parameters
         ----------
@@ -90,11 +117,18 @@ class CarriedLandmarks(ReadOnly):
         OSError
             If the system cannot write there.
         """
-        rows: list[list[object]] = [["specimen", "landmark", "x", "y", "z", "spread", "doubtful"]]
+        rows: list[list[object]] = [[*COLUMNS, *EVIDENCE]]
         for i, specimen in enumerate(self.specimens):
             for j, name in enumerate(self.names):
                 numbers = [*self.points[i, j].tolist(), float(self.spread[i, j])]
-                rows.append([specimen, name, *numbers, int(self.doubtful[i, j])])
+                apart = float(self.disagreement[i, j])
+                evidence = [
+                    int(self.given[i, j]),
+                    float(self.distance[i, j]),
+                    "NA" if np.isnan(apart) else apart,
+                    float(self.confidence[i, j]),
+                ]
+                rows.append([specimen, name, *numbers, int(self.doubtful[i, j]), *evidence])
         replace_file(as_path(path), csv_text(rows).encode())
 
 
@@ -103,13 +137,15 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     """Carry the landmarks of some specimens to all.
 
     Each is taken to the mean shape, where those of all labelled specimens are averaged, and from
-    there to the surface of each specimen.
+    there to the surface of each specimen. Doubtful ones are left out of the average where there are
+    others.
 
     Parameters
     ----------
     collection : Collection
     labelled : mapping of str to Landmarks
-        By the name of the specimen, the same landmarks each; NaN where one is missing.
+        By the name of the specimen, the same landmarks each, on its surface, in the frame and unit
+        of its file; NaN where one is missing.
 
     Returns
     -------
@@ -119,7 +155,8 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     ------
     InvalidParameterError
         If no specimen is labelled, a labelled one is not in the collection, landmarks have other
-        names, or one is missing on all specimens.
+        names, one is missing on all specimens, or some do not lie on the surface of their specimen,
+        as in another unit or frame: the error names each specimen.
 
     See Also
     --------
@@ -145,16 +182,29 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     names, given = _points_to_carry(collection, labelled)
     mean, faces = collection.mean, collection.mean.faces
     rows = [collection.number(name) for name in labelled]
+    placements = require_on_surfaces(
+        (name, collection.read_specimen(name), labelled[name]) for name in labelled
+    )
+    radii = np.array([mean_radius(own) for own in collection.points])
+    all_known = np.isfinite(given).all(axis=2)
+    sound = all_known.copy()
     on_mean = np.full_like(given, np.nan)
-    for number, row in enumerate(rows):
-        known = np.isfinite(given[number]).all(axis=1)
+    for number, (row, (far, is_beside)) in enumerate(zip(rows, placements.values(), strict=True)):
+        known = all_known[number]
         own = TriangleMesh(collection.points[row], faces)
         there = closest_points(own, given[number, known])
         on_mean[number, known] = place_points(mean, there.simplices, there.weights).points
+        off_map = np.linalg.norm(there.points - given[number, known], axis=1)
+        sound[number, known] = np.maximum(off_map, far[known]) <= FAR * radii[row]
+        sound[number] &= not is_beside
+    apart = _disagreements(on_mean) / mean_radius(mean.vertices)
+    if np.isfinite(apart).any():
+        sound &= ~(apart > WRONG_LABEL * min(float(np.nanmedian(apart)), ERROR_OF_ONE))
+    # Where all are doubtful, the average is of them, and doubtful itself.
+    on_mean[~np.where(sound.any(axis=0), sound, all_known)] = np.nan
 
     places = closest_points(mean, np.nanmean(on_mean, axis=0))
     points = np.empty((len(collection.names), len(names), 3))
-    radii = np.array([mean_radius(own) for own in collection.points])
     carried = np.full_like(given, np.nan)  # to each labelled specimen, from all others
     for row, name in enumerate(collection.names):
         surface = collection.read_specimen(name)  # one at a time: together they may fill the memory
@@ -166,7 +216,8 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
             carried[rows.index(row), seen] = _carry(collection, row, surface, there)
 
     # Errors that are made where the truth is known
-    squares = np.sum((carried - given) ** 2, axis=2) / radii[rows, None] ** 2
+    truth = np.where(np.isfinite(on_mean), given, np.nan)
+    squares = np.sum((carried - truth) ** 2, axis=2) / radii[rows, None] ** 2
     n_known = np.isfinite(squares).sum(axis=0)
     common = float(np.nanmean(squares)) if n_known.any() else ERROR_OF_ONE**2
     errors = np.sqrt((np.nansum(squares, axis=0) + N_PRIOR * common) / (n_known + N_PRIOR))
@@ -177,15 +228,35 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
         for values in (collection.gaps, collection.confidence)
     )
     spread = np.hypot(radii[:, None] * errors, gaps)
-    doubtful = (gaps > FAR * radii[:, None]) | (sure < NO_PLACE)
-    for number, row in enumerate(rows):
-        known = np.isfinite(given[number]).all(axis=1)
-        away = np.linalg.norm(carried[number] - given[number], axis=1)
-        usual = radii[row] * np.sqrt(np.nanmedian(squares)) if n_known.any() else np.inf
-        doubtful[row, known] = (away > WRONG_LABEL * usual)[known]
+    doubtful = (gaps > FAR * radii[:, None]) | (sure < NO_PLACE) | ~sound.any(axis=0)
+    is_given, distance = np.zeros_like(doubtful), gaps.copy()
+    disagreement = np.full_like(gaps, np.nan)
+    for number, (row, (far, _)) in enumerate(zip(rows, placements.values(), strict=True)):
+        known = all_known[number]
+        is_given[row] = known
+        doubtful[row, known] = ~sound[number, known]
         points[row, known] = given[number, known]
         spread[row, known] = 0
-    return CarriedLandmarks(collection.names, names, points, spread, doubtful)
+        distance[row, known] = far[known]
+        disagreement[row, known] = apart[number, known] * radii[row]
+    return CarriedLandmarks(
+        collection.names, names, points, spread, doubtful, is_given, distance, disagreement, sure
+    )
+
+
+def _disagreements(on_mean: Float[np.ndarray, "m k 3"]) -> Float[np.ndarray, "m k"]:
+    """Return the distance of each place within which half of the others lie; NaN where there are none.
+
+    So a place that more than half of the specimens agree on does not depend on those that are wrong.
+    """
+    found = np.full(on_mean.shape[:2], np.nan)
+    for j, places in enumerate(on_mean.transpose(1, 0, 2)):
+        known = np.flatnonzero(np.isfinite(places).all(axis=1))
+        if len(known) > 1:
+            apart = np.linalg.norm(places[known, None] - places[known], axis=2)
+            # The first of each row is the distance of a place from itself.
+            found[known, j] = np.sort(apart, axis=1)[:, len(known) // 2]
+    return found
 
 
 def _points_to_carry(

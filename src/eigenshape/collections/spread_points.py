@@ -62,11 +62,6 @@ def spread_points(mesh: TriangleMesh, n_points: int) -> SpreadPoints:
     return SpreadPoints(place_points(mesh, faces, weights), vectors[faces] / areas[faces, None])
 
 
-def mean_radius(points: Float[np.ndarray, "n 3"]) -> float:
-    """Return the root mean square distance of points from their middle."""
-    return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))
-
-
 def join_normals(
     points: Float[np.ndarray, "k 3"], normals: Float[np.ndarray, "k 3"], weight: float
 ) -> Float[np.ndarray, "k 6"]:

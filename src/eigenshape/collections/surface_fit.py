@@ -22,13 +22,12 @@ from eigenshape.collections.alignment import (
 )
 from eigenshape.collections.spread_points import (
     join_normals,
-    mean_radius,
     nearest_both_ways,
     spread_points,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.measure import area_vectors, mean_normals, unit_vectors
+from eigenshape.geometry.measure import area_vectors, mean_normals, mean_radius, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, edge_table

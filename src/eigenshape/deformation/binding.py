@@ -1,7 +1,9 @@
 """Bind regions to handles: by how much each vertex follows each handle."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -11,6 +13,7 @@ from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
+from eigenshape.deformation.patches import Patch, split_region
 from eigenshape.deformation.region import Region, region_mask, require_boundary
 from eigenshape.deformation.rig import EigenRig
 from eigenshape.deformation.rigidity import (
@@ -20,6 +23,7 @@ from eigenshape.deformation.rigidity import (
     require_fixed_vertices,
 )
 from eigenshape.geometry.distances.geodesic import geodesic_distances
+from eigenshape.geometry.repairs.repair_report import count_nouns
 
 # (least extent of a region over that of the rest, number of modes): the rule of thesis 6.3.2.
 MODE_RULE = ((0.75, 8), (0.1, 50), (0.0, 300))
@@ -33,11 +37,8 @@ LEAST_CONTRAST = 1e-9
 # Weight of smoothness where the fit has no data, against the fit where it has. A larger value blurs
 # the regions.
 SMOOTHNESS = 1e-3
-# Share of the depth of a region, or of the rest if that is less deep, up to which vertices on
-# either side of the boundary are free. Of 0.3, 0.5 and 0.7, on scenes of experiments/ch6_deformation
-# at 2,000 to 6,000 vertices: 0.3 changes edge errors little, 0.5 divides them by 1.3 to 1.8 on six
-# of eight, 0.7 by more, but then little of a region follows its handle exactly.
-FREE_DEPTH = 0.5
+# A vertex of an island in the bend beside a patch that follows by less than this is named.
+FOLLOWS = 0.95
 
 
 @record
@@ -50,7 +51,7 @@ class Binding(ReadOnly):
     regions : (r, n) bool
         The vertices of each region.
     n_modes : (r,) int
-        Number of modes that spread the motion of each region.
+        Number of modes that spread the motion of each region: the most that a patch has.
     distances : (r, n) float
         Geodesic distance of each vertex to the boundary of each region, in length.
     shares : (r, n) float
@@ -102,9 +103,14 @@ def bind(
     over a narrow one. Without `fixed`, all vertices outside the regions are fitted to 0. With
     `fixed`, only the fixed vertices are, and the others follow smoothly.
 
+    A region may consist of several connected patches, down to single vertices. The depth and the
+    number of modes are those of each patch, and each follows the handle. Only small patches that
+    lie entirely in the bend beside a large one follow as its boundary does, in part. All patches of
+    a region have the one pivot of its handle: a region for each lets them turn about their own.
+
     Vertices of a share between 0 and 1 are free: `bend` places them so that edges change little.
-    Without `fixed`, so are all vertices that are nearer to the boundary of a region than half of
-    the region's depth, or of that of the rest if it is less deep: the more vertices are free, the
+    Without `fixed`, so are all vertices that are nearer to the boundary of a patch than half of
+    the patch's depth, or of that of the rest if it is less deep: the more vertices are free, the
     less edges change. All other vertices are held (`Binding.held`): they stay, or follow exactly.
 
     Parameters
@@ -115,9 +121,10 @@ def bind(
     fixed : region, optional
         The vertices that must stay. A region without vertices has no effect.
     n_modes : int, optional
-        Number of modes of each fit, 1 to k. By default, with δ the extent of a region divided by
-        that of the rest, both measured from the region's boundary: 8 if δ ≥ 0.75, 50 if δ ≥ 0.1,
-        and 300 otherwise (thesis 6.3.2); one more for each component beyond the first.
+        Number of modes of each fit, 1 to k. By default, with δ the extent of a patch divided by
+        that of the rest, both measured from the patch's boundary: 8 if δ ≥ 0.75, 50 if δ ≥ 0.1,
+        and 300 otherwise (thesis 6.3.2). Of a shape in several components, modes count that are on
+        the component of the patch.
 
     Returns
     -------
@@ -129,6 +136,11 @@ def bind(
         If a region has no boundary; if regions overlap; if `fixed` is given and a component has no
         vertex that is fixed or in a region; if `n_modes` is not in 1..k; or if the modes are
         constant on a region and the rest.
+
+    Warns
+    -----
+    UserWarning
+        If small patches beside a large one follow in part, with the first of them.
 
     See Also
     --------
@@ -171,25 +183,33 @@ def bind(
 
     rims = [require_boundary(rig.mesh, mask, number) for number, mask in enumerate(masks)]
     distances = geodesic_distances(rig.mesh, rims)
-    counts = []
-    for mask, distance in zip(masks, distances, strict=True):
-        reached = np.isfinite(distance)
-        inside = np.max(distance[mask & reached], initial=0.0)
-        outside = np.max(distance[~mask & reached], initial=0.0)
-        by_rule = next(count for least, count in MODE_RULE if inside >= least * outside)
-        # One more for each further component, whose indicator is a mode of eigenvalue 0
-        counts.append(min(by_rule + int(rig.components.max()), rig.n_modes))
-    if n_modes is not None:
-        counts = [whole_number(n_modes, "n_modes", 1, rig.n_modes)] * len(masks)
-    pairs = zip(masks, counts, strict=True)
-    shares = np.array([_fit_shares(rig, mask, known, count) for mask, count in pairs])
-    shares /= np.maximum(shares.sum(axis=0), 1)
+    patches = [split_region(rig.mesh, *pair) for pair in zip(masks, distances, strict=True)]
+    wanted = None if n_modes is None else whole_number(n_modes, "n_modes", 1, rig.n_modes)
+    counts = [[wanted or _count_modes(rig, patch) for patch in group] for group in patches]
+    shares = np.array(
+        [_fit_shares(rig, *pair, known) for pair in zip(patches, counts, strict=True)]
+    )
+    # A whole component in a region has no boundary at which it could bend.
+    shares[masks & np.isinf(distances)] = 1
+    # What follows its own handle exactly follows no other one.
+    exact = masks & (shares == 1)
+    shares = np.where(exact.any(axis=0), exact, shares / np.maximum(shares.sum(axis=0), 1))
+    islands = np.concatenate([patch.islands for patch in chain.from_iterable(patches)])
+    late = islands[shares[:, islands].sum(axis=0) < FOLLOWS]
+    if late.size:
+        warnings.warn(
+            "Small patches of a region that lie in the bend beside a large one follow in part: "
+            f"{count_nouns(late.size, 'vertex')}, of which vertex {late[0]} follows by "
+            f"{shares[:, late[0]].sum():.2f}. Leave them out, or add what lies between.",
+            stacklevel=3,
+        )
 
     placed = known & ((shares == 0).all(axis=0) | (shares == 1).any(axis=0))
     if not still.any():
-        placed = _placed_beyond_rims(rig, masks, distances, placed)
+        placed = _placed_beyond_rims(rig, patches, placed)
     part = free_part(rig.edges, placed)
-    return Binding(rig, masks, np.array(counts), distances, shares, part)
+    most = np.array([max(group) for group in counts])
+    return Binding(rig, masks, most, distances, shares, part)
 
 
 def pull_binding(binding: Binding, strength: float) -> Binding:
@@ -203,52 +223,74 @@ def pull_binding(binding: Binding, strength: float) -> Binding:
 
 
 def _placed_beyond_rims(
-    rig: EigenRig,
-    masks: Bool[np.ndarray, "r n"],
-    distances: Float[np.ndarray, "r n"],
-    placed: Bool[np.ndarray, " n"],
+    rig: EigenRig, patches: Sequence[Sequence[Patch]], placed: Bool[np.ndarray, " n"]
 ) -> Bool[np.ndarray, " n"]:
-    """Return the placed vertices that are not near the boundary of a region.
+    """Return the placed vertices that are not in the bend of a patch.
 
-    Depths are measured in each component. Where a region or the rest of a component would have no
-    placed vertex left, all stay placed.
+    Where a patch or the rest of a component would have no placed vertex left, all stay placed.
     """
-    owner = np.where(masks.any(axis=0), 1 + masks.argmax(axis=0), 0)
+    # The number of the patch of each vertex; below 0, that of the component
+    owner = -1 - rig.components
+    numbered = list(enumerate(chain.from_iterable(patches)))
+    for number, patch in numbered:
+        owner[patch.members] = number
     near = np.zeros_like(placed)
-    for number, distance in enumerate(distances):
-        reached = np.isfinite(distance)
-        sides = (reached & (owner == number + 1), reached & (owner != number + 1))
-        depths = np.zeros((2, rig.components.max() + 1))
-        for depth, side in zip(depths, sides, strict=True):
-            np.maximum.at(depth, rig.components[side], distance[side])
-        # Vertices of other regions are free near their own boundaries alone.
-        nearby = reached & (distance < FREE_DEPTH * depths.min(axis=0)[rig.components])
-        near |= nearby & ((owner == 0) | (owner == number + 1))
-    group = rig.components * (len(masks) + 1) + owner
-    n_left = np.bincount(group[placed & ~near], minlength=group.max() + 1)
-    return placed & (~near | (n_left[group] == 0))
+    for number, patch in numbered:
+        # Vertices of other patches are free near their own boundaries alone.
+        near[patch.bend] |= (owner[patch.bend] < 0) | (owner[patch.bend] == number)
+    groups = np.unique(owner, return_inverse=True)[1]
+    n_left = np.bincount(groups[placed & ~near], minlength=groups.max() + 1)
+    return placed & (~near | (n_left[groups] == 0))
+
+
+def _count_modes(rig: EigenRig, patch: Patch) -> int:
+    """Return the number of modes for a patch: as many on its component as the rule says."""
+    by_rule = next(count for least, count in MODE_RULE if patch.extent >= least)
+    if not rig.components.any():
+        return min(by_rule, rig.n_modes)
+    # Modes of other components are zero here; those of eigenvalue 0 may be mixed.
+    here = rig.components == rig.components[patch.members[0]]
+    weights = rig.areas[here] @ rig.eigenvectors[here] ** 2
+    enough = 1 + int(np.searchsorted(weights.cumsum(), by_rule - 0.5))
+    return min(enough, rig.n_modes)
 
 
 def _fit_shares(
-    rig: EigenRig, mask: Bool[np.ndarray, " n"], known: Bool[np.ndarray, " n"], n_modes: int
+    rig: EigenRig, patches: Sequence[Patch], counts: Sequence[int], known: Bool[np.ndarray, " n"]
 ) -> Float[np.ndarray, " n"]:
-    """Fit a region's indicator by the lowest modes, and scale and clip the fit to 0..1."""
-    modes, values = rig.eigenvectors[:, :n_modes], rig.eigenvalues[:n_modes]
-    goal = modes[mask].T @ rig.areas[mask]
-    if known.all():
-        # The modes are orthonormal with respect to the areas.
+    """Fit the indicators of patches by the lowest modes, scale each fit to 0..1, and add them.
+
+    Each patch has its own scale: in a common fit, that of a small one would be too low everywhere.
+    """
+    shares, most = np.zeros(len(known)), max(counts)
+    if not known.all():
+        weighted = rig.eigenvectors[known, :most] * rig.areas[known, None]
+        gram = weighted.T @ rig.eigenvectors[known, :most]
+        stiffness = SMOOTHNESS * rig.areas[known].sum() / rig.areas.sum()
+    for patch, n_modes in zip(patches, counts, strict=True):
+        modes, values = rig.eigenvectors[:, :n_modes], rig.eigenvalues[:n_modes]
+        members = patch.members
+        goal = modes[members].T @ rig.areas[members]
+        if not known.all():
+            # Least squares where the indicator is known, and smooth elsewhere. Where it is known
+            # everywhere, the modes are orthonormal with respect to the areas.
+            relative_values = values / max(values[-1], np.finfo(float).tiny)
+            stiff = np.diag(stiffness * relative_values**2)
+            goal = np.linalg.solve(gram[:n_modes, :n_modes] + stiff, goal)
         fit = modes @ goal
-    else:
-        # Least squares where the indicator is known, and smooth elsewhere
-        gram = (modes[known] * rig.areas[known, None]).T @ modes[known]
-        relative_values = values / max(values[-1], np.finfo(float).tiny)
-        stiff = SMOOTHNESS * rig.areas[known].sum() / rig.areas.sum() * relative_values**2
-        fit = modes @ np.linalg.solve(gram + np.diag(stiff), goal)
-    best, rest = fit[mask].max(), fit[known & ~mask].min()
-    if not best - rest > LEAST_CONTRAST * abs(best):
-        raise InvalidParameterError(
-            "Modes must differ between a region and the rest; "
-            f"the lowest {n_modes} are constant there. Increase n_modes."
-        )
-    low, high = max(CLIP * min(best, 1), rest), min(1 - CLIP, best)
-    return np.clip((fit - low) / (high - low), 0, 1)
+        here = rig.components == rig.components[members[0]]
+        rest = here.copy()
+        rest[members] = False
+        best, least = fit[members].max(), fit[rest].min()
+        if best - least > LEAST_CONTRAST * abs(best):
+            low, high = max(CLIP * min(best, 1), least), min(1 - CLIP, best)
+            shares[here] += np.clip((fit[here] - low) / (high - low), 0, 1)
+        elif rig.components.any():
+            # The modes of a rig may all be too coarse for a small component.
+            shares[members] = 1
+        else:
+            raise InvalidParameterError(
+                "Modes must differ between a region and the rest; "
+                f"the lowest {n_modes} are constant there. Increase n_modes."
+            )
+    return np.minimum(shares, 1)

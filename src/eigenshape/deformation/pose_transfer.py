@@ -14,6 +14,7 @@ from eigenshape.deformation.rigidity_loops import turn_edges
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import warn_of_seams
 from eigenshape.geometry.simplices import dual_volumes, size_one
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.maps.functional_map import FunctionalMap, point_areas, transfer_function
@@ -70,6 +71,11 @@ def transfer_deformation(
     InvalidShapeError
         If a face of `before` or of the target has no area.
 
+    Warns
+    -----
+    UserWarning
+        If vertices of the target are double along seams, where it would come apart.
+
     See Also
     --------
     functional_map : Compute the map from pairs of corresponding points.
@@ -94,6 +100,7 @@ def transfer_deformation(
     after = as_mesh(after, "after")
     target = as_mesh(target, "target")
     require_poses(before, after)
+    warn_of_seams(target)
     if not isinstance(mapping, FunctionalMap):
         # The functional map of 50 modes, or fewer on small meshes, of corresponding vertices
         partners = whole_numbers(

@@ -16,6 +16,7 @@ from eigenshape._typing import ArrayLike, Integer
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.requirements import warn_of_seams
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.spectral.solve import solve_spectrum
@@ -103,6 +104,11 @@ def rig_shape(
     InvalidParameterError
         If the spectrum has another number of vertices.
 
+    Warns
+    -----
+    UserWarning
+        If vertices are double along seams, where the shape would come apart.
+
     See Also
     --------
     deform : Move a region of a rigged shape.
@@ -123,6 +129,7 @@ def rig_shape(
     """
     mesh = as_mesh(mesh)
     require_type(spectrum, Spectrum | None, "spectrum")
+    warn_of_seams(mesh)
     laplacian = cotangent_laplacian(mesh)
     if spectrum is None:
         n_components, _ = vertex_components(mesh)

@@ -8,11 +8,12 @@ import numpy as np
 from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import attribute_of, describe_value, require_choice
-from eigenshape._arrays import as_array
+from eigenshape._arrays import as_array, finite_rows, index_rows
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.polygons import triangulate_polygons
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 
 Cells = Literal["tetrahedra", "quads"]
@@ -230,7 +231,7 @@ def from_arrays(
         Dimension of a point cloud; not used for meshes.
     cells : "tetrahedra" or "quads", optional
         Meaning of rows of four indices; required for such rows. A quad becomes two triangles that
-        share the diagonal from its first corner.
+        share the diagonal from its first corner, or the other one if that lies outside.
 
     Returns
     -------
@@ -242,7 +243,7 @@ def from_arrays(
     InvalidParameterError
         If rows have four indices and `cells` is not given, or `cells` is given for other rows.
     InvalidShapeError
-        If the arrays do not form a shape, as in the three classes.
+        If the arrays do not form a shape, as in the three classes, or a quad crosses itself.
 
     See Also
     --------
@@ -272,7 +273,10 @@ def from_arrays(
             f"and rows of simplices have {corners}. Leave cells out."
         )
     if cells == "quads":
-        simplices = np.asarray(simplices)[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+        places = finite_rows(points, "points")
+        rows = index_rows(simplices, "simplices", 4, len(places))
+        starts = np.arange(0, rows.size + 1, 4)
+        simplices, _ = triangulate_polygons(places, starts, rows.ravel())
     if (_width(points), _width(simplices)) == (3, 3):
         return TriangleMesh(points, simplices)
     return SimplicialMesh(points, simplices)

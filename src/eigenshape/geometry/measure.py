@@ -234,6 +234,11 @@ def bounding_box(shape: Shape) -> tuple[Float[np.ndarray, " d"], Float[np.ndarra
     return shape.points.min(axis=0), shape.points.max(axis=0)
 
 
+def mean_radius(points: Float[np.ndarray, "n 3"]) -> float:
+    """Return the root mean square distance of points from their middle."""
+    return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))
+
+
 def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k 3 3"]:
     """Return the rotation nearest to each matrix in the Frobenius norm (Kabsch 1976)."""
     return rotations_and_stretches(matrices)[0]

@@ -3,17 +3,19 @@
 Each check costs a few sorts. Its error names the first offender by index and value, and the repair.
 """
 
+import warnings
+
 import numpy as np
 
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.face_turns import face_turns, inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.seams import seams
 from eigenshape.geometry.simplices import require_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     repeated_simplices,
     require_simplices_everywhere,
-    seams,
     vertex_components,
 )
 
@@ -65,6 +67,19 @@ def require_joined(mesh: Mesh) -> None:
         )
 
 
+def warn_of_seams(mesh: TriangleMesh) -> None:
+    """Warn if vertices are double along seams, as those of a texture: the mesh comes apart there."""
+    pairs = seams(mesh)
+    if len(pairs):
+        one, two = pairs[0]
+        warnings.warn(
+            "Both sides of a seam must share their vertices to bend together; the edges "
+            f"{one.tolist()} and {two.tolist()} lie on each other and do not ({len(pairs)} such). "
+            'Try repair(mesh, ["weld_seams"]), or --repair weld_seams on the command line.',
+            stacklevel=3,
+        )
+
+
 def require_describable(mesh: Mesh) -> None:
     """Raise an error if a descriptor of the mesh would not describe the shape.
 
@@ -87,7 +102,7 @@ def require_oriented(mesh: TriangleMesh) -> None:
         one_sided = int(np.argmin(orientable))
         remedy = (
             f"The piece of face {one_sided} has one side only, like a Möbius strip. Try repair(mesh, "
-            '["cut_one_sided"]), or --repair cut_one_sided on the command line.'
+            '["auto", "cut_one_sided"]), or --repair auto,cut_one_sided on the command line.'
         )
     raise InvalidShapeError(
         "Neighboring faces must be turned the same way; "

@@ -68,7 +68,8 @@ def in_length(
         most = 301 // abs(power)
         raise InvalidShapeError(
             f"To measure {noun} the largest coordinate must lie within 1e-{most}..1e{most}; "
-            f"it is about {scale:.0e}. Choose another unit, or call normalize_mesh."
+            f"it is about {scale:.0e}. Choose another unit, as "
+            'normalize_mesh(mesh, "box") does for surfaces.'
         )
     return np.ldexp(values, exponent)
 

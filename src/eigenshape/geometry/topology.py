@@ -201,21 +201,6 @@ def number_places(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
     return place.ravel().astype(np.int64)
 
 
-def seams(mesh: Mesh) -> Int[np.ndarray, "k 2 m"]:
-    """Return pairs of boundary facets with corners at the same places but different vertices.
-
-    Of several facets at one place each is paired with the next, so that the pairs connect them all.
-    """
-    facets = boundary_facets(mesh)
-    used, numbers = np.unique(facets, return_inverse=True)
-    places = number_places(mesh.points[used])[numbers.reshape(facets.shape)]
-    by_place = np.argsort(places, axis=1, kind="stable")
-    facets, places = (np.take_along_axis(rows, by_place, axis=1) for rows in (facets, places))
-    order, _, repeats = sorted_rows(places)
-    second = np.flatnonzero(repeats)
-    return np.stack([facets[order[second - 1]], facets[order[second]]], axis=1)
-
-
 def boundary_vertices(mesh: MeshLike) -> Int[np.ndarray, " k"]:
     """Return the points on the boundary of a mesh.
 

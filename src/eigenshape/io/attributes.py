@@ -1,6 +1,6 @@
 """Mesh files as they were read, and what they hold besides positions and faces."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -139,10 +139,11 @@ class WriteJob:
     face_labels: Int[np.ndarray, " f"] | None
     lost: list[str]
 
-    def lose(self, kinds: Iterable[str]) -> None:
-        """Note that further content is lost, and what there is of some kinds of content."""
+    def lose(self, kinds: Iterable[str], kept: Collection[str] = ()) -> None:
+        """Note that further content is lost but for some, and what there is of some kinds of content."""
         contents = self.attributes.contents
-        self.lost.extend([*self.attributes.others, *(kind for kind in kinds if contents[kind])])
+        self.lost.extend(other for other in self.attributes.others if other not in kept)
+        self.lost.extend(kind for kind in kinds if contents[kind])
 
 
 def plain_attributes(mesh: TriangleMesh) -> MeshAttributes:

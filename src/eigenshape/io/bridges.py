@@ -156,7 +156,7 @@ def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
             return (
                 TriangleMesh(points, cells) if dim_of_cells == 2 else SimplicialMesh(points, cells)
             )
-    segments = lists.pairs(np.flatnonzero(np.isin(kinds, LINES)))
+    segments = lists.take(np.flatnonzero(np.isin(kinds, LINES))).pairs()
     return SimplicialMesh(points, segments) if segments.size else PointCloud(points, dim)
 
 

@@ -1,5 +1,6 @@
 """Functions on vertices and faces, in files of a mesh such as .vtu, or without one such as .func.gii."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from eigenshape.io.formats.registry import (
     format_of,
     written_suffix,
 )
+from eigenshape.io.formats.rounding import loss_in_single
 from eigenshape.io.opening import SourceFile, naming, open_file
 
 WRITABLE = ("f8", "f4", "i8", "i4", "u1")  # numpy's types of fields that are written as they are
@@ -30,7 +32,7 @@ Fields = dict[str, np.ndarray]
 def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLike]) -> None:
     """Write a mesh with functions on its vertices and faces, or functions on its vertices alone.
 
-    .vtu, .vtk, .npz and .gii hold the mesh, too. .func.gii, .shape.gii, .label.gii, .dscalar.nii,
+    .vtu, .vtp, .vtk, .npz and .gii hold the mesh, too. .func.gii, .shape.gii, .label.gii, .dscalar.nii,
     .curv, .mgh and .mgz hold functions on vertices alone, as Connectome Workbench and FreeSurfer
     keep them; a path such as lh.thickness is a file in .curv. Those and .gii hold numbers of 32
     bits. In .dscalar.nii, the name of a function begins with its hemisphere, as in
@@ -76,16 +78,20 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     """
     mesh, path = as_simplicial(mesh), as_path(path)
     suffix = written_suffix(path, FIELD_FORMATS)
-    replace_file(path, format_fields(mesh, suffix, fields, structure_named(mesh, path, suffix)))
+    data = format_fields(mesh, suffix, fields, structure_named(mesh, path, suffix))
+    lost = []
+    if "single" in format_of(suffix).traits and isinstance(mesh, TriangleMesh):
+        lost = loss_in_single(mesh)
+    replace_file(path, data)
+    for loss in lost:
+        warnings.warn(f"{path.name} does not keep {loss}", stacklevel=2)
 
 
-def structure_named(mesh: Mesh, path: Path, suffix: str, source: SourceFile | None = None) -> str:
-    """Return the structure that a GIFTI source names, or CortexLeft or CortexRight by the name of the new file.
+def structure_named(mesh: Mesh, path: Path, suffix: str) -> str:
+    """Return CortexLeft or CortexRight by the name of a file that is to be written.
 
     Raise FileFormatError if the surface lies on the other side than the name says.
     """
-    if source is not None and source.suffix == ".gii":
-        return str(format_of(".gii").load().structure_of(source.data))
     if suffix not in (".gii", *MAP_FORMATS) or not isinstance(mesh, TriangleMesh):
         return ""
     side = side_of_file(mesh, path.name)
@@ -143,7 +149,8 @@ def read_fields(path: str | Path) -> Fields:
     ----------
     path : str or Path
         A file such as `write_fields` writes; also lh.thickness and other files of FreeSurfer
-        without a suffix.
+        without a suffix, and functions on vertices that are stored as a volume of n x 1 x 1 voxels
+        in .nii.
 
     Returns
     -------
@@ -183,7 +190,10 @@ def read_fields(path: str | Path) -> Fields:
 
 def _parse_fields(source: SourceFile) -> Fields:
     with naming(source.path):
-        of_vertices, of_faces = format_of(source.suffix).load().parse_fields(source.data)
+        module = format_of(source.suffix).load()
+        of_vertices, of_faces, *notes = module.parse_fields(source.data, **source.options)
+    for note in notes:
+        warnings.warn(f"{source.path}: {note}", stacklevel=3)
     found = dict(of_vertices)
     for name, values in of_faces.items():
         found[f"face_{name}" if name in found else name] = values

@@ -3,7 +3,7 @@
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Literal, overload
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -13,10 +13,8 @@ from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidSh
 from eigenshape._files import as_path, replace_file
 from eigenshape._typing import FileLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import PLURALS, count_nouns
-from eigenshape.geometry.simplices import size_one
 from eigenshape.io.attributes import (
     MeshAttributes,
     WriteJob,
@@ -24,7 +22,7 @@ from eigenshape.io.attributes import (
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.field_files import format_fields, read_field_attributes, structure_named
+from eigenshape.io.field_files import format_fields, read_field_attributes
 from eigenshape.io.formats.cells import SEGMENTS, require_kind, select_cells, split_sentence
 from eigenshape.io.formats.registry import (
     MESH_FORMATS,
@@ -35,11 +33,9 @@ from eigenshape.io.formats.registry import (
     suffixes_with,
     written_suffix,
 )
+from eigenshape.io.formats.rounding import loss_in_single
 from eigenshape.io.opening import SourceFile, naming, open_file
 
-# Largest share of the shortest side of a face by which rounding may move its corners without a word,
-# and of the area by which it may change the whole at all.
-ROUNDING, MOST_CHANGE = 0.01, 0.01
 KINDS = {2: SEGMENTS, 3: "triangles"}  # of cells, by their number of corners
 
 
@@ -75,9 +71,9 @@ def read_mesh(
     r"""Read a triangle mesh from a file.
 
     Vertices keep their order and are neither merged nor split. The exception is STL, which does not
-    store shared vertices: there, corners with equal coordinates become one vertex. Polygons become
-    fans of triangles around their first corner. Colors, normals, textures and materials come as
-    attributes, if they are requested. The whole file is read into memory.
+    store shared vertices: there, corners with equal coordinates become one vertex. A polygon of k
+    corners, convex or not, becomes k - 2 triangles inside of it. Colors, normals, textures and
+    materials come as attributes, if they are requested. The whole file is read into memory.
 
     Parameters
     ----------
@@ -98,7 +94,8 @@ def read_mesh(
         raise an error.
     attributes : bool
         Whether to return also what the file holds besides: texture coordinates, materials, images,
-        colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTK, NPZ and GIFTI files hold such content.
+        colors, groups, fields. OBJ, PLY, GLB, glTF, VTU, VTP, VTK, NPZ, GIFTI and FreeSurfer files
+        hold such content.
 
     Returns
     -------
@@ -113,7 +110,8 @@ def read_mesh(
         If the format is unknown, the path is not a regular file, the content differs from what its
         header declares, or it holds no triangles in R³.
     InvalidShapeError
-        If a coordinate is not finite, or a face has an index that is not that of a vertex.
+        If a coordinate is not finite, a face has an index that is not that of a vertex, or a
+        polygon crosses itself.
     InvalidParameterError
         If `cells` is unknown.
     OSError
@@ -170,7 +168,7 @@ def parse_file(
         If hexahedra, wedges or pyramids were split, or the format's `parse` returned notes.
     """
     known = format_of(source.suffix)
-    options: dict[str, Any] = {"folder": source.folder} if "beside" in known.traits else {}
+    options = source.options
     if "scenes" in known.traits:
         options["scene"] = source.scene
     elif source.scene is not None:
@@ -385,44 +383,17 @@ def save_mesh(
             files = known.load("_attributes").write(job)
         elif "fields" in known.traits:
             job.lose([kind for kind in held.contents if kind != "fields"])
-            structure = structure_named(mesh, path, suffix, held.source)
-            files = {path: format_fields(mesh, suffix, held.fields, structure)}
+            files = {path: format_fields(mesh, suffix, held.fields)}
         else:
             job.lose(held.contents)
             module = known.load()
             files = {path: (module.format_binary if is_binary else module.format_text)(mesh)}
     except FileFormatError as err:
         raise FileFormatError(f"{path} cannot hold the mesh. {err}") from err
-    lost += rounding_loss(mesh) if is_binary and "single" in known.traits else []
+    lost += loss_in_single(mesh) if is_binary and "single" in known.traits else []
     for place, data in files.items():
         replace_file(place, data)
     return f"{path.name} does not keep: {', '.join(dict.fromkeys(lost))}." if lost else ""
-
-
-def rounding_loss(mesh: TriangleMesh) -> list[str]:
-    """Name what single precision takes from a shape; nothing while sides are much longer than it.
-
-    Raise FileFormatError if the area changes by more than `MOST_CHANGE`.
-    """
-    rounded = mesh.vertices.astype(np.float32).astype(np.float64)
-    corners, scale = size_one((mesh.vertices - mesh.vertices[0])[mesh.faces])
-    single = (rounded - mesh.vertices[0])[mesh.faces] / scale
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    moved = np.linalg.norm(single - corners, axis=2)
-    before, after = triangle_areas(corners), triangle_areas(single)
-    damaged = (moved.max(axis=1) > ROUNDING * sides.min(axis=1)) & (before > 0)
-    if not damaged.any():
-        return []
-    n_flat = int(((after == 0) & (before > 0)).sum())
-    change = abs(after.sum() - before.sum()) / before.sum()
-    faces = f"{count_nouns(int(damaged.sum()), 'face')}, of which {n_flat} lose their area"
-    remedy = "Write .ply or .glb, or subtract mesh.vertices.mean(axis=0) from the vertices before."
-    if change > MOST_CHANGE:
-        raise FileFormatError(
-            f"Single precision must keep the area to {MOST_CHANGE:.0%}; rounding changes it by "
-            f"{change:.2g}, and {faces}. {remedy}"
-        )
-    return [f"the shape of {faces}: coordinates are rounded to single precision. {remedy}"]
 
 
 def _replaced_by_parts(held: MeshAttributes, has_part_materials: bool) -> list[str]:

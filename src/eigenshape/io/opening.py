@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,11 @@ class SourceFile:
     folder: Path = NOWHERE
     scene: str | int | None = None
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """What parsers take besides the data: the folder, if parts of the file may lie there."""
+        return {"folder": self.folder} if "beside" in format_of(self.suffix).traits else {}
+
 
 def open_file(
     path: FileLike,
@@ -71,6 +77,10 @@ def open_file(
         # Volumes are unpacked by their readers, which know how large they are.
         if data.startswith(GZIP) and "volume" not in format_of(suffix).traits:
             data = unpack_gzip(data)
+        # MNI objects have the suffix of Wavefront files.
+        found = recognize(data)
+        if suffix == ".obj" and found and found.suffix == ".mniobj":
+            suffix = found.suffix
         require_content(data, suffix)
     return SourceFile(place, suffix, data, folder, scene)
 

@@ -1,5 +1,6 @@
 """Read and write parcels of a surface: annotation, label, GIFTI and CIFTI files."""
 
+import warnings
 from pathlib import Path
 
 from eigenshape._errors import FileFormatError
@@ -27,13 +28,20 @@ def read_parcellation(path: str | Path, mesh: MeshLike) -> Parcellation:
     Returns
     -------
     Parcellation
-        Label -1 is for vertices in no parcel: the label 0 of an annotation, and ??? in GIFTI.
+        Label -1 is for vertices in no parcel: those that are black in an annotation, and ??? in
+        GIFTI. Parcels without colors in GIFTI get different hues.
+
+    Warns
+    -----
+    UserWarning
+        If a parcel is empty because an earlier one has its color or key, if a black parcel has
+        vertices, if one is transparent, or if a label file lists points without a vertex.
 
     Raises
     ------
     FileFormatError
-        If the file is of another surface or hemisphere, has no names and colors, or does not hold
-        what it declares, or the surface lies on both sides of x = 0 and the file is of both.
+        If the file is of another surface or hemisphere, has no names, or does not hold what it
+        declares, or the surface lies on both sides of x = 0 and the file is of both.
     MissingExtraError
         If nibabel is not installed, which reads .nii.
     OSError
@@ -59,7 +67,8 @@ def read_parcellation(path: str | Path, mesh: MeshLike) -> Parcellation:
     source = open_file(path, None, PARCEL_FORMATS)
     with naming(source.path):
         module = format_of(source.suffix).load()
-        parcellation: Parcellation = module.parse_parcels(source.data, mesh)
+        parcellation: Parcellation
+        parcellation, *notes = module.parse_parcels(source.data, mesh, **source.options)
         n_labels = len(parcellation.labels)
         if n_labels != mesh.n_vertices:
             raise FileFormatError(
@@ -69,6 +78,8 @@ def read_parcellation(path: str | Path, mesh: MeshLike) -> Parcellation:
         structure = module.structure_of(source.data) if source.suffix == ".label.gii" else ""
         if source.suffix != ".dlabel.nii":  # which holds both
             side_of_file(mesh, source.path.name, structure)
+    for note in notes:
+        warnings.warn(f"{source.path}: {note}", stacklevel=2)
     return parcellation
 
 

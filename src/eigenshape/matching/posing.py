@@ -43,6 +43,11 @@ def take_pose(mesh: MeshLike, like: MeshLike, *, match: ShapeMatch | None = None
     InvalidShapeError
         If a mesh cannot be matched; see `match_shapes`.
 
+    Warns
+    -----
+    UserWarning
+        If vertices are double along seams, where the shape would come apart.
+
     See Also
     --------
     match_shapes : Compute the map, and see how sure it is.

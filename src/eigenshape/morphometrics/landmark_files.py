@@ -1,20 +1,36 @@
-"""Files of landmarks: of 3D Slicer, of the tps programs, of Morphologika, and tables."""
+"""Files of landmarks, read and written: of 3D Slicer, of the tps programs, of Morphologika, and tables."""
 
 import csv
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any
 
 import numpy as np
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import as_path, read_regular, replace_file
+from eigenshape.morphometrics.landmark_parsers import (
+    PLANAR,
+    Parsed,
+    Table,
+    as_number,
+    by_name,
+    filled_lines,
+    is_semilandmark,
+    numbered,
+    one_specimen,
+    parse_amira,
+    parse_landmark_editor,
+    parse_nts,
+    parse_picked_points,
+    points_of,
+)
 from eigenshape.morphometrics.landmarks import Landmarks, require_name, require_same_names
-
-Table: TypeAlias = dict[str, Landmarks]
+from eigenshape.morphometrics.tps_files import parse_tps
 
 SCHEMA = (
     "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/"
@@ -28,25 +44,44 @@ FCSV_COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 STATUS_COLUMN = 14
 PLACED, NOT_PLACED = "2", ("0", "3")  # PositionDefined; PositionUndefined, PositionMissing
 CSV_COLUMNS = ["specimen", "landmark", "x", "y", "z", "spread"]
-MISSING = ("", "NA", "NaN", "nan")  # of a number, as R, pandas and tps programs write it
+UNIT = "mm"  # of scenes and meshes of Slicer
+# Names of units, as UCUM, Slicer and Amira write them, by their length in nanometers: the ratio of
+# two whole numbers is rounded once
+LENGTHS = {
+    10**9: ("m", "meter", "metre"),
+    10**7: ("cm", "centimeter", "centimetre"),
+    10**6: ("mm", "millimeter", "millimetre"),
+    10**3: ("um", "\u00b5m", "\u03bcm", "micron", "micrometer", "micrometre"),
+    1: ("nm", "nanometer", "nanometre"),
+    25_400_000: ("inch", "in", "[in_i]"),
+}
 
 
-def read_landmarks(path: str | Path) -> Landmarks:
+def read_landmarks(path: str | Path, *, unit: str = UNIT) -> Landmarks:
     """Read the landmarks of one specimen.
 
     Parameters
     ----------
     path : str or Path
         Any file of `read_specimens` with one specimen, such as a `.mrk.json` file of 3D Slicer.
+    unit : str, optional
+        As in `read_specimens`.
 
     Returns
     -------
     Landmarks
 
+    Warns
+    -----
+    UserWarning
+        As `read_specimens`.
+
     Raises
     ------
     FileFormatError
         As `read_specimens`, and if the file holds several specimens.
+    InvalidParameterError
+        If the unit is unknown.
 
     See Also
     --------
@@ -62,7 +97,7 @@ def read_landmarks(path: str | Path) -> Landmarks:
     >>> es.morphometrics.read_landmarks(path).names
     ('nasion',)
     """
-    specimens = read_specimens(path)
+    specimens = read_specimens(path, unit=unit)
     if len(specimens) > 1:
         raise FileFormatError(
             f"{path} must hold one specimen; it holds {len(specimens)}. Read it by read_specimens."
@@ -70,20 +105,31 @@ def read_landmarks(path: str | Path) -> Landmarks:
     return next(iter(specimens.values()))
 
 
-def read_specimens(path: str | Path) -> dict[str, Landmarks]:
-    r"""Read the landmarks of all specimens of a file.
+def read_specimens(path: str | Path, *, unit: str = UNIT) -> dict[str, Landmarks]:
+    r"""Read the landmarks of all specimens of a file, or of all files of a folder.
 
-    - `.mrk.json` and `.fcsv` of 3D Slicer, one specimen, which has the name of the file. Points in
-      the system RAS are turned to LPS, in which Slicer writes meshes. Curves of `.mrk.json` files
-      become `Landmarks.curves`.
-    - `.tps`, points in space ("LM3="), multiplied by "SCALE=". A specimen has the name of its "ID=" or
-      "IMAGE="; landmarks, which have no names there, are numbered from "1" on.
+    - `.mrk.json` (or `.json`) and `.fcsv` of 3D Slicer, one specimen, which has the name of the file.
+      Points in the system RAS are turned to LPS, in which Slicer writes meshes. Curves of `.mrk.json`
+      files become `Landmarks.curves`. Points of all lists are landmarks; a label that occurs again
+      gets a number.
+    - `.tps`, points in space ("LM3=") or in a plane ("LM="), multiplied by "SCALE=". A specimen has
+      the name of its "ID=" or "IMAGE=", or its number; landmarks, which have no names there, are
+      numbered from "1" on. Points of "CURVES=" follow them, and become `Landmarks.curves`.
     - `.txt` of Morphologika; landmarks are numbered. Labels, groups and wireframes are not read.
+    - `.nts` and `.dta` of NTSYS and Landmark Editor, `.pts` of Landmark Editor, `.pp` of MeshLab,
+      `.landmarkAscii` of Amira and Avizo.
     - `.csv` with the columns specimen, landmark, x, y, z, and spread, if it is known.
 
     Parameters
     ----------
     path : str or Path
+        A file, or a folder, whose files of all these formats but `.txt`, `.csv`, `.json` and `.dta`
+        are read, also in the folders in it. There a file of one specimen names it by its own path
+        below the folder.
+    unit : str, optional
+        The unit of the points that are returned: "m", "cm", "mm", "um", "nm" or "inch", that of the
+        meshes. Points of files that name another one are converted to it; those of all others
+        are returned as they are.
 
     Returns
     -------
@@ -91,11 +137,20 @@ def read_specimens(path: str | Path) -> dict[str, Landmarks]:
         Specimens by name, in the order of the file, all with the same landmarks. Missing points
         ("NA", or not placed) are NaN.
 
+    Warns
+    -----
+    UserWarning
+        If points were converted to another unit or read with z = 0, labels got numbers, points are
+        semilandmarks by their description, outlines or radii are not read, or the last line has no
+        end.
+
     Raises
     ------
     FileFormatError
         If the file does not follow its format, is cut off, or its specimens have different
-        landmarks.
+        landmarks, or a folder holds no landmarks.
+    InvalidParameterError
+        If the unit is unknown, or a specimen has two files in a folder.
 
     See Also
     --------
@@ -112,11 +167,56 @@ def read_specimens(path: str | Path) -> dict[str, Landmarks]:
     ([[0.0, 1.5, 2.0]], [[nan, nan, nan]])
     """
     path = as_path(path)
-    parse, _ = FORMATS[_suffix(path)]
+    if path.is_dir():
+        found = read_folder(path, unit)
+        if not found:
+            raise FileFormatError(
+                f"A folder of landmarks must hold files that end in {', '.join(IN_FOLDERS)}; {path} "
+                "holds none."
+            )
+        return found
+    return _read_file(path, unit, stacklevel=3)
+
+
+def read_folder(folder: Path, unit: str = UNIT, without: Path | None = None) -> Table:
+    """Return the landmarks of all files in a folder, but not of those below another one.
+
+    Raise InvalidParameterError if a specimen has two files, or landmarks of specimens differ.
+    """
+    found: Table = {}
+    for path in sorted(folder.rglob("*")):
+        suffix = next((each for each in IN_FOLDERS if path.name.lower().endswith(each.lower())), "")
+        is_output = without is not None and without.absolute() in path.absolute().parents
+        # The same suffix is that of point clouds.
+        is_cloud = suffix == ".pts" and path.read_bytes()[:7] != b"Version"
+        if not suffix or is_output or is_cloud or not path.is_file():
+            continue
+        specimens = _read_file(path, unit, stacklevel=4)
+        if len(specimens) == 1:
+            name = path.relative_to(folder).as_posix()[: -len(suffix)]
+            specimens = {name: next(iter(specimens.values()))}
+        for name, landmarks in specimens.items():
+            if name in found:
+                raise InvalidParameterError(
+                    f"A specimen must have one file of landmarks; {name!r} has two in {folder}. "
+                    "Move one of them elsewhere."
+                )
+            found[name] = landmarks
+    if found:
+        require_same_names(found)
+    return found
+
+
+def _read_file(path: Path, unit: str, stacklevel: int) -> Table:
+    """Return the specimens of a file, in a unit, and warn of what they do not show."""
+    wanted = nanometers(unit)
+    suffix = _suffix(path, PARSERS)
     data = read_regular(path, "landmarks")
     try:
-        specimens = parse(data.decode("utf-8-sig"), path.name[: -len(_suffix(path))])
+        text = data.decode("utf-8-sig")
+        specimens, notes, named = PARSERS[suffix](text, path.name[: -len(suffix)])
         require_same_names(specimens)
+        own = wanted if named is None else nanometers(named)
     except (ValueError, csv.Error) as err:
         raise FileFormatError(f"{path} must hold landmarks: {err}") from err
     # JSON, or sections of Morphologika, of another structure fail in any of these ways.
@@ -124,7 +224,29 @@ def read_specimens(path: str | Path) -> dict[str, Landmarks]:
         raise FileFormatError(
             f"{path} must hold landmarks: its structure differs, {err!r}"
         ) from err
+    if own != wanted:
+        specimens = {
+            name: Landmarks(each.names, each.points * (own / wanted), curves=each.curves)
+            for name, each in specimens.items()
+        }
+        notes = (*notes, f"its points are in {named} and were converted to {unit}")
+    if suffix in OPEN_ENDED and not text.endswith("\n"):
+        notes = (
+            *notes,
+            "its last line has no line break; if the file was cut off, that line is short",
+        )
+    for note in notes:
+        warnings.warn(f"{path}: {note}", stacklevel=stacklevel)
     return specimens
+
+
+def nanometers(unit: str) -> int:
+    """Return the length of a unit; raise InvalidParameterError if its name is unknown."""
+    for length, names in LENGTHS.items():
+        if str(unit).strip().lower() in names:
+            return length
+    known = ", ".join(names[0] for names in LENGTHS.values())
+    raise InvalidParameterError(f"The unit of length must be one of {known}; it is {unit!r}.")
 
 
 def write_landmarks(landmarks: Landmarks | Mapping[str, Landmarks], path: str | Path) -> None:
@@ -170,7 +292,7 @@ def write_landmarks(landmarks: Landmarks | Mapping[str, Landmarks], path: str | 
     """
     require_type(landmarks, Landmarks | Mapping, "landmarks")
     path = as_path(path)
-    suffix = _suffix(path)
+    suffix = _suffix(path, WRITERS)
     if isinstance(landmarks, Landmarks):
         landmarks = {path.name[: -len(suffix)]: landmarks}
     require_same_names(landmarks)
@@ -184,51 +306,18 @@ def write_landmarks(landmarks: Landmarks | Mapping[str, Landmarks], path: str | 
         raise InvalidParameterError(
             f"A {suffix} file holds one specimen; there are {len(landmarks)}. Write one file for each."
         )
-    _, text_of = FORMATS[suffix]
-    replace_file(path, text_of(dict(landmarks)).encode())
+    replace_file(path, WRITERS[suffix](dict(landmarks)).encode())
 
 
-def _suffix(path: Path) -> str:
-    suffix = next((each for each in FORMATS if path.name.lower().endswith(each)), None)
+def _suffix(path: Path, formats: Mapping[str, object]) -> str:
+    """Return the end of a name that is a format; raise an error if none is."""
+    suffix = next((each for each in formats if path.name.lower().endswith(each.lower())), None)
     if suffix is None:
-        raise FileFormatError(f"Files of landmarks end in {', '.join(FORMATS)}; it is {path}.")
-    return suffix
-
-
-def _number(text: str) -> float:
-    """Return a number, or NaN for a missing one. `float` would take 1_000 for a thousand, too."""
-    if text.strip() in MISSING:
-        return np.nan
-    if "_" in text:
-        raise FileFormatError(f"{text!r} is no number.")
-    return float(text)
-
-
-def _lines(text: str) -> list[str]:
-    """Return the lines of a text; raise an error if the last one may be cut off."""
-    if not text.endswith("\n"):
+        verb = "written" if formats is WRITERS else "read"
         raise FileFormatError(
-            "its last line has no end, so that a number may be cut off. If the file is whole, end it "
-            "with a line break."
+            f"Files of landmarks that are {verb} end in {', '.join(formats)}; it is {path}."
         )
-    return [line.strip() for line in text.splitlines()]
-
-
-def _numbered(lines: Sequence[str], scale: float = 1.0) -> Landmarks:
-    """Return the points of lines of three numbers, named by their own numbers."""
-    for line in lines:
-        if len(line.split()) != 3:
-            raise FileFormatError(f"a point must have three numbers; a line is {line!r}.")
-    rows = [[_number(word) for word in line.split()] for line in lines]
-    names = [str(number + 1) for number in range(len(rows))]
-    return Landmarks(names, scale * np.reshape(rows, (-1, 3)))
-
-
-def _by_name(names: Sequence[str], found: Sequence[Landmarks]) -> Table:
-    for number, name in enumerate(names):
-        if name in names[:number]:
-            raise FileFormatError(f"specimens must have different names; two are {name!r}.")
-    return dict(zip(names, found, strict=True))
+    return suffix
 
 
 def _texts(landmarks: Landmarks) -> list[list[str]]:
@@ -239,33 +328,51 @@ def _texts(landmarks: Landmarks) -> list[list[str]]:
     ]
 
 
-def _parse_markups(text: str, stem: str) -> Table:
-    rows: dict[str, int] = {}
-    places: list[list[float]] = []
+def _parse_markups(text: str, stem: str) -> Parsed:
+    rows: dict[tuple[str, tuple[float, ...]], int] = {}  # by label and place, of curves
+    labels: list[str] = []
+    places: list[tuple[float, ...]] = []
     curves = []
+    units: set[str] = set()
+    n_semilandmarks = 0
     for markup in json.loads(text)["markups"]:
         is_curve = markup.get("type") in ("Curve", "ClosedCurve")
         signs = _signs(markup.get("coordinateSystem", "LPS"))
+        units.add(_unit_of(markup.get("coordinateUnits")))
         members = []
         for point in markup["controlPoints"]:
-            name = str(point.get("label") or point.get("id") or len(rows) + 1).strip()
-            place = [np.nan] * 3
+            label = str(point.get("label") or point.get("id") or len(labels) + 1).strip()
+            place: tuple[float, ...] = (np.nan,) * 3
             if point.get("positionStatus", "defined") == "defined":
                 if len(point["position"]) != 3:
                     raise FileFormatError(
-                        f"a point must have three numbers; {name!r} is {point['position']}."
+                        f"a point must have three numbers; {label!r} is {point['position']}."
                     )
-                place = [sign * float(x) for sign, x in zip(signs, point["position"], strict=True)]
+                pairs = zip(signs, point["position"], strict=True)
+                place = tuple(sign * float(x) for sign, x in pairs)
             # Points of curves may be landmarks of another list, too: one point has one row.
-            if not (is_curve and name in rows and places[rows[name]] == place):
-                if name in rows:
-                    raise FileFormatError(f"names must differ; two points are {name!r}.")
-                rows[name] = len(rows)
+            if not (is_curve and (label, place) in rows):
+                rows[label, place] = len(labels)
+                labels.append(label)
                 places.append(place)
-            members.append(rows[name])
+                n_semilandmarks += not is_curve and is_semilandmark(point.get("description", ""))
+            members.append(rows[label, place])
         if is_curve:
             curves.append(members + members[:1] * (markup["type"] == "ClosedCurve"))
-    return {stem: Landmarks(rows, np.reshape(places, (-1, 3)), curves=curves)}
+    if len(units) > 1:
+        raise FileFormatError(
+            f"all lists must be in one unit; they are in {' and '.join(sorted(units))}. Write one file "
+            "for each."
+        )
+    points = np.reshape(places, (-1, 3))
+    return one_specimen(stem, labels, points, curves, n_semilandmarks, *units)
+
+
+def _unit_of(entry: Any) -> str:
+    """Return the unit of a list of Slicer: a text, or a code with its coding scheme and its meaning."""
+    if isinstance(entry, dict):
+        entry = entry.get("codeValue")
+    return str((entry[0] if isinstance(entry, list) else entry) or UNIT)
 
 
 def _format_markups(specimens: Table) -> str:
@@ -289,13 +396,16 @@ def _format_markups(specimens: Table) -> str:
 
 def _signs(system: str) -> tuple[float, float, float]:
     if system not in TO_LPS:
-        raise FileFormatError(f"the coordinate system must be LPS or RAS; it is {system!r}.")
+        raise FileFormatError(
+            f"the coordinate system must be LPS or RAS; it is {system!r}. Save the list again in Slicer."
+        )
     return TO_LPS[system]
 
 
-def _parse_fcsv(text: str, stem: str) -> Table:
+def _parse_fcsv(text: str, stem: str) -> Parsed:
     system, columns = "RAS", FCSV_COLUMNS.split(",")  # of files that do not name theirs
     names, places = [], []
+    n_semilandmarks = 0
     for line in text.splitlines():
         key, _, value = line.partition("=")
         if key.split() == ["#", "CoordinateSystem"]:
@@ -308,9 +418,11 @@ def _parse_fcsv(text: str, stem: str) -> Table:
             if len(row) < len(columns):
                 raise FileFormatError(f"a line must have {len(columns)} cells; one is {line!r}.")
             is_placed = (cells[STATUS_COLUMN:] or [PLACED])[0] not in NOT_PLACED
-            places.append([_number(row[axis]) if is_placed else np.nan for axis in "xyz"])
+            places.append([as_number(row[axis]) if is_placed else np.nan for axis in "xyz"])
             names.append(row["label"].strip() or str(len(places)))
-    return {stem: Landmarks(names, np.reshape(places, (-1, 3)) * _signs(system))}
+            n_semilandmarks += is_semilandmark(row.get("desc", ""))
+    points = np.reshape(places, (-1, 3)) * _signs(system)
+    return one_specimen(stem, names, points, semilandmarks=n_semilandmarks)
 
 
 def _format_fcsv(specimens: Table) -> str:
@@ -331,41 +443,6 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
     return lines.getvalue()
 
 
-def _parse_tps(text: str, _: str) -> Table:
-    blocks: list[tuple[dict[str, str], list[str]]] = []
-    for line in filter(None, _lines(text)):
-        key, equals, value = line.partition("=")
-        key = key.strip().upper()
-        if equals and key.startswith("LM"):
-            blocks.append(({}, []))
-        if not blocks:
-            raise FileFormatError(f"a .tps file must begin with LM3=; it begins with {line!r}.")
-        if not equals:
-            blocks[-1][1].append(line)
-        elif key in ("LM", "CURVES", "OUTLINES"):
-            raise FileFormatError(
-                f"points must be in space and in one list, LM3=; there is {line!r}."
-            )
-        else:
-            blocks[-1][0][key] = value.strip()
-    names, found = [], []
-    for number, (fields, lines) in enumerate(blocks):
-        if fields.keys() != blocks[0][0].keys():
-            odd = min(fields.keys() ^ blocks[0][0].keys())
-            raise FileFormatError(
-                f"all specimens, or none, must have {odd}=; specimen {number} differs."
-            )
-        scale = _number(fields.get("SCALE", "1"))
-        if fields["LM3"] != str(len(lines)) or not scale > 0:
-            raise FileFormatError(
-                f"LM3= must be the number of points, and SCALE= positive; specimen {number} has "
-                f"LM3={fields['LM3']}, {len(lines)} points and a scale of {scale}."
-            )
-        names.append(fields.get("ID") or fields.get("IMAGE") or str(number + 1))
-        found.append(_numbered(lines, scale))
-    return _by_name(names, found)
-
-
 def _format_tps(specimens: Table) -> str:
     lines = []
     for name, landmarks in specimens.items():
@@ -374,10 +451,10 @@ def _format_tps(specimens: Table) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _parse_morphologika(text: str, _: str) -> Table:
+def _parse_morphologika(text: str, _: str) -> Parsed:
     sections: dict[str, list[str]] = {}
     section = sections.setdefault("", [])
-    for line in filter(None, _lines(text)):
+    for line in filled_lines(text):
         if line.startswith("["):
             section = sections.setdefault(line.strip("[]").strip().lower(), [])
         else:
@@ -386,12 +463,14 @@ def _parse_morphologika(text: str, _: str) -> Table:
     # Each specimen has a line before its points: an apostrophe and its number or name.
     lines = [line for line in sections["rawpoints"] if not line.startswith("'")]
     names = sections.get("names") or [str(number + 1) for number in range(n)]
-    if len(lines) != n * k or len(names) != n or sections["dimensions"] != ["3"]:
+    n_axes = int(sections["dimensions"][0])
+    if len(lines) != n * k or len(names) != n or n_axes not in (2, 3):
         raise FileFormatError(
-            f"there must be {n} names and {n} times {k} points in 3 dimensions; there are "
-            f"{len(names)} names and {len(lines)} points in {sections['dimensions'][0]}."
+            f"there must be {n} names and {n} times {k} points in 2 or 3 dimensions; there are "
+            f"{len(names)} names and {len(lines)} points in {n_axes}."
         )
-    return _by_name(names, [_numbered(lines[row : row + k]) for row in range(0, n * k, k)])
+    points = points_of(lines, n_axes).reshape(n, k, 3)
+    return Parsed(by_name(names, map(numbered, points)), (PLANAR,) * (n_axes == 2))
 
 
 def _format_morphologika(specimens: Table) -> str:
@@ -403,8 +482,8 @@ def _format_morphologika(specimens: Table) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _parse_csv(text: str, _: str) -> Table:
-    reader = csv.DictReader(_lines(text), strict=True)
+def _parse_csv(text: str, _: str) -> Parsed:
+    reader = csv.DictReader(filled_lines(text), strict=True)
     absent = set(CSV_COLUMNS[:-1]) - set(reader.fieldnames or ())
     if absent:
         raise FileFormatError(
@@ -420,11 +499,11 @@ def _parse_csv(text: str, _: str) -> Table:
         found.setdefault(specimen, []).append(cells)
     specimens = {}
     for specimen, lines in found.items():
-        numbers = np.array([[_number(cell) for cell in cells[1:]] for cells in lines])
+        numbers = np.array([[as_number(cell) for cell in cells[1:]] for cells in lines])
         points, spread = numbers[:, :3], numbers[:, 3]
         names = [cells[0] for cells in lines]
         specimens[specimen] = Landmarks(names, points, None if np.isnan(spread).all() else spread)
-    return specimens
+    return Parsed(specimens)
 
 
 def _format_csv(specimens: Table) -> str:
@@ -440,11 +519,35 @@ def _format_csv(specimens: Table) -> str:
     return csv_text(rows)
 
 
-FORMATS: dict[str, tuple[Callable[[str, str], Table], Callable[[Table], str]]] = {
-    ".mrk.json": (_parse_markups, _format_markups),
-    ".fcsv": (_parse_fcsv, _format_fcsv),
-    ".tps": (_parse_tps, _format_tps),
-    ".txt": (_parse_morphologika, _format_morphologika),
-    ".csv": (_parse_csv, _format_csv),
+PARSERS: dict[str, Callable[[str, str], Parsed]] = {
+    ".mrk.json": _parse_markups,
+    ".json": _parse_markups,
+    ".fcsv": _parse_fcsv,
+    ".tps": parse_tps,
+    ".txt": _parse_morphologika,
+    ".csv": _parse_csv,
+    ".nts": parse_nts,
+    ".dta": parse_nts,
+    ".pts": parse_landmark_editor,
+    ".pp": parse_picked_points,
+    ".landmarkAscii": parse_amira,
+}
+WRITERS: dict[str, Callable[[Table], str]] = {
+    ".mrk.json": _format_markups,
+    ".fcsv": _format_fcsv,
+    ".tps": _format_tps,
+    ".txt": _format_morphologika,
+    ".csv": _format_csv,
 }
 OF_ONE = (".mrk.json", ".fcsv")
+# Files that a folder of landmarks may hold; other things end in .txt, .csv, .json and .dta, too.
+IN_FOLDERS = (*OF_ONE, ".tps", ".nts", ".pts", ".pp", ".landmarkAscii")
+OPEN_ENDED = (
+    ".tps",
+    ".txt",
+    ".csv",
+    ".nts",
+    ".dta",
+    ".pts",
+    ".landmarkAscii",
+)  # without an end mark

@@ -6,6 +6,7 @@ import type { Beside } from "./core/beside";
 import { Cloud } from "./core/cloud";
 import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile } from "./core/dom";
 import type { Film } from "./core/film";
+import { Skin, stackImages } from "./core/skin";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
 import { FolderDialog } from "./folders";
@@ -352,6 +353,7 @@ export class Studio {
       if (state !== this.state) return this.showing; // a newer one has come meanwhile
       this.viewer.setMesh(points, faces, state.up, state.towards);
       this.viewer.shape = shape;
+      if (state.n_images >= 0) this.loadSkin(state).catch((error) => this.fail(error));
       this.cloud?.remove();
       const cloud = state.n_points && (await this.backend.array<Float32Array>("points"));
       if (state !== this.state) return this.showing;
@@ -382,7 +384,21 @@ export class Studio {
       this.timer = window.setTimeout(() => this.refresh().catch((error) => this.fail(error)), POLL);
   }
 
+  /** Let the shape look as its file says, after the first picture of it. */
+  private async loadSkin({ shape, n_images }: State): Promise<void> {
+    const numbers = Array.from({ length: n_images }, (_, number) => number);
+    const [rows, corners, ...files] = await Promise.all([
+      this.backend.array<Float32Array>("skin/rows"),
+      this.backend.array<Uint32Array>("skin/corners"),
+      ...numbers.map((number) => this.backend.array<Uint8Array<ArrayBuffer>>(`skin/${number}`)),
+    ]);
+    const images = await stackImages(files);
+    if (this.viewer.shape !== shape) return images.dispose();
+    this.viewer.setSkin(new Skin(this.viewer.surface, rows, corners, images));
+  }
+
   refreshPanels(): void {
+    this.strip?.refresh();
     if (this.active) this.addPanels();
     this.large.refresh(this.state);
     for (const { panel } of this.pages.values()) panel.refresh(this.state);

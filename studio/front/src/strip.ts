@@ -23,6 +23,7 @@ export class Strip {
         viewer.edges.show(this.toggle("edges"));
         viewer.invalidate();
       },
+      texture: () => viewer.showTexture(this.toggle("texture")),
       cut: () => {
         form.get("cut-menu").hidden = !this.toggle("cut");
         this.cut();
@@ -45,12 +46,18 @@ export class Strip {
         app.refreshPanels(); // the hint says what a finger does
       },
     });
-    const keys = { E: "edges", X: "cut", M: "measure", F: "film" };
+    const keys = { E: "edges", X: "cut", M: "measure", F: "film", I: "texture" };
     for (const [key, name] of Object.entries(keys))
       app.shortcut(key, `Picture: ${name}`, () => form.get(name).click());
     form.get("film-page").hidden = !app.state.capabilities.includes("finish");
     this.showFinger();
+    this.refresh();
     viewer.stage.append(form.root);
+  }
+
+  /** Only a shape whose file says how it looks can be seen without that. */
+  refresh(): void {
+    this.form.get("texture").hidden = this.app.state.n_images < 0;
   }
 
   /** Films belong to the panel that is shown. */

@@ -6,6 +6,7 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.repairs.orient import orient
 from eigenshape.geometry.repairs.repair import REPAIRS, repair, suggest_repairs
 from eigenshape.geometry.repairs.repair_names import MESH_REPAIRS
 from eigenshape.geometry.repairs.repair_steps import (
@@ -14,7 +15,6 @@ from eigenshape.geometry.repairs.repair_steps import (
     drop_duplicate_faces,
     drop_unreferenced,
     largest_component,
-    orient,
     weld,
     weld_seams,
 )

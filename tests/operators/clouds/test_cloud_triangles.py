@@ -58,8 +58,14 @@ def test_bad_input_is_named():
     with pytest.raises(InvalidShapeError, match="Points must differ; points 0"):
         local_triangles(PointCloud(np.vstack([points, points[:1]]), dim=2))
     line = np.column_stack([np.arange(9.0), np.zeros(9), np.zeros(9)])
-    with pytest.raises(InvalidShapeError, match="Every point must have a triangle"):
+    with pytest.raises(InvalidShapeError, match="points of a cloud must span 2 dimensions"):
         local_triangles(PointCloud(line, dim=2))
+    beside = PointCloud(np.vstack([line, [4.0, 9, 0]]), dim=2)
+    with pytest.raises(
+        InvalidShapeError, match=r"must have a triangle; .* its 3 neighbors .* Try more n_neighbors"
+    ):
+        local_triangles(beside, n_neighbors=3)
+    assert len(local_triangles(beside, n_neighbors=9)) >= 10
     with pytest.raises(InvalidParameterError, match="n_neighbors must lie in 3"):
         robust_laplacian(cloud, n_neighbors=2)
     with pytest.raises(InvalidParameterError, match="n_neighbors must not be given for a mesh"):

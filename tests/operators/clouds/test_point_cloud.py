@@ -145,3 +145,9 @@ def test_scales_are_as_for_meshes():
         InvalidParameterError, match=r"A kernel must reach the neighbors, h ≥ e; h = 2√t is 0\.5"
     ):
         point_cloud_laplacian(cloud, edge_factor=0.5)
+    for size in np.random.default_rng(0).uniform(1, 9, 9):
+        other = PointCloud(size * cloud.points)
+        with pytest.raises(InvalidParameterError, match="Choose t = e² = ") as refusal:
+            point_cloud_laplacian(other, t=1e-6)
+        named = float(str(refusal.value).split("e² = ")[1].split(",")[0])
+        assert point_cloud_laplacian(other, t=named).n_points == 200

@@ -1,6 +1,7 @@
 from .collecting import doubtful_landmarks as doubtful_landmarks
 from .collecting import find_landmarks as find_landmarks
-from .collecting import landmarks_outside as landmarks_outside
+from .collecting import given_landmarks as given_landmarks
+from .collecting import mostly_doubtful as mostly_doubtful
 from .collecting import unsure_sides as unsure_sides
 from .collection_report import write_collection_report as write_collection_report
 from .condensing import condense_file as condense_file
@@ -8,6 +9,7 @@ from .condensing import join_tables as join_tables
 from .condensing import require_table as require_table
 from .condensing import run_in_workers as run_in_workers
 from .condensing import write_table as write_table
+from .facts import note_seams as note_seams
 from .facts import shape_facts as shape_facts
 from .indexing import choose_shapes as choose_shapes
 from .indexing import describe_all as describe_all
@@ -24,7 +26,7 @@ from .parts import find_features as find_features
 from .parts import find_tree as find_tree
 from .parts import part_rows as part_rows
 from .parts import print_rows as print_rows
-from .reading import load_mesh as load_mesh
+from .parts import regions_of_patches as regions_of_patches
 from .reading import load_poses as load_poses
 from .reading import load_repaired as load_repaired
 from .reading import load_shape as load_shape

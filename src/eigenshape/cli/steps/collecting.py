@@ -1,76 +1,89 @@
 """Landmarks beside the specimens of a collection: which are given, and where a person should look."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from eigenshape._errors import InvalidParameterError
+from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape.collections.carrying import CarriedLandmarks
-from eigenshape.collections.collection import Collection
-from eigenshape.collections.spread_points import mean_radius
-from eigenshape.geometry.distances.closest import closest_points
+from eigenshape.collections.collection import Collection, read_specimen
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.folders import find_items
-from eigenshape.morphometrics.landmark_files import OF_ONE, read_landmarks, read_specimens
-from eigenshape.morphometrics.landmarks import Landmarks, require_same_names
+from eigenshape.morphometrics.landmark_files import read_folder, read_specimens
+from eigenshape.morphometrics.landmarks import Landmarks
+from eigenshape.morphometrics.placement import require_on_surfaces
 
 MOST_NAMED = 5  # specimens that a sentence names
-OUTSIDE = 0.1  # distance of landmarks from their surface to be noted, in root mean square radii
 
 
-def find_landmarks(folder: Path, landmarks: Path | None, output: Path) -> dict[str, Landmarks]:
+def find_landmarks(
+    folder: Path, landmarks: Path | None, output: Path, unit: str
+) -> dict[str, Landmarks]:
     """Read the landmarks that are given: from a table, or from files beside meshes or in a folder.
 
     Raise InvalidParameterError if one is of no specimen of the folder, since its name may be
-    misspelled.
+    misspelled, or does not lie on its surface.
     """
-    if landmarks is not None and not landmarks.is_dir():
-        found, source = read_specimens(landmarks), landmarks
+    source = landmarks or folder
+    if source == folder or source.is_dir():
+        found = read_folder(source, unit, output)
     else:
-        source = landmarks or folder
-        found = {}
-        for path in sorted(source.rglob("*")):
-            suffix = next((each for each in OF_ONE if path.name.lower().endswith(each)), None)
-            if suffix is None or output.absolute() in path.absolute().parents:
-                continue
-            name = path.relative_to(source).as_posix()[: -len(suffix)]
-            if name in found:
-                raise InvalidParameterError(
-                    f"A specimen must have one file of landmarks; {name!r} has two in {source}."
-                )
-            found[name] = read_landmarks(path)
-    names = {item.name for item in find_items(folder)}
-    unknown = sorted(found.keys() - names)
+        found = read_specimens(source, unit=unit)
+    paths = {item.name: item.path for item in find_items(folder)}
+    unknown = sorted(found.keys() - paths.keys())
     if unknown:
         raise InvalidParameterError(
             f"Landmarks must be of specimens in {folder}; {unknown[0]!r} of {source} is none. The "
-            f"specimens are {', '.join(sorted(names)[:5])}{', ...' if len(names) > 5 else ''}"
+            f"specimens are {', '.join(sorted(paths)[:5])}{', ...' if len(paths) > 5 else ''}"
         )
     if landmarks is not None and not found:
         raise InvalidParameterError(
-            f"--landmarks takes a table, or a folder of files NAME.mrk.json or NAME.fcsv; {source} "
-            "holds none."
+            f"--landmarks takes a table, or a folder of files such as NAME.mrk.json; {source} holds "
+            "none."
         )
-    if found:
-        require_same_names(found)
+    require_on_surfaces(_readable(found, paths))
     return found
 
 
-def landmarks_outside(collection: Collection, labelled: Mapping[str, Landmarks]) -> list[str]:
-    """Name the specimens whose landmarks do not lie on them, as in another frame or unit."""
-    found = []
-    for name, landmarks in labelled.items():
-        own = collection.points[collection.number(name)]
-        known = landmarks.points[np.isfinite(landmarks.points).all(axis=1)]
-        if not len(known):
+def _readable(
+    landmarks: Mapping[str, Landmarks], paths: Mapping[str, Path]
+) -> Iterator[tuple[str, TriangleMesh, Landmarks]]:
+    """Give the surfaces with landmarks one by one; what cannot be read is named as a failure later."""
+    for name, own in landmarks.items():
+        try:
+            mesh, _ = read_specimen(paths[name])
+        except (EigenshapeError, OSError):
             continue
-        nearest = closest_points(TriangleMesh(own, collection.mean.faces), known).points
-        away = float(np.median(np.linalg.norm(nearest - known, axis=1)))
-        if away > OUTSIDE * mean_radius(own):
+        yield name, mesh, own
+
+
+def given_landmarks(carried: CarriedLandmarks) -> dict[str, dict[str, dict[str, float | None]]]:
+    """Return the distance and the disagreement of each given landmark, by specimen and name."""
+    found: dict[str, dict[str, dict[str, float | None]]] = {}
+    for i, j in np.argwhere(carried.given):
+        apart = float(carried.disagreement[i, j])
+        found.setdefault(carried.specimens[i], {})[carried.names[j]] = {
+            "distance": float(carried.distance[i, j]),
+            "disagreement": None if np.isnan(apart) else apart,
+        }
+    return found
+
+
+def mostly_doubtful(carried: CarriedLandmarks) -> list[str]:
+    """Name the specimens whose given landmarks are doubtful for the most part, with what is known."""
+    found = []
+    for row, name in enumerate(carried.specimens):
+        given = carried.given[row]
+        n_given, n_doubtful = int(given.sum()), int(carried.doubtful[row, given].sum())
+        if 2 * n_doubtful > n_given:
+            apart = carried.disagreement[row, given]
+            others = f" and {np.nanmedian(apart):.3g} from where others put them"
             found.append(
-                f"those of {name} lie {away:.3g} from its surface (median), so they are in another "
-                "frame or unit than the mesh"
+                f"{n_doubtful} of {n_given} of {name} are doubtful: they lie "
+                f"{np.median(carried.distance[row, given]):.3g} from its surface"
+                f"{others if np.isfinite(apart).any() else ''} (medians). They may be of another "
+                "specimen, moved, turned or mirrored."
             )
     return found
 

@@ -5,12 +5,14 @@ from typing import Any
 import numpy as np
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape.cli.console import err
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import bounding_box, edge_lengths, enclosed_volume, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import suggest_repairs
 from eigenshape.geometry.repairs.repair_steps import drop_duplicate_points
+from eigenshape.geometry.seams import seams
 from eigenshape.geometry.simplices import degenerate_simplices, mean_side_length, simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import (
@@ -21,7 +23,6 @@ from eigenshape.geometry.topology import (
     non_manifold_edges,
     non_manifold_vertices,
     repeated_simplices,
-    seams,
     unreferenced_vertices,
     vertex_components,
 )
@@ -42,6 +43,16 @@ def shape_facts(shape: Shape) -> dict[str, Any]:
     low, high = bounding_box(shape)
     facts |= {"box_low": low.tolist(), "box_high": high.tolist()}
     return facts | {"repairs_to_try": list(suggest_repairs(shape))}
+
+
+def note_seams(shape: Shape) -> None:
+    """Print on stderr that a mesh is open along seams."""
+    n_seams = 0 if isinstance(shape, PointCloud) else len(seams(shape))
+    if n_seams:
+        err.print(
+            f"[yellow]note:[/] this shape is open along seams ({n_seams} sides), which no heat "
+            "crosses; --repair weld_seams closes them"
+        )
 
 
 def _cloud_facts(cloud: PointCloud) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from jaxtyping import Int
 
 from eigenshape._progress import Progress
 from eigenshape.cli.console import print_table
+from eigenshape.deformation.patches import regions_of_patches
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.contrast import PART_CONTRAST
 from eigenshape.features.parts import find_parts, smooth_cut
@@ -19,6 +20,8 @@ from eigenshape.geometry.orientation import orient_closed_outward
 from eigenshape.retrieval.heat.features import HeatFeatures, find_heat_features
 from eigenshape.retrieval.heat.recipe import PRESETS, HeatRecipe
 from eigenshape.spectral.signatures.approximate_heat import LARGE, USUAL_ACCURACY
+
+__all__ = ["regions_of_patches"]  # for the verbs, as it is, beside what is defined here
 
 
 def find_features(

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from scipy.spatial import cKDTree
 
 from eigenshape._errors import EigenshapeError, InvalidParameterError
@@ -33,7 +34,10 @@ __all__ = ["read_map"]  # for the verbs, as it is, beside what is defined here
 def load_surface(path: Path, repairs: str) -> TriangleMesh:
     """Read a surface, as `es.io.read_surface`, and print on stderr what was made of it or repaired."""
     done = read_surface(path, repair=repair_names(repairs))
-    print_repairs(done.report)
+    report = done.report
+    if report and not np.array_equal(done.source_vertices, np.arange(done.mesh.n_vertices)):
+        report += (f"vertices have new numbers, up to {done.mesh.n_vertices - 1:,}",)
+    print_repairs(report)
     return done.mesh
 
 

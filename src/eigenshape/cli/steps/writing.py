@@ -17,11 +17,13 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.formats.registry import (
     HEMISPHERES,
+    SHAPE_FORMATS,
     UPRIGHT,
     WITH_COLORS,
     WITH_MORE,
     WRITTEN,
     suffix_in,
+    suffix_of,
 )
 from eigenshape.io.labeled_shapes import write_labels
 from eigenshape.io.mesh_files import read_mesh, save_mesh, write_mesh
@@ -123,7 +125,7 @@ def save_like(
         The scene that was read.
     """
     attributes = None
-    if suffix_in(source.name) in WITH_MORE:
+    if suffix_of(source, None, SHAPE_FORMATS) in WITH_MORE:
         try:
             found = read_mesh(source, attributes=True, drop_missing=True, scene=scene)[1]
             attributes = carry_attributes(found, mesh)

@@ -11,8 +11,10 @@ from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest_loops import nearest_faces, windings
 from eigenshape.geometry.distances.crossing_loops import box_tree, curve_places, face_boxes
+from eigenshape.geometry.distances.nesting import find_pieces
+from eigenshape.geometry.face_turns import face_turns
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.orientation import faces_to_turn, orient_outward
+from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.geometry.simplices import in_length, size_one
@@ -150,11 +152,13 @@ def signed_distance(mesh: MeshLike, points: ArrayLike) -> Float[np.ndarray, " p"
     corners, places, scale = _scale_both(mesh, points)
     # A closed piece, or an open mesh as a whole, must not look inward.
     require_oriented(mesh)
-    turned, _, _ = faces_to_turn(mesh)
-    if turned.any():
+    pieces = find_pieces(mesh, face_turns(mesh))
+    solid_inward = (pieces.sides < 0) & (pieces.depths % 2 == 0)
+    inward = solid_inward[pieces.of_faces]
+    if inward.any():
         raise InvalidShapeError(
             "Faces must look outward, or inside and outside change places; face "
-            f"{np.argmax(turned)} looks inward ({np.count_nonzero(turned)} such). "
+            f"{np.argmax(inward)} looks inward ({np.count_nonzero(inward)} such). "
             'Try repair(mesh, ["orient"]).'
         )
     if not is_closed(mesh) and orient_outward(mesh) is not mesh:

@@ -1,7 +1,7 @@
 """Self-intersections of a surface."""
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.crossing_loops import crossing_pairs, curve_places, face_boxes
@@ -63,9 +63,14 @@ def self_intersections(mesh: MeshLike) -> Int[np.ndarray, "p 2"]:
     """
     mesh = as_mesh(mesh)
     corners, _ = scaled_corners(mesh)
-    points = np.ldexp(np.rint(np.ldexp(corners.reshape(-1, 3), FINEST)), -FINEST)
+    points = round_finely(corners.reshape(-1, 3))
     boxes = face_boxes(points)
     order = np.argsort(curve_places(boxes), kind="stable")
     found = order[crossing_pairs(points.reshape(-1, 3, 3)[order].reshape(-1, 3), boxes[order])]
     found.sort(axis=1)
     return found[np.lexsort((found[:, 1], found[:, 0]))]
+
+
+def round_finely(coordinates: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """Round coordinates of size 1 so that no product of three underflows in `predicate_loops`."""
+    return np.ldexp(np.rint(np.ldexp(coordinates, FINEST)), -FINEST)

@@ -13,6 +13,7 @@ from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.holes import fill_holes
 from eigenshape.geometry.repairs.one_sided import cut_one_sided
+from eigenshape.geometry.repairs.orient import orient
 from eigenshape.geometry.repairs.repair_names import (
     CLOUD_REPAIRS,
     MESH_REPAIRS,
@@ -27,7 +28,6 @@ from eigenshape.geometry.repairs.repair_steps import (
     drop_duplicate_points,
     drop_unreferenced,
     largest_component,
-    orient,
     weld,
     weld_seams,
 )
@@ -150,15 +150,17 @@ def repair(
     `drop_degenerate`, `drop_unreferenced` and, on surfaces, `orient` change the mesh, until none
     does. On a cloud it is `drop_duplicate_points`. It fills no hole and removes no component.
 
-    `weld` joins vertices at the same place, and so closed pieces that touch; `weld_seams` joins only
-    boundary edges that lie on each other. `collapse_needles` joins the ends of sides shorter than a
-    millionth of the longest side of their face, or a billionth of the longest side of the mesh.
-    `drop_degenerate` removes faces without area and splits the neighbor on their longest side, so
-    that no slit opens. `drop_duplicate_faces` and `drop_duplicate_points` keep the first of equal
-    ones. `orient` turns faces so that neighbors agree and closed pieces face outward; a piece that
-    has one side only is left, until `cut_one_sided` cuts it open. `largest_component` keeps the
-    component with the most area. `fill_holes` closes boundary loops by faces with the least sum of
-    areas (Barequet and Sharir 1995), without new vertices.
+    `weld` joins vertices at the same place, and so closed pieces that touch; `weld_seams` joins
+    only boundary edges that lie on each other, up to the rounding of stored coordinates: of single
+    precision, of decimals in text, or of double precision. `collapse_needles` joins the ends of
+    sides shorter than a millionth of the longest side of their face, or a billionth of the longest
+    side of the mesh. `drop_degenerate` removes faces without area and splits the neighbor on their
+    longest side, so that no slit opens. `drop_duplicate_faces` and `drop_duplicate_points` keep the
+    first of equal ones. `orient` turns faces so that neighbors agree, closed pieces face outward
+    and those inside an odd number of others inward, as cavities do; a piece that has one side only
+    is left, until `cut_one_sided` cuts it open. `largest_component` keeps the component with the
+    most area. `fill_holes` closes boundary loops by faces with the least sum of areas (Barequet and
+    Sharir 1995), without new vertices.
 
     Examples
     --------

@@ -8,11 +8,9 @@ from scipy.spatial import cKDTree
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.face_turns import turn_faces
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.orientation import faces_to_turn
 from eigenshape.geometry.repairs.repair_report import (
     MeshT,
     RepairedCloud,
@@ -20,6 +18,7 @@ from eigenshape.geometry.repairs.repair_report import (
     count_nouns,
     simplex_noun,
 )
+from eigenshape.geometry.seams import seams
 from eigenshape.geometry.simplices import (
     MEASURES,
     degenerate_simplices,
@@ -33,7 +32,6 @@ from eigenshape.geometry.topology import (
     number_places,
     repeated_simplices,
     require_simplices_everywhere,
-    seams,
     submesh,
     unreferenced_vertices,
     vertex_components,
@@ -74,12 +72,18 @@ def weld(mesh: MeshT, *, tolerance: float = 0.0) -> RepairedMesh[MeshT]:
 def weld_seams(mesh: MeshT) -> RepairedMesh[MeshT]:
     """Join boundary edges that lie on each other, such as the seams of a surface that was cut open.
 
-    This also connects a soup of separate triangles. Pieces that touch without such a seam, as
-    closed pieces do, stay apart. Only edges on the boundary change: they get two faces or more.
+    Edges may be apart by the rounding of stored coordinates, as `seams` tells. This also connects a
+    soup of separate triangles. Pieces that touch without such a seam, as closed pieces do, stay
+    apart. Only edges on the boundary change: they get two faces or more.
     """
     one, two = seams(mesh).transpose(1, 0, 2).reshape(2, -1)
     _, group = label_components(mesh.n_points, one, two)
-    return _merge_vertices(mesh, group, "weld_seams joined {} along seams")
+    gaps, scale = size_one(mesh.points[one] - mesh.points[two])
+    widest = scale * float(np.linalg.norm(gaps, axis=1).max(initial=0.0))
+    report = "weld_seams joined {} along seams"
+    if widest > 0:
+        report += f", which were open by up to {widest:.2g}"
+    return _merge_vertices(mesh, group, report)
 
 
 def _merge_vertices(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> RepairedMesh[MeshT]:
@@ -221,29 +225,6 @@ def drop_unreferenced(mesh: MeshT) -> RepairedMesh[MeshT]:
     noun = "face" if mesh.dim == 2 else "simplex"
     report = f"drop_unreferenced removed {count_nouns(n_loose, 'vertex')} without a {noun}"
     return RepairedMesh(kept, (report,), source)
-
-
-def orient(mesh: TriangleMesh) -> RepairedMesh[TriangleMesh]:
-    """Turn faces over so that neighbors agree and pieces face outward.
-
-    In each piece the smaller group of faces is turned. Then each piece is turned as a whole if that
-    makes it face outward. A piece that cannot be oriented, such as a Möbius strip, is left as it
-    is, and the report names one of its faces.
-
-    A closed piece faces outward if its signed volume is positive. A closed piece inside another one
-    is turned together with the outermost, because it may be a cavity. An open piece whose faces
-    disagreed is turned by `orient_outward`; an open piece whose faces agreed is left as it is.
-    Pieces end at edges with more than two faces.
-    """
-    turned, one_sided, piece = faces_to_turn(mesh)
-    report = f"orient turned {count_nouns(int(turned.sum()), 'face')} over"
-    if one_sided.any():
-        # The report names the first face of each of the first nine such pieces.
-        first = np.flatnonzero(one_sided)[np.unique(piece[one_sided], return_index=True)[1]]
-        names = ", ".join(map(str, first[:9]))
-        report += f", left {count_nouns(len(first), 'piece')} with one side only, of face {names}"
-        report += " and others" if len(first) > 9 else ""
-    return RepairedMesh(turn_faces(mesh, turned), (report,), np.arange(mesh.n_vertices))
 
 
 def largest_component(mesh: TriangleMesh) -> RepairedMesh[TriangleMesh]:

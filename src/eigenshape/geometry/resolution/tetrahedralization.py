@@ -9,12 +9,15 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.crossings import self_intersections
+from eigenshape.geometry.distances.nesting import Pieces, find_pieces
+from eigenshape.geometry.face_turns import face_turns, turn_faces
+from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.measure import enclosed_volume
-from eigenshape.geometry.orientation import orient_closed_outward
+from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
 from eigenshape.geometry.simplices import simplex_volumes, size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.geometry.topology import boundary_edges, non_manifold_edges
+from eigenshape.geometry.topology import edge_table, number_places
 
 WITHOUT_LIMIT = 1e10  # Netgen's own; the surface has size 1
 ONE_MESHER = Lock()  # Netgen keeps what it is doing in global variables
@@ -31,7 +34,8 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
     ----------
     mesh : MeshLike
         Closed, without crossings, of one piece or more. A piece inside another one is a cavity, and
-        its faces must look into it.
+        its faces must look into it; a piece inside a cavity is filled again. Pieces may touch where
+        they share vertices.
     side_length : float, optional
         Largest length of sides to aim at inside, in the unit of coordinates. By default, sides
         grow from those of the surface inward.
@@ -46,8 +50,9 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
     InvalidParameterError
         If `side_length` is not positive.
     InvalidShapeError
-        If the surface has a boundary, an edge with more than two faces, faces that cross or have no
-        area, or the tetrahedra do not fill what it encloses.
+        If the surface has a boundary, an edge with more than two faces of a piece, two vertices at
+        one place, faces that cross, have no area or look to the wrong side, or the tetrahedra do not
+        fill what it encloses.
     MissingExtraError
         If Netgen is not installed.
 
@@ -73,17 +78,9 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
     mesh = as_mesh(mesh)
     longest = None if side_length is None else positive_number(side_length, "side_length")
     require_sound(mesh)
-    crowded, open_edges = non_manifold_edges(mesh), boundary_edges(mesh)
-    if len(crowded) or len(open_edges):
-        fault = "more than two faces" if len(crowded) else "one face"
-        edge = (crowded if len(crowded) else open_edges)[0]
-        raise InvalidShapeError(
-            "Each edge of a surface to be filled must have two faces; edge "
-            f"({edge[0]}, {edge[1]}) has {fault} ({len(crowded)} edges with more, "
-            f'{len(open_edges)} with one). Try repair(mesh, ["auto", "fill_holes"]), or '
-            "--repair auto,fill_holes on the command line."
-        )
     require_oriented(mesh)
+    pieces = find_pieces(mesh, face_turns(mesh))
+    _require_closed(mesh, pieces)
     crossing = self_intersections(mesh)
     if len(crossing):
         one, two = crossing[0]
@@ -92,8 +89,16 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
             f"({len(crossing)} pairs). No repair here moves vertices; smooth or remesh it where it "
             "was made."
         )
+    _require_apart(mesh)
+    turned = (pieces.sides * (-1) ** pieces.depths < 0)[pieces.of_faces]
+    if turned.any() and not turned.all():
+        raise InvalidShapeError(
+            "Faces of a surface to be filled must look out of the solid, those of a cavity into the "
+            f"cavity; face {np.argmax(turned)} does not ({np.count_nonzero(turned)} such). "
+            'Try repair(mesh, ["orient"]), or --repair orient on the command line.'
+        )
+    surface = turn_faces(mesh, turned)
     netgen = import_extra("netgen.meshing", "'eigenshape[tetrahedralize]'")
-    surface = orient_closed_outward(mesh)
     points, scale = size_one(surface.vertices)
     center = points.mean(axis=0)
     with ONE_MESHER:
@@ -109,11 +114,52 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
     found = SimplicialMesh(points, corners) if len(corners) else None
     filled = 0.0 if found is None else float(simplex_volumes(found).sum())
     volume = enclosed_volume(surface)
-    if found is None or abs(filled - volume) > 1e-6 * volume:
+    # Where the triangles between an odd number of tetrahedra are those of the surface, the
+    # tetrahedra cover each point of the solid an odd number of times, and each point of a cavity
+    # and outside an even number of times. With the volume of the solid that is once and never.
+    if found is None or not _is_bounded_by(found, surface) or abs(filled - volume) > 1e-6 * volume:
         raise InvalidShapeError(
-            f"Tetrahedra must fill what the surface encloses, {volume:g}; Netgen filled {filled:g}. "
-            "Faces of a cavity must look into it, and pieces must not lie in each other otherwise. "
-            'Try repair(mesh, ["largest_component"]), or --repair largest_component on the command '
-            "line."
+            f"Tetrahedra must fill what the surface encloses, {volume:g}, and nothing else; "
+            f"Netgen filled {filled:g}. No repair here moves vertices; smooth or remesh it where it was made."
         )
     return found
+
+
+def _require_closed(mesh: TriangleMesh, pieces: Pieces) -> None:
+    """Raise an error if an edge does not have two faces of each piece that it belongs to."""
+    if pieces.closed.all():
+        return
+    table = edge_table(mesh)
+    edges = np.unique(table.face_edges[~pieces.closed[pieces.of_faces]])
+    edges = edges[table.n_faces[edges] != 2]
+    worst = edges[table.n_faces[edges].argmax()]
+    remedy = (
+        'Try repair(mesh, ["auto", "fill_holes"]), or --repair auto,fill_holes on the command line.'
+    )
+    if table.n_faces[worst] > 2:
+        remedy = "No repair here tells which of them to remove; do so where the surface was made."
+    raise InvalidShapeError(
+        "Each edge of a surface to be filled must have two faces of each piece; edge "
+        f"{table.edges[worst].tolist()} has {table.n_faces[worst]} ({len(edges)} such). {remedy}"
+    )
+
+
+def _require_apart(mesh: TriangleMesh) -> None:
+    """Raise an error if two vertices are at one place: there Netgen may end the process."""
+    place = number_places(mesh.vertices)
+    _, first = np.unique(place, return_index=True)
+    if len(first) < mesh.n_vertices:
+        doubles = np.delete(np.arange(mesh.n_vertices), first)
+        one, two = first[place[doubles[0]]], doubles[0]
+        raise InvalidShapeError(
+            f"Vertices of a surface to be filled must differ; {one} and {two} are both at "
+            f"{mesh.vertices[two].tolist()} ({len(doubles)} such). "
+            'Try repair(mesh, ["weld"]), or --repair weld on the command line.'
+        )
+
+
+def _is_bounded_by(solid: SimplicialMesh, surface: TriangleMesh) -> bool:
+    """Tell whether the triangles at an odd number of tetrahedra are those of the surface."""
+    table = facet_table(solid)
+    odd = table.facets[table.n_simplices % 2 == 1]
+    return np.array_equal(odd, np.unique(np.sort(surface.faces, axis=1), axis=0))

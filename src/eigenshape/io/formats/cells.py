@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, cast, get_args
+from itertools import chain
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape.geometry.polygons import triangulate_polygons
 from eigenshape.geometry.solids import N_TETRAHEDRA, split_solids
 from eigenshape.io.formats.registry import CellKind
 
@@ -18,21 +20,48 @@ N_CORNERS = {
 }  # fmt: skip
 SOLIDS = ("hexahedra", "wedges", "pyramids")
 NO_TRIANGLES = np.empty((0, 3), dtype=np.int64)
-Cells = dict[str, Int[np.ndarray, "_ _"]]  # corners, by CellKind or another kind of cell
+# Corners by CellKind or another kind of cell: arrays of rows, and CellLists of "polygons"
+Cells = dict[str, Any]
 SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
 # Largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7.
 FLAT = 1e-6
 
-VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, QUAD, TETRAHEDRON = 1, 2, 3, 4, 5, 9, 10
-HEXAHEDRON, WEDGE, PYRAMID = 12, 13, 14
-VTK_KINDS = {
-    LINE: SEGMENTS, TRIANGLE: "triangles", QUAD: "quads", TETRAHEDRON: "tetrahedra",
-    HEXAHEDRON: "hexahedra", WEDGE: "wedges", PYRAMID: "pyramids",
-}  # fmt: skip
-VTK_NAMES = {
-    6: "triangle strip", 7: "polygon", 8: "pixel", 11: "voxel",
-    21: "quadratic edge", 22: "quadratic triangle", 23: "quadratic quad", 24: "quadratic tetrahedron", 42: "polyhedron",
-}  # fmt: skip
+
+@dataclass(frozen=True)
+class CellLists:
+    """Lists of points of varying length: list i is corners[starts[i] : starts[i + 1]]."""
+
+    starts: Int[np.ndarray, " c1"]
+    corners: Int[np.ndarray, " k"]
+
+    @property
+    def lengths(self) -> Int[np.ndarray, " c"]:
+        """Number of points of each list."""
+        return np.diff(self.starts)
+
+    def rows(self, chosen: Int[np.ndarray, " s"], length: int) -> Int[np.ndarray, "s length"]:
+        """Return lists of equal length as rows."""
+        return self.corners[self.starts[chosen][:, None] + np.arange(length)]
+
+    def take(self, chosen: Int[np.ndarray, " s"]) -> "CellLists":
+        """Return the chosen lists."""
+        lengths = self.lengths[chosen]
+        ends = np.cumsum(lengths)
+        places = np.arange(lengths.sum()) + np.repeat(self.starts[chosen] - ends + lengths, lengths)
+        return CellLists(np.concatenate([[0], ends]), self.corners[places])
+
+    def pairs(self) -> Int[np.ndarray, "p 2"]:
+        """Return the pairs of successive points in each list."""
+        owner = np.repeat(np.arange(len(self.lengths)), self.lengths)
+        follows = owner[1:] == owner[:-1]
+        return np.column_stack([self.corners[:-1][follows], self.corners[1:][follows]])
+
+    @staticmethod
+    def join(parts: Sequence["CellLists"]) -> "CellLists":
+        """Return the lists of all parts, one after the other."""
+        lengths = [np.zeros(1, dtype=np.int64), *(part.lengths for part in parts)]
+        corners = [np.zeros(0, dtype=np.int64), *(part.corners for part in parts)]
+        return CellLists(np.cumsum(np.concatenate(lengths)), np.concatenate(corners))
 
 
 def require_kind(cells: str | None) -> CellKind | None:
@@ -56,16 +85,16 @@ def require_splittable(others: Sequence[str]) -> None:
 def select_cells(
     points: Float[np.ndarray, "n d"], blocks: Cells, cells: CellKind | None
 ) -> Int[np.ndarray, "s corners"]:
-    """Return the simplices of the requested kind, where each quad becomes two triangles.
+    """Return the simplices of the requested kind, where quads and polygons become triangles.
 
-    The kind "quads" includes the triangles between them, and "tetrahedra" those of hexahedra,
-    wedges and pyramids. Without cells the shape is (0, 3).
+    The kind "triangles" includes those of polygons, "quads" all triangles, and "tetrahedra" those of
+    hexahedra, wedges and pyramids. Without cells the shape is (0, 3).
 
     Raise FileFormatError if the file has no cells of the requested kind, and InvalidShapeError if a
-    hexahedron, wedge or pyramid cannot be split.
+    polygon crosses itself, or a hexahedron, wedge or pyramid cannot be split.
     """
+    blocks = dict(blocks)
     if FOUR_CORNERED in blocks:
-        blocks = dict(blocks)
         four = blocks.pop(FOUR_CORNERED)
         kind: str | None = "tetrahedra" if cells == "tetrahedra" else "quads"
         if cells is None:
@@ -77,13 +106,21 @@ def select_cells(
                 "read_mesh, and --cells in the commands info, spectrum and repair."
             )
         blocks[kind] = four
-    quads = fans(blocks["quads"]) if "quads" in blocks else NO_TRIANGLES
-    triangles = blocks.get("triangles", NO_TRIANGLES)
-    surface = np.concatenate([triangles, quads])
     tetrahedra = blocks.get("tetrahedra", np.empty((0, 4), dtype=np.int64))
     if cells in (None, "tetrahedra"):
         split = [split_solids(points, blocks[name]).simplices for name in SOLIDS if name in blocks]
         tetrahedra = np.concatenate([tetrahedra, *split])
+        if cells is None and len(tetrahedra):
+            return tetrahedra
+    triangles = blocks.get("triangles", NO_TRIANGLES)
+    if "polygons" in blocks:
+        polygons = blocks.pop("polygons")
+        cut, _ = triangulate_polygons(points, polygons.starts, polygons.corners)
+        blocks["triangles"] = triangles = np.concatenate([cut, triangles])
+    quads = NO_TRIANGLES
+    if cells in (None, "quads") and "quads" in blocks:
+        quads = polygon_triangles(points, blocks["quads"])
+    surface = np.concatenate([triangles, quads])
     found = {"tetrahedra": tetrahedra, "quads": surface, "triangles": triangles}
     if cells is not None:
         if not len(found[cells]):
@@ -92,8 +129,7 @@ def select_cells(
                 f"A file that is read with cells={cells!r} must hold {cells}; it holds {held}."
             )
         return found[cells]
-    by_dimension = [tetrahedra, surface, blocks.get(SEGMENTS, surface)]
-    return next((block for block in by_dimension if len(block)), surface)
+    return surface if len(surface) else blocks.get(SEGMENTS, surface)
 
 
 def split_sentence(blocks: Cells) -> str:
@@ -143,90 +179,39 @@ def _multiplicities(rows: Int[np.ndarray, "c p corners"]) -> Int[np.ndarray, "c 
     return counts[inverse.ravel()].reshape(rows.shape[:2])
 
 
-def fans(polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> Int[np.ndarray, "f 3"]:
-    """Split polygons into triangles around their first corner."""
-    if isinstance(polygons, np.ndarray):
-        first = np.broadcast_to(polygons[:, :1], polygons[:, 1:-1].shape)
-        return np.stack([first, polygons[:, 1:-1], polygons[:, 2:]], axis=2).reshape(-1, 3)
-    triangles = [
-        (corners[0], corners[place], corners[place + 1])
-        for corners in polygons
-        for place in range(1, len(corners) - 1)
-    ]
-    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
+def polygon_triangles(
+    points: Float[np.ndarray, "n d"],
+    polygons: Sequence[Sequence[int]] | Int[np.ndarray, "p c"],
+) -> Int[np.ndarray, "f 3"]:
+    """Cut polygons, lists of corners or rows of a table, into triangles."""
+    if isinstance(polygons, np.ndarray) and polygons.shape[1] == 3:
+        return polygons
+    lists = list_corners(polygons)
+    return triangulate_polygons(points, lists.starts, lists.corners)[0]
 
 
-def strip_triangles(strips: Sequence[Int[np.ndarray, " _"]]) -> Int[np.ndarray, "f 3"]:
-    """Split strips into triangles, every second one reversed so that all agree.
+def list_corners(lists: Sequence[Sequence[int]] | Int[np.ndarray, "p c"]) -> CellLists:
+    """Put lists of corners, or rows of a table, one behind the other."""
+    starts = np.cumsum([0, *map(len, lists)])
+    if isinstance(lists, np.ndarray):
+        return CellLists(starts, lists.ravel())
+    return CellLists(starts, np.array([*chain.from_iterable(lists)]).astype(np.int64))
+
+
+def strip_triangles(
+    strips: CellLists,
+) -> tuple[Int[np.ndarray, "f 3"], Int[np.ndarray, " f"]]:
+    """Split strips into triangles, every second one reversed so that all agree, and name their strips.
 
     A strip changes its direction by a repeated point. The triangles without area that result from
     this are left out.
     """
-    pieces = [np.empty((0, 3), dtype=np.int64)]
-    for corners in strips:
-        triangles = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
-        triangles[1::2] = triangles[1::2, [1, 0, 2]]
-        pieces.append(triangles)
-    found = np.concatenate(pieces).astype(np.int64)
-    first, second, third = found.T
-    return found[(first != second) & (second != third) & (third != first)]
-
-
-@dataclass(frozen=True)
-class CellLists:
-    """Lists of points of varying length: list i is corners[starts[i] : starts[i + 1]]."""
-
-    starts: Int[np.ndarray, " c1"]
-    corners: Int[np.ndarray, " k"]
-
-    @property
-    def lengths(self) -> Int[np.ndarray, " c"]:
-        """Number of points of each list."""
-        return np.diff(self.starts)
-
-    def rows(self, chosen: Int[np.ndarray, " s"], length: int) -> Int[np.ndarray, "s length"]:
-        """Return lists of equal length as rows."""
-        return self.corners[self.starts[chosen][:, None] + np.arange(length)]
-
-    def split(self) -> list[Int[np.ndarray, " _"]]:
-        """Return all lists, one by one."""
-        return np.split(self.corners, self.starts[1:-1])
-
-    def pairs(self, chosen: Int[np.ndarray, " s"]) -> Int[np.ndarray, "p 2"]:
-        """Return the pairs of successive points in lists."""
-        owner = np.repeat(np.arange(len(self.lengths)), self.lengths)
-        follows = (owner[1:] == owner[:-1]) & np.isin(owner[1:], chosen)
-        return np.column_stack([self.corners[:-1][follows], self.corners[1:][follows]])
-
-
-def cells_of_types(lists: CellLists, types: Int[np.ndarray, " c"]) -> Cells:
-    """Sort cells by their kind; ignore cells that are points.
-
-    Raise FileFormatError if a cell has another type, or its number of corners does not match its
-    type.
-    """
-    others = np.setdiff1d(types, [VERTEX, POLY_VERTEX, POLYLINE, *VTK_KINDS])
-    if others.size:
-        named = ", ".join(VTK_NAMES.get(int(kind), f"VTK's type {kind}") for kind in others)
-        raise FileFormatError(
-            "Cells of a VTK file must be simplices, quads, polylines, hexahedra, wedges or pyramids; "
-            f"it holds {named}. Save it with those."
-        )
-    blocks = {}
-    for kind, name in VTK_KINDS.items():
-        length = N_CORNERS[name]
-        chosen = np.flatnonzero(types == kind)
-        wrong = chosen[lists.lengths[chosen] != length]
-        if wrong.size:
-            count = lists.lengths[wrong[0]]
-            raise FileFormatError(
-                f"A VTK cell of type {kind} must have {length} corners; cell {wrong[0]} has {count}."
-            )
-        if chosen.size:
-            blocks[name] = lists.rows(chosen, length)
-    polylines = np.flatnonzero(types == POLYLINE)
-    if polylines.size:
-        blocks[SEGMENTS] = np.concatenate(
-            [blocks.get(SEGMENTS, np.empty((0, 2), int)), lists.pairs(polylines)]
-        )
-    return blocks
+    counts = (strips.lengths - 2).clip(0)
+    owners = np.repeat(np.arange(len(counts)), counts)
+    steps = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)  # in the strip
+    odd = steps % 2
+    first = strips.starts[owners] + steps
+    triangles = strips.corners[np.column_stack([first + odd, first + 1 - odd, first + 2])]
+    one, two, three = triangles.T
+    is_real = (one != two) & (two != three) & (three != one)
+    return triangles[is_real], owners[is_real]

@@ -38,7 +38,16 @@ KINDS = {
     rb"\s*MeshVersionFormatted": Kind("a Medit file", ".mesh"),
     rb"# \.PCD": Kind("a PCD file", ".pcd"),
     rb"solid\s.*\s+facet\b": Kind("an STL file", ".stl"),
-    rb"\xff\xff\xfe": Kind("a surface of FreeSurfer", ".surf"),
+    rb"\xff\xff[\xfd\xfe]|#!ascii version of": Kind("a surface of FreeSurfer", ".surf"),
+    rb"\xff\xff\xff\xff": Kind(
+        "a patch of FreeSurfer",
+        remedy="Read the whole surface, and cut it by es.geometry.mask_surface.",
+    ),
+    # The first numbers are shares of light: in text, or floats from 0 to 1 in either byte order.
+    rb"P\s+[\d.]|p(?=.{0,23}[\x00\x80-\xff])([\x00=>?]...|...[\x00=>?])": Kind(
+        "an MNI object", ".mniobj"
+    ),
+    rb"ascii\s+VOID|binar(ABCD|DCBA)": Kind("a mesh of BrainVISA", remedy="Save it as GIFTI, .gii."),
     rb"\s*\{.*\"asset\"\s*:": Kind("a glTF file", ".gltf"),
     rb"\s*<.*<VTKFile[^>]*\"UnstructuredGrid\"": Kind("a VTU file", ".vtu"),
     rb"\s*<.*<VTKFile[^>]*\"PolyData\"": Kind("a VTP file", ".vtp"),

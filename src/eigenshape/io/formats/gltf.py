@@ -1,15 +1,29 @@
-"""glTF, as one binary file or with separate buffers: the triangles of all nodes, transformed."""
+"""glTF, as one binary file or with separate buffers: the triangles of a scene as viewers show them.
+
+Nodes, instances, skins and morph targets place them, in the pose that stands in the file; animations
+are not played.
+
+Read: triangles, strips and fans of one scene; nodes, instances, skins, default weights of morph
+    targets, quantized and sparse accessors.
+Kept: to GLB all but tangents and instances; to others texture coordinates (with their transform),
+    normals, colors, materials with their images, names of nodes.
+Named: other scenes; hidden nodes; points and lines; weights of joints that have no sum of 1;
+    extensions that are not read; digits that are lost.
+Refused: meshes that Draco or meshopt has packed, and other extensions that a file requires;
+    buffers outside the file or its folder.
+"""
 
 import base64
 import json
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import unquote
 
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
 from eigenshape._errors import FileFormatError
@@ -21,17 +35,31 @@ JSON_CHUNK = b"JSON"
 BINARY_CHUNK = b"BIN\0"
 COPIES = 2**22  # most vertices and faces from copies in a small file; they take 200 MB
 KINDS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 TRIANGLES, STRIP, FAN = SURFACES = 4, 5, 6
 LARGEST = sys.float_info.max
-# Extensions that change the look of a surface but not its place, or that a reader may ignore.
-HARMLESS = (
-    "KHR_materials_",
-    "KHR_texture_",
-    "EXT_texture_",
-    "KHR_lights_",
-    "KHR_mesh_quantization",
+SKINS = "JOINTS", "WEIGHTS"  # attributes of vertices; what they have four of each has a number
+# Weights of a vertex in a skin sum to 1; eight of one byte each may miss it by 8 / 2 / 255.
+SAME_SUM = 0.02
+# Extensions that say where geometry is, and are applied: copies of a mesh, nodes that are not shown,
+# and nodes that stand for another one from afar.
+INSTANCES, VISIBILITY, LEVELS = "EXT_mesh_gpu_instancing", "KHR_node_visibility", "MSFT_lod"
+# Compressed copies of geometry. Where they are not required, the file holds it plainly, too.
+DRACO = "KHR_draco_mesh_compression"
+COMPRESSED = (
+    "A glTF file must hold its geometry plainly; it is compressed by the extension {!r}. The command "
+    "`npx @gltf-transform/cli copy a.glb b.glb` writes it without compression."
 )
+COMPRESSIONS = (DRACO, "EXT_meshopt_compression", "KHR_meshopt_compression")
+# What places a node or an instance, and where it stands by default.
+PLACES = {"TRANSLATION": [0.0] * 3, "ROTATION": [0.0, 0.0, 0.0, 1.0], "SCALE": [1.0] * 3}
+# Beginnings of the names of extensions that are applied, or leave all geometry in its place.
+HARMLESS = (
+    INSTANCES, LEVELS, "KHR_mesh_quantization", "KHR_node_", "KHR_animation_", "KHR_audio", "KHR_lights_",
+    "KHR_materials_", "KHR_texture_", "KHR_xmp", "EXT_instance_features", "EXT_lights_", "EXT_materials_",
+    "EXT_mesh_features", "EXT_mesh_manifold", "EXT_structural_metadata", "EXT_texture_", "MSFT_packing_",
+    "MSFT_texture_", "FB_ngon_encoding", "CESIUM_primitive_outline", "GODOT_single_root", "VRM",
+)  # fmt: skip
 
 
 class Piece(NamedTuple):
@@ -43,24 +71,38 @@ class Piece(NamedTuple):
     primitives: np.ndarray  # (f,) the number of each face's primitive in its mesh
 
 
+class Placement(NamedTuple):
+    """How a node shows its mesh."""
+
+    mesh: int
+    weights: tuple[float, ...]  # of the morph targets
+    matrix: np.ndarray  # (4, 4) from the coordinates of the node to those of the world
+    copies: np.ndarray  # (k, 4, 4) the same for each instance; the identity if there is a skin
+    skin: int | None
+    bones: np.ndarray | None  # (j, 4, 4) for each joint of the skin, instead of the matrix
+
+
 class Scene(NamedTuple):
     """The triangles of all nodes in world coordinates, and where they stand in the file."""
 
+    number: int | None  # None if the file has no scenes
     piece: Piece
     nodes: np.ndarray  # (f,) the node of each face
-    matrices: dict[int, np.ndarray]  # by node, from its coordinates to those of the world
+    placements: dict[int, Placement]  # by node
 
 
 @dataclass(frozen=True)
 class Gltf:
     """The JSON tree and buffers of a file, and a limit for its vertices and faces.
 
-    There is a limit because a small file can place one mesh any number of times.
+    There is a limit because a small file can place one mesh any number of times. Notes say what
+    the file holds and the shape does not, as they are found.
     """
 
     tree: dict[str, Any]
     buffers: Sequence[bytes]
     most: int
+    notes: list[str] = field(default_factory=list)
 
     def entry(self, kind: str, index: Any) -> dict[str, Any]:
         """Return one entry of a list in the tree."""
@@ -72,6 +114,10 @@ class Gltf:
             )
         return entries[index]
 
+    def entries(self, kind: str) -> list[dict[str, Any]]:
+        """Return all entries of a list in the tree."""
+        return [self.entry(kind, index) for index in range(len(_list(self.tree, kind)))]
+
     def require_few(self, total: int) -> None:
         """Raise an error if there are more vertices and faces than the limit."""
         if total > self.most:
@@ -80,18 +126,22 @@ class Gltf:
             )
 
 
-def parse(data: bytes, folder: Path | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces of the scene, from a .glb file or, if a folder is given, a .gltf file.
+def parse(
+    data: bytes, folder: Path | None = None, scene: str | int | None = None
+) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
+    """Read vertices and faces of a scene, and notes, from a .glb file or the text of a .gltf file.
 
-    The buffers of a .gltf file lie in its folder or in data URIs.
+    The buffers of a .gltf file lie in its folder, if that is given, or in data URIs.
     """
-    piece = read_scene(read_gltf(data, folder)).piece
-    return piece.vertices, piece.faces
+    gltf = read_gltf(data, folder)
+    piece = read_scene(gltf, scene).piece
+    return piece.vertices, piece.faces, *gltf.notes
 
 
 def read_gltf(data: bytes, folder: Path | None = None) -> Gltf:
     """Read the tree and the buffers of a file; see `parse`."""
-    if folder is None:
+    is_text = data[:4] != b"glTF" and (folder is not None or data.lstrip().startswith(b"{"))
+    if not is_text:
         version, length = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8))
         if data[:4] != b"glTF" or version != 2 or length != len(data):
             raise FileFormatError(
@@ -116,11 +166,12 @@ def read_gltf(data: bytes, folder: Path | None = None) -> Gltf:
     return Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES))
 
 
-def read_scene(gltf: Gltf) -> Scene:
-    """Read the triangles of the scene; there must be some."""
-    scene = place_triangles(gltf)
+def read_scene(gltf: Gltf, name: str | int | None = None) -> Scene:
+    """Read the triangles of a scene; there must be some."""
+    scene = place_triangles(gltf, name)
     if not len(scene.piece.faces):
-        raise FileFormatError("A glTF file must hold triangles; it holds none.")
+        reasons = "".join(f"; {note}" for note in gltf.notes)
+        raise FileFormatError(f"A glTF file must hold triangles; it holds none{reasons}.")
     return scene
 
 
@@ -179,7 +230,14 @@ def _decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -
             f"A GLB file must hold all its data; buffers[{index}] points outside, to {str(uri)[:80]!r}."
         )
     size = _whole(entry, "byteLength")
-    data = read_regular(file_beside(index, str(uri), folder), "numbers")
+    path = file_beside(index, str(uri), folder)
+    # A service must not tell where its folder is, as an error of the system would.
+    if not path.exists():
+        raise FileFormatError(
+            f"Buffers of a .gltf file must lie in its folder; buffers[{index}], {str(uri)[:80]!r}, is not there. "
+            "Give the file with its folder, or save it as .glb, which holds all."
+        )
+    data = read_regular(path, "numbers")
     if len(data) < size:
         raise FileFormatError(
             f"buffers[{index}] must have {size} bytes; the file {str(uri)[:80]!r} has {len(data)}."
@@ -201,35 +259,106 @@ def file_beside(index: int, uri: str, folder: Path) -> Path:
     return path
 
 
-def place_triangles(gltf: Gltf) -> Scene:
-    """Gather the triangles of all nodes, in world coordinates."""
-    for name in _list(gltf.tree, "extensionsRequired"):
-        if not str(name).startswith(HARMLESS):
-            raise FileFormatError(
-                f"A glTF file must be plain glTF 2.0; it requires the extension {str(name)[:60]!r}."
-            )
-    shapes: dict[int, Piece] = {}
-    matrices: dict[int, np.ndarray] = {}
-    meshes: dict[int, int] = {}  # by node
-    total = 0
-    for node, index, matrix in _placed_meshes(gltf):
-        mesh = gltf.entry("meshes", index)
-        if index not in shapes:
-            shapes[index] = _mesh(gltf, mesh)
-        total += len(shapes[index].vertices) + len(shapes[index].faces)
-        gltf.require_few(total)  # before any copy is made
-        matrices[node], meshes[node] = matrix, index
+def place_triangles(gltf: Gltf, name: str | int | None = None) -> Scene:
+    """Gather the triangles of all nodes of a scene, in world coordinates."""
+    _check_extensions(gltf)
+    scene = _choose_scene(gltf, name)
+    placements = _placements(gltf, _roots(gltf, scene))
+    shapes: dict[Any, Piece] = {}
     placed = []
-    for node, matrix in matrices.items():
-        piece = shapes[meshes[node]]
-        # A reflection turns triangles inside out; by the format they must be turned back.
-        flips = np.linalg.slogdet(matrix[:3, :3])[0] < 0
-        vertices = piece.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-        faces = piece.faces[:, ::-1] if flips else piece.faces
-        placed.append(piece._replace(vertices=vertices, faces=faces))
+    total = 0
+    for place in placements.values():
+        # Nodes share what they show alike.
+        key = place.mesh, place.weights, place.skin
+        if key not in shapes:
+            shapes[key] = _mesh(gltf, place)
+        piece = shapes[key]
+        total += len(place.copies) * (len(piece.vertices) + len(piece.faces))
+        gltf.require_few(total)  # before any copy is made
+        placed.append(_copy_piece(piece, place.copies))
+    shown = {place.mesh for place in placements.values()}
+    parts = [part for n in shown for part in _list(gltf.entry("meshes", n), "primitives")]
+    if n_others := sum(part.get("mode", TRIANGLES) not in SURFACES for part in parts):
+        gltf.notes.append(f"{n_others} primitives of points or lines are left out")
     n_faces = [len(piece.faces) for piece in placed]
-    nodes = np.repeat(np.array(list(matrices), dtype=np.int64), n_faces)
-    return Scene(_merge_pieces(placed), nodes, matrices)
+    nodes = np.repeat(np.array(list(placements), dtype=np.int64), n_faces)
+    return Scene(scene, _merge_pieces(placed), nodes, placements)
+
+
+def _check_extensions(gltf: Gltf) -> None:
+    """Raise an error if an unknown extension is required, and note unknown ones that are used."""
+    for name in map(str, _list(gltf.tree, "extensionsRequired")):
+        if name in COMPRESSIONS:
+            raise FileFormatError(COMPRESSED.format(name))
+        if not name.startswith(HARMLESS):
+            raise FileFormatError(
+                f"A glTF file must be plain glTF 2.0; it requires the extension {name[:60]!r}."
+            )
+    used = [ascii(name)[:60] for name in _list(gltf.tree, "extensionsUsed")
+            if not str(name).startswith((*HARMLESS, *COMPRESSIONS))]  # fmt: skip
+    if used:
+        gltf.notes.append(
+            f"extensions that are not read may move, add or select parts of the shape: {', '.join(used)}"
+        )
+
+
+def extension(entry: Any, name: str) -> dict[str, Any]:
+    """Return what an extension adds to an entry of the tree, which may be nothing."""
+    return _object(_object(entry, "extensions"), name)
+
+
+def _object(entry: dict[str, Any], key: str) -> dict[str, Any]:
+    value = entry.get(key, {})
+    if not isinstance(value, dict):
+        raise FileFormatError(f"{key} of a glTF file must be an object; it is {str(value)[:60]!r}.")
+    return value
+
+
+def _choose_scene(gltf: Gltf, wanted: str | int | None) -> int | None:
+    """Return the number of the scene of a name or number, or of the one that the file names."""
+    names = [entry.get("name") for entry in gltf.entries("scenes")]
+    if not names and wanted is None:
+        return None
+    number = gltf.tree.get("scene", 0) if wanted is None else wanted
+    if isinstance(number, str):
+        number = (
+            names.index(number) if number in names else int(number) if number.isdecimal() else -1
+        )
+    listed = ", ".join(
+        f"{n} {'' if name is None else repr(name)}".strip() for n, name in enumerate(names)
+    )
+    if type(number) is not int or not 0 <= number < len(names):
+        raise FileFormatError(
+            f"The scene of a glTF file must be one that it holds, {listed[:400] or 'none'}; it is "
+            f"{str(gltf.tree.get('scene') if wanted is None else wanted)[:60]!r}."
+        )
+    if wanted is None and len(names) > 1:
+        gltf.notes.append(
+            f"scene {number} is read of scenes {listed[:400]}; scene= or --scene chooses"
+        )
+    return number
+
+
+def _copy_piece(piece: Piece, matrices: np.ndarray) -> Piece:
+    """Place copies of triangles."""
+    count = len(matrices)
+    points = piece.vertices @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
+    # A reflection turns triangles inside out; by the format they must be turned back.
+    flips = (sides(matrices) < 0)[:, None, None]
+    faces = np.where(flips, piece.faces[:, ::-1], piece.faces)
+    starts = len(piece.vertices) * np.arange(count)
+    return Piece(
+        points.reshape(-1, 3),
+        (faces + starts[:, None, None]).reshape(-1, 3),
+        np.tile(piece.rows, count),
+        np.tile(piece.primitives, count),
+    )
+
+
+def sides(matrices: np.ndarray) -> np.ndarray:
+    """Return -1 for matrices that turn triangles over, and 1 for others, however small."""
+    signs: np.ndarray = np.linalg.slogdet(matrices[:, :3, :3])[0]
+    return signs
 
 
 def _merge_pieces(pieces: Sequence[Piece]) -> Piece:
@@ -244,70 +373,223 @@ def _merge_pieces(pieces: Sequence[Piece]) -> Piece:
     )
 
 
-def _placed_meshes(gltf: Gltf) -> Iterator[tuple[int, Any, np.ndarray]]:
-    waiting = [(index, np.eye(4)) for index in reversed(_roots(gltf))]
-    seen = set()
-    while waiting:
-        index, above = waiting.pop()
+def _placements(gltf: Gltf, roots: list[Any]) -> dict[int, Placement]:
+    """Return how each node below the roots shows its mesh."""
+    matrices, hidden = _world_matrices(gltf, roots)
+    skins: dict[int, np.ndarray] = {}
+    found = {}
+    for index, matrix in matrices.items():
         node = gltf.entry("nodes", index)
-        if index in seen:
+        if "mesh" not in node or index in hidden:
+            continue
+        mesh = gltf.entry("meshes", node["mesh"])
+        n_targets = max(
+            (len(_list(part, "targets")) for part in _list(mesh, "primitives")), default=0
+        )
+        # The weights of a node win over those of its mesh.
+        weights = [0.0] * n_targets
+        for entry in (mesh, node):
+            weights = _numbers(entry, "weights", weights).tolist()
+        skin, bones = node.get("skin"), None
+        if skin is not None:
+            gltf.entry("skins", skin)
+            if skin not in skins:
+                skins[skin] = _bones(gltf, skin, matrices)
+            bones = skins[skin]
+        # By the format only the joints place a skin, and neither its node nor instances.
+        copies = _instances(gltf, index) if bones is None else np.eye(4)[None]
+        copies = matrix @ copies if bones is None else copies
+        found[index] = Placement(node["mesh"], tuple(weights), matrix, copies, skin, bones)
+    if n_hidden := sum("mesh" in gltf.entry("nodes", index) for index in hidden):
+        gltf.notes.append(f"{n_hidden} nodes with a mesh are hidden by {VISIBILITY}, and left out")
+    return found
+
+
+def _world_matrices(gltf: Gltf, roots: list[Any]) -> tuple[dict[int, np.ndarray], set[int]]:
+    """Return the matrices of all nodes below the roots, and which of these nodes are hidden."""
+    waiting = [(index, np.eye(4), True) for index in reversed(roots)]
+    levels = [_list(extension(node, LEVELS), "ids") for node in gltf.entries("nodes")]
+    coarser = {index for ids in levels for index in ids if type(index) is int}
+    matrices: dict[int, np.ndarray] = {}
+    hidden = set()
+    while waiting:
+        index, above, is_shown = waiting.pop()
+        node = gltf.entry("nodes", index)
+        if index in matrices:
             raise FileFormatError(
                 f"The nodes of a glTF file must form trees; node {index} is met twice."
             )
-        seen.add(index)
-        matrix = above @ _local_matrix(node)
-        if "mesh" in node:
-            yield index, node["mesh"], matrix
-        waiting.extend((child, matrix) for child in reversed(_list(node, "children")))
+        if index in coarser:
+            continue
+        is_shown &= extension(node, VISIBILITY).get("visible") is not False
+        matrices[index] = above @ _local_matrix(node)
+        if not is_shown:
+            hidden.add(index)
+        waiting.extend(
+            (child, matrices[index], is_shown) for child in reversed(_list(node, "children"))
+        )
+    return matrices, hidden
 
 
-def _roots(gltf: Gltf) -> list[Any]:
-    if "scenes" in gltf.tree:
-        return _list(gltf.entry("scenes", gltf.tree.get("scene", 0)), "nodes")
-    everyone = range(len(_list(gltf.tree, "nodes")))
-    children = [
-        child for index in everyone for child in _list(gltf.entry("nodes", index), "children")
-    ]
-    below = {child for child in children if isinstance(child, int)}
-    return [index for index in everyone if index not in below]
+def _roots(gltf: Gltf, scene: int | None) -> list[Any]:
+    if scene is not None:
+        return _list(gltf.entry("scenes", scene), "nodes")
+    nodes = gltf.entries("nodes")
+    below = {child for node in nodes for child in _list(node, "children") if type(child) is int}
+    return [index for index in range(len(nodes)) if index not in below]
+
+
+def _bones(gltf: Gltf, index: int, matrices: dict[int, np.ndarray]) -> np.ndarray:
+    """Return, for each joint of a skin, the matrix from where the skin was bound to the world."""
+    skin = gltf.entry("skins", index)
+    joints = _list(skin, "joints")
+    for joint in joints:
+        gltf.entry("nodes", joint)
+        if joint not in matrices:
+            raise FileFormatError(
+                f"Joints of a skin must lie in the scene of its mesh; skins[{index}] names node {joint}, "
+                "which does not."
+            )
+    bones = np.array([matrices[joint] for joint in joints]).reshape(-1, 4, 4)
+    if "inverseBindMatrices" not in skin:
+        return bones
+    inverses = read_accessor(gltf, skin["inverseBindMatrices"], 16)
+    if len(inverses) < len(joints):
+        raise FileFormatError(
+            f"A skin must have an inverse bind matrix for each joint; skins[{index}] has {len(inverses)} "
+            f"for {len(joints)} joints."
+        )
+    columns = inverses[: len(joints)].reshape(-1, 4, 4)
+    return bones @ columns.transpose(0, 2, 1)
+
+
+def _instances(gltf: Gltf, index: int) -> np.ndarray:
+    """Return the matrix of each instance of the mesh of a node; the identity if it has none."""
+    node = gltf.entry("nodes", index)
+    named = _object(extension(node, INSTANCES), "attributes")
+    if not named:
+        return np.eye(4)[None]
+    count = max(_whole(gltf.entry("accessors", accessor), "count") for accessor in named.values())
+    gltf.require_few(count)
+    columns = [
+        np.tile(default, (count, 1)) if name not in named
+        else read_column(gltf, named, name, len(default), count)
+        for name, default in PLACES.items()
+    ]  # fmt: skip
+    return _compose(*columns)
 
 
 def _local_matrix(node: dict[str, Any]) -> np.ndarray:
     if "matrix" in node:
         return _numbers(node, "matrix", [0.0] * 16).reshape(4, 4).T  # stored by columns
-    turn = _numbers(node, "rotation", [0.0, 0.0, 0.0, 1.0])
-    if not turn.any():
+    return _compose(
+        *(_numbers(node, name.lower(), default)[None] for name, default in PLACES.items())
+    )[0]
+
+
+def _compose(
+    shifts: np.ndarray,
+    turns: np.ndarray,
+    scales: np.ndarray,
+) -> np.ndarray:
+    """Return the matrices that scale, then turn by quaternions, then shift."""
+    sizes = np.abs(turns).max(axis=1, keepdims=True)
+    if not sizes.all():
         raise FileFormatError(
             "A rotation must be a quaternion other than zero; a node has [0, 0, 0, 0]."
         )
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_quat(turn / np.abs(turn).max()).as_matrix() * _numbers(
-        node, "scale", [1.0, 1.0, 1.0]
-    )
-    matrix[:3, 3] = _numbers(node, "translation", [0.0, 0.0, 0.0])
-    return matrix
+    matrices = np.tile(np.eye(4), (len(shifts), 1, 1))
+    matrices[:, :3, :3] = Rotation.from_quat(turns / sizes).as_matrix() * scales[:, None]
+    matrices[:, :3, 3] = shifts
+    return matrices
 
 
-def _mesh(gltf: Gltf, mesh: dict[str, Any]) -> Piece:
-    """Read one mesh; parts that differ only in material share their vertices, as in the file."""
-    primitives = _list(mesh, "primitives")
-    sharing: dict[int, list[int]] = {}  # by the accessor of positions
+def _mesh(gltf: Gltf, place: Placement) -> Piece:
+    """Read one mesh with its morph targets and its skin.
+
+    Parts that differ only in material share their vertices, as in the file.
+    """
+    primitives = _list(gltf.entry("meshes", place.mesh), "primitives")
+    sharing: dict[str, list[int]] = {}
     for number, part in enumerate(primitives):
         if _whole(part, "mode", TRIANGLES) in SURFACES:
-            sharing.setdefault(_whole(part.get("attributes"), "POSITION"), []).append(number)
+            _whole(part.get("attributes"), "POSITION")
+            placing = [
+                pair
+                for pair in part["attributes"].items()
+                if pair[0].startswith(("POSITION", *SKINS))
+            ]
+            key = json.dumps([sorted(placing), part.get("targets")])
+            sharing.setdefault(key, []).append(number)
     pieces = []
     total = 0
-    for position, numbers in sharing.items():
-        vertices = read_accessor(gltf, position, 3)
+    for numbers in sharing.values():
+        vertices, flips = _vertices(gltf, primitives[numbers[0]], place)
         total += len(vertices)
         faces = []
         for number in numbers:
-            faces.append(_faces(gltf, primitives[number], len(vertices)))
+            corners = _faces(gltf, primitives[number], len(vertices))
+            turned = flips[corners].sum(axis=1) < 0 if len(flips) else np.zeros(len(corners), bool)
+            faces.append(np.where(turned[:, None], corners[:, ::-1], corners))
             total += 1 + len(faces[-1])
             gltf.require_few(total)
         owners = np.repeat(numbers, [len(block) for block in faces])
         pieces.append(Piece(vertices, np.concatenate(faces), np.arange(len(vertices)), owners))
     return _merge_pieces(pieces)
+
+
+def _vertices(gltf: Gltf, part: dict[str, Any], place: Placement) -> tuple[np.ndarray, np.ndarray]:
+    """Read the vertices of a primitive, and the sides that a skin turns them to, if there is one."""
+    attributes = part["attributes"]
+    if extension(part, DRACO) and "bufferView" not in gltf.entry(
+        "accessors", attributes["POSITION"]
+    ):
+        raise FileFormatError(COMPRESSED.format(DRACO))
+    vertices = read_accessor(gltf, attributes["POSITION"], 3)
+    count = len(vertices)
+    for weight, target in zip(place.weights, _list(part, "targets"), strict=False):
+        if weight and isinstance(target, dict) and "POSITION" in target:
+            vertices = vertices + weight * read_column(gltf, target, "POSITION", 3, count)
+    if place.bones is None:
+        return vertices, np.empty(0)
+    # Each set has four joints and weights, and the first one must be there.
+    joints = sorted({"JOINTS_0", *(name for name in attributes if name.startswith("JOINTS"))})
+    names = [*joints, *(name.replace(*SKINS) for name in joints)]
+    columns = {name: read_column(gltf, attributes, name, 4, count) for name in names}
+    weights = np.hstack([columns[name] for name in names[len(joints) :]])
+    n_odd = int((np.abs(weights.sum(axis=1) - 1.0) > SAME_SUM).sum())
+    if n_odd:
+        gltf.notes.append(
+            f"weights of {n_odd} vertices of a skin do not sum to 1, and were divided by their sum; "
+            "vertices without weights follow their first joint"
+        )
+    matrices = pose_matrices(columns, place.bones)
+    return transform_points(matrices, vertices), sides(matrices)
+
+
+def pose_matrices(columns: Mapping[str, np.ndarray], bones: np.ndarray) -> np.ndarray:
+    """Return the mean matrix of the joints of each vertex (glTF 2.0, section 3.7.3.3)."""
+    names = sorted(name for name in columns if name.startswith(SKINS[0]))
+    joints = np.hstack([columns[name] for name in names])
+    weights = np.hstack([columns[name.replace(*SKINS)] for name in names])
+    weights[weights.sum(axis=1) == 0, 0] = 1.0
+    weights /= weights.sum(axis=1, keepdims=True)
+    joints = np.where(weights != 0, joints, 0).astype(np.int64)
+    bad = np.flatnonzero((joints >= len(bones)).any(axis=1))
+    if bad.size:
+        raise FileFormatError(
+            f"Joints of vertices must be within 0..{len(bones) - 1}; vertex {bad[0]} has joint "
+            f"{joints[bad[0]].max()}."
+        )
+    starts = np.arange(0, joints.size + 1, joints.shape[1])
+    means = csr_array((weights.ravel(), joints.ravel(), starts), shape=(len(joints), len(bones)))
+    return (means @ bones.reshape(-1, 16)).reshape(-1, 4, 4)
+
+
+def transform_points(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Move points by a matrix each, or by one for all."""
+    moved = np.einsum("...ij,...j->...i", matrices[:, :3, :3], points)
+    return moved + matrices[:, :3, 3]
 
 
 def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
@@ -337,31 +619,74 @@ def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
     return corners[np.column_stack([place, place + 1 + odd, place + 2 - odd])]
 
 
+def read_column(gltf: Gltf, named: dict[str, Any], name: str, width: int, count: int) -> np.ndarray:
+    """Read one of several accessors that have a row each for the same things."""
+    rows = read_accessor(gltf, _whole(named, name), width)
+    if len(rows) != count:
+        raise FileFormatError(
+            f"{name} in a glTF file must have {count} rows, as what stands beside it; it has {len(rows)}."
+        )
+    return rows
+
+
 def read_accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
     """Read an accessor as float64, with as many numbers a row as `width`."""
-    rows = raw_accessor(gltf, index, width)
-    if gltf.entry("accessors", index).get("normalized") is True and rows.dtype.kind in "iu":
+    is_normalized = gltf.entry("accessors", index).get("normalized") is True
+    return decode(raw_accessor(gltf, index, width), is_normalized)
+
+
+def decode(rows: np.ndarray, is_normalized: bool) -> np.ndarray:
+    """Return float64; normalized whole numbers are shares of the largest one."""
+    if is_normalized and rows.dtype.kind in "iu":
         return np.maximum(rows / np.iinfo(rows.dtype).max, -1.0)
     return rows.astype(np.float64)
 
 
 def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarray:
-    """Return the rows of an accessor as they are stored, without a copy; `wanted` numbers each."""
+    """Return the rows of an accessor as they are stored, if possible without a copy; `wanted` numbers each."""
     accessor = gltf.entry("accessors", index)
+    name = f"accessors[{index}]"
     kind = np.dtype(KINDS.get(_whole(accessor, "componentType"), "V0"))
     width = WIDTHS.get(str(accessor.get("type")), 0)
-    fits = width == wanted if wanted else width > 0
-    if not kind.itemsize or not fits or "sparse" in accessor:
+    if not kind.itemsize or not (width == wanted if wanted else width):
         raise FileFormatError(
-            f"accessors[{index}] must be a plain list of {wanted or '1 to 4'} numbers each; it is not."
+            f"{name} must have rows of {wanted or '1 to 4, or 16'} numbers of a known type; it has "
+            f"{ascii(accessor.get('type'))[:60]} of type {accessor['componentType']}."
         )
-    data, step = view_of(gltf, accessor.get("bufferView"))
+    count = _whole(accessor, "count")
+    if "bufferView" in accessor:
+        rows = _stored_rows(gltf, accessor, kind, width, count, name)
+    else:
+        gltf.require_few(count)  # zeros take memory, and none of the file
+        rows = np.zeros((count, width), kind)
+    if "sparse" not in accessor:
+        return rows
+    # Some rows are replaced.
+    sparse = accessor["sparse"]
+    n_replaced = _whole(sparse, "count")
+    places, values = (sparse.get(key) for key in ("indices", "values"))
+    kind_of_places = np.dtype(KINDS.get(_whole(places, "componentType"), "V0"))
+    chosen = _stored_rows(gltf, places, kind_of_places, 1, n_replaced, name).ravel()
+    if kind_of_places.kind != "u" or (chosen >= count).any():
+        raise FileFormatError(
+            f"{name} must replace rows that it has, 0..{count - 1}; it replaces {chosen[:5]}."
+        )
+    rows = rows.copy()
+    rows[chosen] = _stored_rows(gltf, values, kind, width, n_replaced, name)
+    return rows
+
+
+def _stored_rows(
+    gltf: Gltf, entry: Any, kind: np.dtype[Any], width: int, count: int, name: str
+) -> np.ndarray:
+    """Return rows that lie in a view, without a copy."""
+    start = _whole(entry, "byteOffset", 0)
+    data, step = view_of(gltf, entry.get("bufferView"))
     row = kind.itemsize * width
-    count, start = _whole(accessor, "count"), _whole(accessor, "byteOffset", 0)
     step = step if step and count > 1 else row  # fewer than two rows have no step
     if step < row or start + (count - 1) * step + row > len(data):
         raise FileFormatError(
-            f"accessors[{index}] must lie in its buffer; {count} rows do not fit {len(data)} bytes."
+            f"{name} must lie in its buffer; {count} rows do not fit {len(data)} bytes."
         )
     return np.ndarray((count, width), kind, data, start, (step, kind.itemsize))
 

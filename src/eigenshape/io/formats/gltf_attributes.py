@@ -3,7 +3,7 @@
 import copy
 import json
 import mimetypes
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,6 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
     WriteJob,
     corner_normals,
     linear_colors,
@@ -28,29 +27,47 @@ from eigenshape.io.attributes import (
 )
 from eigenshape.io.carrying import interpolate
 from eigenshape.io.formats.gltf import (
+    COMPRESSIONS,
+    INSTANCES,
+    LEVELS,
     SURFACES,
     Gltf,
+    Placement,
     Scene,
+    decode,
     decode_buffers,
+    extension,
     file_beside,
     pack,
+    pose_matrices,
     raw_accessor,
     read_accessor,
     read_gltf,
     read_scene,
+    sides,
+    transform_points,
     view_of,
 )
+from eigenshape.io.formats.rounding import rounding_loss
 from eigenshape.io.formats.stl import single_precision
+from eigenshape.io.opening import SourceFile
 
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
-TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 # What a document may hold besides a scene with materials.
 EXTRAS = ("skins", "animations", "cameras", "extensions")
 TANGENTS = "tangents, which viewers compute anew"
 MADE_ANEW = ("POSITION", "NORMAL", "TANGENT")
 # Attributes of vertices that are made anew, go to other formats or are named as skins.
 CARRIED = {*MADE_ANEW, "COLOR_0", "JOINTS_0", "WEIGHTS_0"}
-DRACO = "KHR_draco_mesh_compression"
+# Extensions that copy, compress or replace the old geometry, or name its vertices by number.
+OF_GEOMETRY = (
+    *COMPRESSIONS, INSTANCES, LEVELS, "EXT_instance_features", "EXT_mesh_manifold", "EXT_mesh_polygon",
+    "EXT_mesh_primitive_edge_visibility", "CESIUM_primitive_outline", "FB_ngon_encoding",
+)  # fmt: skip
+# A shape that lies this many times its size from the origin is written about its own middle: three
+# of the 24 binary digits of single precision are worth a node that is moved.
+FAR = 8
 Columns = dict[str, tuple[np.ndarray, bool]]  # numbers, and whether whole ones mean shares of one
 
 
@@ -61,14 +78,14 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     corner_rows = scene.piece.rows[scene.piece.faces]
     found: dict[str, Any] = {}
     materials = [_material(gltf, source, entry) for entry in gltf.tree.get("materials", [])]
-    nodes = list(scene.matrices)
+    nodes = list(scene.placements)
     face_materials, face_groups, face_parts = np.full((3, n_faces), -1)
     for part, (node, _, primitive, chosen) in enumerate(_placed_primitives(gltf, scene)):
         named = primitive["attributes"]
         number = primitive.get("material", -1)
         face_materials[chosen], face_groups[chosen] = number, nodes.index(node)
         face_parts[chosen] = part
-        coordinates = _base_coordinates(gltf, primitive)
+        coordinates, transform = _base_coordinates(gltf, primitive)
         columns = {"normals": ("NORMAL", (3,)), "texture_coordinates": (coordinates, (2,)),
                    "colors": ("COLOR_0", (3, 4))}  # fmt: skip
         for key, (name, widths) in columns.items():
@@ -82,6 +99,8 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
             rows = read_accessor(gltf, named[name], width)
             if key == "colors" and width == 3:
                 rows = np.column_stack([rows, np.ones(len(rows))])
+            if key == "texture_coordinates":
+                rows = _transform_coordinates(rows, transform)
             default = 1.0 if key == "colors" else 0.0
             table = found.setdefault(key, np.full((n_faces, 3, max(widths)), default))
             table[chosen] = _take(rows, corner_rows[chosen], name)
@@ -110,14 +129,14 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
 
 def _open(source: SourceFile) -> tuple[Gltf, Scene]:
     gltf = read_gltf(source.data, source.folder if source.suffix == ".gltf" else None)
-    return gltf, read_scene(gltf)
+    return gltf, read_scene(gltf, source.scene)
 
 
 def _placed_primitives(
     gltf: Gltf, scene: Scene
 ) -> Iterator[tuple[int, int, dict[str, Any], Int[np.ndarray, " k"]]]:
     """Give the node, the number and the faces of each primitive of each node that has faces."""
-    for node in scene.matrices:
+    for node in scene.placements:
         primitives = gltf.entry("meshes", gltf.entry("nodes", node)["mesh"])["primitives"]
         for number, primitive in enumerate(primitives):
             chosen = (scene.nodes == node) & (scene.piece.primitives == number)
@@ -139,11 +158,22 @@ def _base_color(material: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _base_coordinates(gltf: Gltf, primitive: dict[str, Any]) -> str:
-    """Name the texture coordinates of the base color of a primitive."""
+def _base_coordinates(gltf: Gltf, primitive: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Name the texture coordinates of the base color of a primitive, and what transforms them."""
     number = primitive.get("material", -1)
     pbr = {} if number < 0 else _base_color(gltf.entry("materials", number))
-    return f"TEXCOORD_{pbr.get('baseColorTexture', {}).get('texCoord', 0)}"
+    texture = pbr.get("baseColorTexture", {})
+    transform = extension(texture, "KHR_texture_transform")
+    return f"TEXCOORD_{transform.get('texCoord', texture.get('texCoord', 0))}", transform
+
+
+def _transform_coordinates(rows: np.ndarray, transform: dict[str, Any]) -> np.ndarray:
+    """Scale, turn and shift texture coordinates, whose v goes down (KHR_texture_transform)."""
+    angle = transform.get("rotation", 0.0)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    scaled = rows * transform.get("scale", [1.0, 1.0])
+    turned: np.ndarray = scaled @ turn.T + transform.get("offset", [0.0, 0.0])
+    return turned
 
 
 def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material:
@@ -153,11 +183,14 @@ def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material
     image, image_name = None, ""
     if "baseColorTexture" in pbr:
         texture = gltf.entry("textures", pbr["baseColorTexture"].get("index"))
-        if "source" in texture:
-            number = texture["source"]
+        # Images of newer formats, such as WebP, are named by extensions.
+        named = [texture, *texture.get("extensions", {}).values()]
+        number = next((each["source"] for each in named if "source" in each), None)
+        if number is not None:
             held = gltf.entry("images", number)
             image, kind = _image(gltf, source, held)
-            ending = ".jpg" if kind == "image/jpeg" else mimetypes.guess_extension(kind) or ""
+            ending = mimetypes.guess_extension(kind) or f".{kind.rpartition('/')[2]}"
+            ending = ".jpg" if kind == "image/jpeg" else ending
             stem = Path(str(held.get("name") or held.get("uri", "")[:80])).name
             stem = Path(stem).stem if not stem.startswith("data:") else ""
             image_name = f"{stem or f'image{number}'}{ending}"
@@ -187,7 +220,7 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
     primitives = [part for mesh in tree.get("meshes", []) for part in mesh.get("primitives", [])]
     further: set[str] = set()
     for part in primitives:
-        further |= {*part["attributes"]} - CARRIED - {_base_coordinates(gltf, part)}
+        further |= {*part["attributes"]} - CARRIED - {_base_coordinates(gltf, part)[0]}
     names.extend(f"the values {name} of vertices" for name in sorted(further))
     if any("targets" in part for part in primitives):
         names.append("morph targets")
@@ -227,11 +260,11 @@ class _Document:
         accessors.append({"bufferView": view, "count": len(rows), **kind, **entry})
         return len(accessors) - 1
 
-    def add_columns(self, columns: Columns, chosen: Int[np.ndarray, " n"]) -> dict[str, int]:
-        """Add some rows of each column, and return the accessors by name."""
+    def add_columns(self, columns: Columns) -> dict[str, int]:
+        """Add columns, and return their accessors by name."""
         found = {}
         for name, (values, is_normalized) in columns.items():
-            rows = np.ascontiguousarray(values[chosen])
+            rows = np.ascontiguousarray(values)
             size = rows.dtype.itemsize * rows.shape[1]
             step = size + -size % 4  # rows of attributes begin at multiples of four bytes
             padded = np.zeros((len(rows), step), np.uint8)
@@ -283,6 +316,8 @@ def write(job: WriteJob) -> dict[Path, bytes]:
     if source and source.suffix in (".glb", ".gltf"):
         return {job.path: _rewrite(source, job)}
     job.lose(["fields"])
+    places, offset = _local_places(job.mesh)
+    job.lost.extend(rounding_loss(job.mesh, (places + offset)[job.mesh.faces]))
     return {job.path: write_new(job.attributes, job.mesh)}
 
 
@@ -290,7 +325,8 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     """Write a glTF file again as GLB with other positions and triangles, and name what is lost.
 
     Everything else in the file stays as it is: nodes, materials, images, skins, animations and
-    extensions. Every attribute of vertices is carried, whatever it means, but tangents.
+    extensions. Every attribute of vertices is carried, whatever it means, but tangents. Positions
+    are such that the nodes, skins and morph targets of the file put each vertex into its place.
     """
     mesh, attributes = job.mesh, job.attributes
     gltf, scene = _open(source)
@@ -298,57 +334,143 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     file_rows = scene.piece.rows[scene.piece.faces.ravel()]
     parts = [(node, number) for node, number, _, _ in _placed_primitives(gltf, scene)]
     nodes, primitive_numbers = np.array(parts)[attributes.face_parts].T
-    places = single_precision(mesh, "GLB").astype(np.float64)
+    places = mesh.vertices[mesh.faces]
+    found = np.zeros_like(places)  # where the written file puts the corners
     normals = corner_normals(attributes, mesh)
     written: dict[int, list[dict[str, Any]]] = {}
-    for node, matrix in scene.matrices.items():
-        primitives = gltf.entry("meshes", gltf.entry("nodes", node)["mesh"])["primitives"]
-        # A reflection turns triangles over, and the reader has turned them back.
-        order = [2, 1, 0] if np.linalg.slogdet(matrix[:3, :3])[0] < 0 else [0, 1, 2]
+    for node, place in scene.placements.items():
+        primitives = gltf.entry("meshes", place.mesh)["primitives"]
         written[node] = [part for part in primitives if part.get("mode", 4) not in SURFACES]
         for numbers in _sharing(primitives):
             shared = primitives[numbers[0]]
             chosen = np.flatnonzero((nodes == node) & np.isin(primitive_numbers, numbers))
             if not chosen.size:
                 continue
-            vertices = mesh.faces[chosen][:, order].ravel()
             # The rows of the file that the corners come from, and what each gives to each corner
-            blends = attributes.corners[(3 * chosen[:, None] + order).ravel()]
+            blends = attributes.corners[(3 * chosen[:, None] + [0, 1, 2]).ravel()]
             used, inverse = np.unique(blends.indices, return_inverse=True)
             rows = file_rows[used]
             blends = csr_array((blends.data, inverse.ravel(), blends.indptr))
-            named = {name: i for name, i in shared["attributes"].items() if name not in MADE_ANEW}
-            table, *targets = (
-                {name: _blend(gltf, index, name, rows, blends) for name, index in columns.items()}
-                for columns in (named, *shared.get("targets", []))
+            columns = _carry_columns(gltf, shared, rows, blends)
+            old = decode(*columns[0].pop("POSITION"))
+            normal = (
+                normals[chosen].reshape(-1, 3)
+                if normals is not None and "NORMAL" in shared["attributes"]
+                else None
             )
             # Corners of the file agree if their rows do, others if all their values do.
-            keys = [vertices, rows[blends.indices]]
-            if blends.nnz > len(vertices):
-                columns = [values for place in (table, *targets) for values, _ in place.values()]
-                keys = [vertices, *(column for values in columns for column in values.T)]
-            local = (places[vertices] - matrix[:3, 3]) @ np.linalg.pinv(matrix[:3, :3]).T
-            table["POSITION"] = local.astype("<f4"), False
-            if normals is not None and "NORMAL" in shared["attributes"]:
-                normal = normals[chosen][:, order].reshape(-1, 3)
-                keys += [*np.rint(normal.T * 1e5)]
-                table["NORMAL"] = unit_rows(normal @ matrix[:3, :3]).astype("<f4"), False
+            keys = [rows[blends.indices]]
+            if blends.nnz > 3 * len(chosen):
+                keys = [
+                    column
+                    for table in columns
+                    for values, _ in table.values()
+                    for column in values.T
+                ]
+            keys += [] if normal is None else [*np.rint(normal.T * 1e5)]
+            first, indices = _split_corners([mesh.faces[chosen].ravel(), *keys])
+            columns = [_choose_rows(table, first) for table in columns]
+            wanted = places[chosen].reshape(-1, 3)[first]
+            facing = None if normal is None else normal[first]
+            turned, put = _place_vertices(place, columns, old[first], wanted, facing)
+            triangles = indices.reshape(-1, 3)
+            found[chosen] = put[triangles]
+            # A reflection turns triangles over, and the reader has turned them back.
+            flips = turned[triangles].sum(axis=1) < 0
+            triangles = np.where(flips[:, None], triangles[:, ::-1], triangles)
             job.lost.extend([TANGENTS] if "TANGENT" in shared["attributes"] else [])
-            first, indices = _split_corners(keys)
-            changed: dict[str, Any] = {"attributes": document.add_columns(table, first)}
-            if targets:
-                changed["targets"] = [document.add_columns(place, first) for place in targets]
-            for number in numbers:
-                of_part = np.repeat(primitive_numbers[chosen] == number, 3)
-                if not of_part.any():
-                    continue
+            changed: dict[str, Any] = {"attributes": document.add_columns(columns[0])}
+            if columns[1:]:
+                changed["targets"] = [document.add_columns(table) for table in columns[1:]]
+            for number in np.unique(primitive_numbers[chosen]).tolist():
+                of_part = triangles[primitive_numbers[chosen] == number]
                 entry = copy.deepcopy(primitives[number]) | changed
-                entry["indices"] = document.add_indices(indices[of_part], len(first))
+                entry["indices"] = document.add_indices(of_part.ravel(), len(first))
                 entry.pop("mode", None)
-                entry.get("extensions", {}).pop(DRACO, None)
                 written[node].append(entry)
+    job.lost.extend(rounding_loss(mesh, found))
+    document.tree |= {} if scene.number is None else {"scene": scene.number}
     _replace_meshes(document.tree, written)
+    job.lost.extend(_drop_extensions(document.tree, written))
     return document.pack()
+
+
+def _choose_rows(columns: Columns, chosen: Int[np.ndarray, " n"]) -> Columns:
+    return {name: (values[chosen], flag) for name, (values, flag) in columns.items()}
+
+
+def _carry_columns(
+    gltf: Gltf, part: dict[str, Any], rows: Int[np.ndarray, " r"], blends: csr_array
+) -> list[Columns]:
+    """Return the attributes of a primitive at new corners, and those of each of its morph targets.
+
+    Normals, but those of targets, and tangents are made anew.
+    """
+    tables = [part["attributes"], *part.get("targets", [])]
+    return [
+        {
+            name: _blend(gltf, index, name, rows, blends)
+            for name, index in table.items()
+            if name != "TANGENT" and not (name == "NORMAL" and table is tables[0])
+        }
+        for table in tables
+    ]
+
+
+def _place_vertices(
+    place: Placement,
+    columns: list[Columns],
+    old: np.ndarray,
+    places: np.ndarray,
+    normals: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Add the positions that a node moves into places, and normals, to the columns of vertices.
+
+    What stays in its place keeps its old position, also below a node or joint of scale 0. Return
+    the side that each vertex is turned to, and the place of its rounded position.
+    """
+    table, *targets = columns
+    pose = place.matrix[None]
+    if place.bones is not None:
+        pose = pose_matrices({name: decode(*column) for name, column in table.items()}, place.bones)
+    linear = pose[:, :3, :3]
+    shifts, turns = (_morph(place, targets, name) for name in ("POSITION", "NORMAL"))
+    moves = places - transform_points(pose, old + shifts)
+    with np.errstate(over="ignore"):  # what is too large is found when places are compared
+        local = (old + np.einsum("...ij,...j->...i", np.linalg.pinv(linear), moves)).astype("<f4")
+    table["POSITION"] = local, False
+    if normals is not None:
+        normals = unit_rows(np.einsum("...ji,...j->...i", linear, normals))
+        table["NORMAL"] = unit_rows(normals - turns).astype("<f4"), False
+    return np.broadcast_to(sides(pose), len(local)), transform_points(pose, local + shifts)
+
+
+def _morph(place: Placement, targets: list[Columns], name: str) -> Any:
+    """Return what the morph targets of a mesh add to an attribute by its default weights."""
+    pairs = zip(place.weights, targets, strict=False)
+    return sum(weight * decode(*target[name]) for weight, target in pairs if name in target)
+
+
+def _drop_extensions(tree: dict[str, Any], nodes: Iterable[int]) -> list[str]:
+    """Drop the extensions of some nodes and their meshes that belong to the old geometry, and name them."""
+    owners = [tree["nodes"][node] for node in nodes]
+    meshes = [tree["meshes"][owner["mesh"]] for owner in owners if "mesh" in owner]
+    parts = [part for mesh in meshes for part in mesh["primitives"]]
+    dropped: set[str] = set()
+    for entry in [*owners, *meshes, *parts, *tree["bufferViews"]]:
+        extensions = entry.pop("extensions", {})
+        kept = {name: value for name, value in extensions.items() if name not in OF_GEOMETRY}
+        dropped |= extensions.keys() - kept.keys()
+        if kept:
+            entry["extensions"] = kept
+    text = json.dumps(tree)
+    for key in ("extensionsUsed", "extensionsRequired"):
+        names = tree.pop(key, [])
+        still_used = [name for name in names if name not in dropped or f'"{name}":' in text]
+        if still_used:
+            tree[key] = still_used
+    return [f"the extension {name}, which is about the old geometry"
+            for name in sorted(dropped.difference(COMPRESSIONS))]  # fmt: skip
 
 
 def _sharing(primitives: list[dict[str, Any]]) -> list[list[int]]:
@@ -444,7 +566,8 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
     document = _Document({"asset": {"version": "2.0", "generator": "eigenshape"}, "scene": 0})
     tree = document.tree
     tree |= {"scenes": [{"nodes": []}], "nodes": [], "meshes": []}
-    places, normals = single_precision(mesh, "GLB"), corner_normals(attributes, mesh)
+    places, offset = _local_places(mesh)
+    normals = corner_normals(attributes, mesh)
     if attributes.materials:
         tree["materials"] = [_write_material(document, m) for m in attributes.materials]
     tables: Columns = {}  # with a row for each corner
@@ -456,7 +579,8 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
     if attributes.colors is not None:
         tints = attributes.colors / 255
         tints[..., :3] = linear_colors(tints[..., :3])
-        tables["COLOR_0"] = np.rint(tints * (2**16 - 1)).astype("<u2"), True
+        # Other programs keep the low byte of colors of 16 bits (trimesh 5.2, MeshLab).
+        tables["COLOR_0"] = tints.astype("<f4"), False
     groups = np.unique(attributes.face_groups)
     for group in groups:
         in_group = np.flatnonzero(attributes.face_groups == group)
@@ -471,7 +595,7 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
             keys = [corners, *(column for values, _ in rows.values() for column in values.T)]
             first, indices = _split_corners(keys)
             positions = places[corners]
-        table = document.add_columns({"POSITION": (positions, False), **rows}, first)
+        table = document.add_columns(_choose_rows({"POSITION": (positions, False), **rows}, first))
         materials = attributes.face_materials[in_group]
         primitives: list[dict[str, Any]] = []
         for material in np.unique(materials).tolist():
@@ -483,9 +607,24 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
             primitives.append(entry | ({"material": material} if material >= 0 else {}))
         name = attributes.groups[group] if group >= 0 else ""
         tree["scenes"][0]["nodes"].append(len(tree["nodes"]))
-        tree["nodes"].append({"mesh": len(tree["meshes"]), **({"name": name} if name else {})})
+        node = {"mesh": len(tree["meshes"]), **({"name": name} if name else {})}
+        tree["nodes"].append(node | ({"translation": offset.tolist()} if offset.any() else {}))
         tree["meshes"].append({"primitives": primitives})
     return document.pack()
+
+
+def _local_places(
+    mesh: TriangleMesh,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices in single precision about a point: their middle if it is far away and helps."""
+    places = single_precision(mesh, "GLB")
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    # Of single precision too, as engines take it
+    middle = (low / 2 + high / 2).astype(np.float32).astype(np.float64)
+    is_exact = np.array_equal(places, mesh.vertices)
+    if is_exact or np.abs(middle).max() <= FAR * (high - low).max():
+        return places, np.zeros(3)
+    return (mesh.vertices - middle).astype(np.float32), middle
 
 
 def _write_material(document: _Document, material: Material) -> dict[str, Any]:

@@ -2,6 +2,11 @@
 
 Keywords, their numbers and the binary layout are those of libMeshb:
 https://github.com/LoicMarechal/libMeshb
+
+Read: simplices, quads, hexahedra, wedges and pyramids with straight sides.
+Kept: nothing besides points and cells.
+Named: solids that were cut.
+Refused: cells of higher order; a count that the file does not hold.
 """
 
 import re

@@ -1,4 +1,10 @@
-"""NumPy archives: the arrays `vertices` and `faces`, and functions on them."""
+"""NumPy archives: the arrays `vertices` and `faces`, and functions on them.
+
+Read: faces of any number of corners.
+Kept: functions: arrays whose names begin with vertex_ and face_.
+Named: other arrays.
+Refused: arrays of other shapes or types.
+"""
 
 from io import BytesIO
 
@@ -6,14 +12,15 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.formats.cells import Cells, list_corners
 from eigenshape.io.formats.numbers import require_reasonable
 
 VERTEX_FIELD, FACE_FIELD = "vertex_", "face_"  # how the names of functions begin
 Arrays = dict[str, np.ndarray]
 
 
-def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces of a .npz file."""
+def parse(data: bytes) -> tuple[np.ndarray, np.ndarray | Cells]:
+    """Read vertices and faces of a .npz file, where all faces have equally many corners."""
     arrays = _read_arrays(data)
     missing = {"vertices", "faces"} - arrays.keys()
     if missing:
@@ -28,10 +35,13 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
         or faces.dtype.kind not in "iu"
     ):
         raise FileFormatError(
-            "A .npz file of a mesh must hold vertices (n, 3) of numbers and faces (f, 3) of whole numbers; they are "
-            f"{vertices.shape} {vertices.dtype} and {faces.shape} {faces.dtype}."
+            "A .npz file of a mesh must hold vertices (n, 3) of numbers and faces (f, 3), or (f, k) of "
+            f"polygons, of whole numbers; they are {vertices.shape} {vertices.dtype} and {faces.shape} {faces.dtype}."
         )
-    return vertices.astype(np.float64), faces.astype(np.int64)
+    vertices, faces = vertices.astype(np.float64), faces.astype(np.int64)
+    if faces.shape[1] in (2, 3):
+        return vertices, faces
+    return vertices, {"polygons": list_corners(faces)}
 
 
 def _read_arrays(data: bytes) -> Arrays:
@@ -48,13 +58,17 @@ def _read_arrays(data: bytes) -> Arrays:
 
 
 def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
-    """Return the functions on vertices and those on faces, by name."""
+    """Return the functions on vertices and those on faces, by name: of polygons on their triangles."""
     of_vertices, of_faces = Arrays(), Arrays()
-    for name, array in _read_arrays(data).items():
+    arrays = _read_arrays(data)
+    shape = arrays.get("faces", np.empty(0)).shape
+    for name, array in arrays.items():
         if name.startswith(VERTEX_FIELD):
             of_vertices[name.removeprefix(VERTEX_FIELD)] = array
         elif name.startswith(FACE_FIELD):
-            of_faces[name.removeprefix(FACE_FIELD)] = array
+            are_polygons = len(shape) == 2 and shape[1] > 3 and array.shape[:1] == shape[:1]
+            values = np.repeat(array, shape[1] - 2, axis=0) if are_polygons else array
+            of_faces[name.removeprefix(FACE_FIELD)] = values
     return of_vertices, of_faces
 
 

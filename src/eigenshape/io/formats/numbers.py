@@ -1,6 +1,7 @@
 """Numbers in files: lines of text, and what a file declares, read only if the file can hold it."""
 
 import codecs
+import contextlib
 import lzma
 import zlib
 from collections.abc import Sequence
@@ -90,10 +91,17 @@ def whole(word: bytes, line: Line, what: str) -> int:
     return value
 
 
-def numbers_of(words: Sequence[bytes]) -> Float[np.ndarray, " k"]:
-    """Read words as numbers; raise ValueError if one is not a number."""
+def numbers_of(words: Sequence[bytes], kind: Any = np.float64) -> Shaped[np.ndarray, " k"]:
+    """Read words as numbers: whole numbers of `kind` if all are, otherwise in double precision.
+
+    Raise ValueError if a word is not a number.
+    """
     if b"_" in b" ".join(words):  # Python would read 1_0 as ten
         raise ValueError("numbers have no underscores")
+    if np.dtype(kind).kind in "iu":
+        # Whole numbers of 64 bits would be rounded in double precision.
+        with contextlib.suppress(ValueError, OverflowError):
+            return np.fromiter(map(int, words), kind, len(words))
     return np.fromiter(map(float, words), np.float64, len(words))
 
 
@@ -122,8 +130,8 @@ def rows_text(prefix: str, rows: np.ndarray) -> list[str]:
 MOST_TIMES = 40
 ALWAYS = 2**25  # bytes that a file of any size may unpack to
 LZMA_MEMORY = 2**27  # bytes; level 9, the most that compressors use, needs 65 MiB
-ZLIB, LZMA = "vtkZLibDataCompressor", "vtkLZMADataCompressor"
-COMPRESSORS = (ZLIB, LZMA)
+ZLIB, LZMA, LZ4 = "vtkZLibDataCompressor", "vtkLZMADataCompressor", "vtkLZ4DataCompressor"
+COMPRESSORS = (ZLIB, LZMA, LZ4)
 USUAL_WORD = 16  # bytes of a number in a text file with the space after it
 
 
@@ -163,7 +171,7 @@ class Cursor:
         if not 0 <= count * size <= left:
             raise self.too_many(count)
         if self.is_text:
-            return self._take_words(count)
+            return self._take_words(kind, count)
         found = np.frombuffer(self.data, kind, count, self.place) if count else np.empty(0, kind)
         self.place += count * size
         return found
@@ -175,7 +183,7 @@ class Cursor:
             return wholes(found, f"Counts and corners of {self.what[0].lower()}{self.what[1:]}")
         return found.astype(np.int64)
 
-    def _take_words(self, count: int) -> np.ndarray:
+    def _take_words(self, kind: Any, count: int) -> np.ndarray:
         # A window is split that grows until it holds all words, so that many short lists in a long
         # file cost no more than one long list.
         width, words = USUAL_WORD * (count + 1), list[bytes]()
@@ -186,7 +194,7 @@ class Cursor:
                 break
             width *= 2
         try:
-            found = numbers_of(words[:count])
+            found = numbers_of(words[:count], kind)
         except ValueError as err:
             raise FileFormatError(
                 f"{self.what} must hold {count} numbers at byte {self.place}; it does not: {err}."
@@ -236,13 +244,14 @@ def unpack_block(packed: bytes, size: int, compressor: str) -> bytes:
     """
     try:
         if compressor == ZLIB:
-            found = zlib.decompressobj().decompress(
-                packed, size + 1
-            )  # a limit of 0 would mean no limit
-        else:
+            # A limit of 0 would mean no limit.
+            found = zlib.decompressobj().decompress(packed, size + 1)
+        elif compressor == LZMA:
             unpacker = lzma.LZMADecompressor(memlimit=LZMA_MEMORY)
             found = unpacker.decompress(packed, max_length=size + 1)
-    except (zlib.error, lzma.LZMAError) as err:
+        else:
+            found = _unpack_lz4(packed, size)
+    except (zlib.error, lzma.LZMAError, IndexError) as err:
         raise FileFormatError(f"A compressed block must be whole; one is damaged: {err}.") from err
     if len(found) != size:
         more = "more" if len(found) > size else f"{len(found)}"
@@ -250,3 +259,46 @@ def unpack_block(packed: bytes, size: int, compressor: str) -> bytes:
             f"A compressed block must unpack to the size it declares, {size}; it unpacks to {more}."
         )
     return found
+
+
+def _unpack_lz4(packed: bytes, size: int) -> bytes:
+    """Unpack a block of LZ4, and stop beyond `size` bytes; raise IndexError if it is damaged.
+
+    A block is a row of sequences: literal bytes, then a copy of bytes that were unpacked before
+    (https://github.com/lz4/lz4/blob/dev/doc/lz4_Block_format.md).
+    """
+    out = bytearray()
+    place = 0
+    while len(out) <= size:
+        token = packed[place]
+        place += 1
+        n_literals = token >> 4
+        if n_literals == 15:
+            n_literals, place = _long_length(packed, place)
+        out += packed[place : place + n_literals]
+        place += n_literals
+        if place >= len(packed):  # the last sequence has no copy
+            break
+        back = packed[place] + 256 * packed[place + 1]
+        place += 2
+        count = token & 15
+        if count == 15:
+            count, place = _long_length(packed, place)
+        count = min(count + 4, size + 1 - len(out))
+        start = len(out) - back
+        if start < 0 or not back:
+            raise IndexError("a copy begins before the first byte")
+        piece = out[start : start + count]
+        if back < count:  # a copy that reaches its own bytes repeats itself
+            piece = (piece * (count // back + 1))[:count]
+        out += piece
+    return bytes(out)
+
+
+def _long_length(packed: bytes, place: int) -> tuple[int, int]:
+    """Return a length of 15 or more, to which bytes are added up to one below 255, and its end."""
+    total = 15
+    while packed[place] == 255:
+        total += 255
+        place += 1
+    return total + packed[place], place + 1

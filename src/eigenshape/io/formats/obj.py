@@ -1,4 +1,11 @@
-"""Wavefront OBJ: positions and faces, and the lines of a file that `obj_attributes` understands."""
+"""Wavefront OBJ: positions and faces, and the lines of a file that `obj_attributes` understands.
+
+Read: polygons of any outline, polylines, vertices in a plane, negative indices, lines that go on.
+Kept: from OBJ to OBJ all but comments, points and polylines; to others texture coordinates,
+    normals, colors, materials with their images, groups.
+Named: missing materials and images; lines that are not kept.
+Refused: a corner that is no vertex; a face that crosses itself.
+"""
 
 import codecs
 import re
@@ -9,7 +16,7 @@ from jaxtyping import Float
 
 from eigenshape._arrays import record
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.cells import fans
+from eigenshape.io.formats.cells import polygon_triangles
 from eigenshape.io.formats.numbers import (
     Line,
     coordinates,
@@ -47,7 +54,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     vertices = coordinates(positions, least=2)
     table = whole_table(cells[b"f"])
     if table is not None and table.shape[1] >= 3 and (table > 0).all():
-        return vertices, fans(table - 1)
+        return vertices, polygon_triangles(vertices, table - 1)
     kind, least, noun = b"l", 2, "polyline must have two points"
     if cells[b"f"]:
         kind, least, noun = b"f", 3, "face must have three corners"
@@ -58,7 +65,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
             raise FileFormatError(f"A {noun} or more; line {line[0]} is {quote_line(line)}.")
         rows.append([corner_index(word, line, count) for word in words])
     if cells[b"f"]:
-        return vertices, fans(rows)
+        return vertices, polygon_triangles(vertices, rows)
     pairs = [pair for row in rows for pair in pairwise(row)]
     return vertices, np.array(pairs, dtype=np.int64).reshape(-1, 2)
 

@@ -13,18 +13,18 @@ from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
 from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.polygons import cut_polygons
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
     WriteJob,
     corner_normals,
     plain_attributes,
     unit_rows,
 )
-from eigenshape.io.formats.cells import fans
 from eigenshape.io.formats.numbers import rows_text
 from eigenshape.io.formats.obj import Corner, ObjSheet, read_sheet
+from eigenshape.io.opening import SourceFile
 
 MAP = re.compile(r"(?im)^([ \t]*(?:map_\w+|bump|disp|decal|norm|refl)[ \t]+)(.+?)[ \t\r]*$")
 PLAIN_MATERIAL = {"newmtl", "kd", "d", "tr", "map_kd", "ka", "ke", "ks", "ns", "ni", "illum"}
@@ -37,16 +37,16 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     coordinates = np.array(
         [[*map(float, row.split()[1:3]), 0.0][:2] for row in _rows(sheet, "vt")] or [[0.0, 0.0]]
     )
-    _, textures, normals = np.moveaxis(_triangle_corners(sheet), 2, 0)
+    places, polygon_of, _, corners = _cut_polygons(sheet)
+    _, textures, normals = np.moveaxis(corners[places], 2, 0)
     if textures.max() > len(coordinates):
         raise FileFormatError(
             f"A corner must name one of {len(coordinates)} texture coordinates; one names {textures.max()}."
         )
-    faces_of = np.array([len(polygon) - 2 for polygon in sheet.polygons])
     groups, face_groups = _switches(sheet, ("g ", "o "))
     names, face_materials = _switches(sheet, ("usemtl ",))
     defined, others = _read_materials(sheet, source)
-    if (faces_of > 1).any():
+    if len(polygon_of) > len(sheet.polygons):
         others.append("polygons, of which triangles are made")
     if _rows(sheet, "o") and _rows(sheet, "g"):
         others.append("names of objects beside those of groups")
@@ -56,8 +56,8 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     has_normals = (normals >= 0).any()
     return replace(
         plain_attributes(mesh),
-        face_materials=np.repeat(face_materials, faces_of),
-        face_groups=np.repeat(face_groups, faces_of),
+        face_materials=face_materials[polygon_of],
+        face_groups=face_groups[polygon_of],
         texture_coordinates=coordinates[textures - 1] if textures.any() else None,
         normals=np.array([*sheet.normals, (0.0, 0.0, 0.0)])[normals] if has_normals else None,
         colors=_colors(sheet)[mesh.faces]
@@ -70,11 +70,21 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     )
 
 
-def _triangle_corners(sheet: ObjSheet) -> Int[np.ndarray, "f 3 3"]:
-    """Return the corners of triangles; each polygon is a fan of them around its first corner."""
+def _cut_polygons(
+    sheet: ObjSheet,
+) -> tuple[
+    Int[np.ndarray, "f 3"], Int[np.ndarray, " f"], Int[np.ndarray, " p1"], Int[np.ndarray, "k 3"]
+]:
+    """Return triangles and their polygons, and where the corners of polygons begin, and they.
+
+    A triangle names three of these corners.
+    """
     corners = np.array([corner for polygon in sheet.polygons for corner in polygon])
-    ends = np.cumsum([0, *map(len, sheet.polygons)]).tolist()
-    return corners[fans([range(start, end) for start, end in pairwise(ends)])]
+    starts = np.cumsum([0, *map(len, sheet.polygons)])
+    places, polygon_of, _ = cut_polygons(
+        sheet.vertices[corners[:, 0]], starts, np.arange(len(corners))
+    )
+    return places, polygon_of, starts, corners
 
 
 def _rows(sheet: ObjSheet, keyword: str) -> list[str]:
@@ -205,8 +215,9 @@ def write(job: WriteJob) -> Files:
 def format_sheet(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
     """Write a repaired or deformed mesh with the remaining polygons, textures and groups.
 
-    A polygon is kept if all its triangles still exist. Otherwise its remaining triangles are
-    written. Triangles that the file does not have, such as those of a filled hole, come last.
+    A polygon is kept if all its triangles still exist, and are those that a reader would cut it
+    into. Otherwise its remaining triangles are written. Triangles that the file does not have, such
+    as those of a filled hole, come last.
 
     Parameters
     ----------
@@ -217,31 +228,8 @@ def format_sheet(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh
     mesh : TriangleMesh
         The same faces, with the vertices to write.
     """
-    # The new corners at the three corners of each triangle of the file that is still there
-    file_corners = attributes.corners.indices[attributes.corners.indptr[:-1]].reshape(-1, 3)
-    order = np.argsort(file_corners % 3, axis=1)
-    is_old = attributes.from_file & (np.sort(file_corners % 3, axis=1) == np.arange(3)).all(axis=1)
-    corners_of: dict[int, list[int]] = {}
-    added: list[int] = []
-    for face, corners in enumerate((3 * np.arange(mesh.n_faces)[:, None] + order).tolist()):
-        triangle = int(file_corners[face, 0]) // 3
-        if is_old[face] and triangle not in corners_of:
-            corners_of[triangle] = corners
-        else:
-            added.append(face)
-
-    rows: list[str | list[Corner]] = []
-    new_vertices = mesh.faces.ravel().tolist()
-    n_triangles = n_textures = 0
-    for row in sheet.rows:
-        if isinstance(row, str):
-            rows.append(row)
-            n_textures += row.split(None, 1)[0] == "vt"
-            continue
-        polygon = sheet.polygons[row]
-        triangles = [corners_of.get(n_triangles + place) for place in range(len(polygon) - 2)]
-        n_triangles += len(triangles)
-        rows += _pieces(polygon, triangles, new_vertices)
+    rows, added = _remaining_rows(sheet, attributes, mesh)
+    n_textures = len(_rows(sheet, "vt"))
     for face in added:
         group, material = attributes.face_groups[face], attributes.face_materials[face]
         rows += [f"g {_latin(attributes.groups[group])}"] if group >= 0 else []
@@ -270,40 +258,58 @@ def format_sheet(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh
     return ("\n".join(lines) + "\n").encode("latin-1")
 
 
-def _pieces(
-    polygon: Sequence[Corner], triangles: Sequence[list[int] | None], new_vertices: Sequence[int]
-) -> list[list[Corner]]:
-    """Return what is left of a polygon, with new vertices: the whole, or some triangles.
+def _remaining_rows(
+    sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh
+) -> tuple[list[str | list[Corner]], list[int]]:
+    """Return the lines and faces of a file that are left, and the faces that it does not have."""
+    places, polygon_of, starts, corners = _cut_polygons(sheet)
+    # The new corners at the three corners of each triangle of the file that is still there
+    file_corners = attributes.corners.indices[attributes.corners.indptr[:-1]].reshape(-1, 3)
+    order = np.argsort(file_corners % 3, axis=1)
+    is_old = attributes.from_file & (np.sort(file_corners % 3, axis=1) == np.arange(3)).all(axis=1)
+    old_faces = np.flatnonzero(is_old)
+    kept, firsts = np.unique(file_corners[old_faces, 0] // 3, return_index=True)
+    kept_faces = old_faces[firsts]
+    turns = np.full(len(places), -1)  # -1 if the triangle is gone, 1 if it is turned over
+    turns[kept] = (order[kept_faces, 1] - order[kept_faces, 0]) % 3 == 2
+    new_corners = np.full(places.shape, -1)
+    new_corners[kept] = np.take_along_axis(mesh.faces[kept_faces], order[kept_faces], axis=1)
+    # A polygon is whole if its triangles agree on their corners, and a reader cuts it into them.
+    outlines = np.full(len(corners), -1)
+    outlines[places[kept]] = new_corners[kept]
+    cut, _, crossed = cut_polygons(mesh.vertices[outlines], starts, np.arange(len(corners)))
+    first_triangles = starts - 2 * np.arange(len(starts))  # of each polygon
+    is_same = (
+        (turns >= 0)
+        & (turns == turns[first_triangles[polygon_of]])
+        & (outlines[places] == new_corners).all(axis=1)
+        & (cut == places).all(axis=1)
+        & ~np.isin(polygon_of, crossed)
+    )
+    is_whole = np.bincount(polygon_of[~is_same], minlength=len(starts) - 1) == 0
 
-    It is whole if its triangles are all there, join as before, and none or all of them are turned
-    over.
-    """
-    left = [corners for corners in triangles if corners is not None]
-    joins = [
-        (new_vertices[one[0]], new_vertices[one[2]]) == (new_vertices[two[0]], new_vertices[two[1]])
-        for one, two in pairwise(left)
-    ]
-    if len(left) == len(triangles) and all(joins) and len({*map(_is_turned, left)}) == 1:
-        pieces = [(polygon, [*left[0][:2], *(corners[2] for corners in left)])]
-    else:
-        pieces = [
-            ((polygon[0], polygon[place], polygon[place + 1]), corners)
-            for place, corners in enumerate(triangles, 1)
-            if corners is not None
-        ]
-    rows = []
-    for old, corners in pieces:
-        row = [
-            (new_vertices[corner], texture, normal)
-            for corner, (_, texture, normal) in zip(corners, old, strict=True)
-        ]
-        rows.append([row[0], *row[:0:-1]] if _is_turned(corners) else row)
-    return rows
-
-
-def _is_turned(corners: Sequence[int]) -> bool:
-    """Return whether the first two corners of a face are in reverse order."""
-    return (corners[1] - corners[0]) % 3 == 2
+    rows: list[str | list[Corner]] = []
+    old_corners, vertices_at = corners.tolist(), outlines.tolist()
+    for row in sheet.rows:
+        if isinstance(row, str):
+            rows.append(row)
+            continue
+        start, end = int(starts[row]), int(starts[row + 1])
+        triangles = range(first_triangles[row], first_triangles[row + 1])
+        pieces = [(old_corners[start:end], vertices_at[start:end], turns[triangles[0]])]
+        if not is_whole[row]:
+            pieces = [
+                (corners[places[t]].tolist(), new_corners[t].tolist(), turns[t])
+                for t in triangles
+                if turns[t] >= 0
+            ]
+        for old_ones, vertices, is_turned in pieces:
+            piece = [
+                (vertex, texture, normal)
+                for vertex, (_, texture, normal) in zip(vertices, old_ones, strict=True)
+            ]
+            rows.append([piece[0], *piece[:0:-1]] if is_turned else piece)
+    return rows, np.setdiff1d(np.arange(mesh.n_faces), kept_faces).tolist()
 
 
 def _vertex_lines(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh) -> list[str]:
@@ -315,7 +321,8 @@ def _vertex_lines(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMes
     shared = min(mesh.n_vertices, len(sheet.vertices))
     stays = (attributes.mesh.vertices[:shared] == sheet.vertices[:shared]).all(axis=1)
     tails = {index: sheet.tails[index] for index in np.flatnonzero(stays).tolist()}
-    file_vertices = _triangle_corners(sheet)[..., 0].ravel()
+    places, _, _, corners = _cut_polygons(sheet)
+    file_vertices = corners[places, 0].ravel()
     starts = attributes.corners.indptr
     singles = np.flatnonzero(np.diff(starts) == 1)
     sources = file_vertices[attributes.corners.indices[starts[singles]]]
@@ -331,13 +338,14 @@ def _normals(
     numbers: dict[tuple[int, tuple[float, ...]], int] = {}
     owners, triangles = [], []
     for row in faces:
-        corners = fans([[vertex for vertex, _, _ in row]]).tolist()
+        # The area vectors of a fan have the same sum as those of any other triangles.
+        fan = [(row[0][0], one[0], two[0]) for one, two in pairwise(row[1:])]
         for vertex, _, normal in row:
             if normal >= 0:
                 key = (vertex, sheet.normals[normal])
                 number = numbers.setdefault(key, len(numbers))
-                triangles += corners
-                owners += [number] * len(corners)
+                triangles += fan
+                owners += [number] * len(fan)
     if not numbers:
         return np.empty((0, 3)), numbers
     vectors = area_vectors(vertices[np.array(triangles)])

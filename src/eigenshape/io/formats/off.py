@@ -1,4 +1,10 @@
-"""Object File Format: counts, vertices and faces, as text or binary."""
+"""Object File Format: counts, vertices and faces, as text or binary.
+
+Read: polygons of any outline; binary files; OFF, COFF, NOFF, CNOFF, STOFF and 4OFF.
+Kept: nothing besides positions and faces.
+Named: colors, normals and texture coordinates, which are not read.
+Refused: a count that the file does not hold; a face that crosses itself; other dimensions (nOFF).
+"""
 
 import re
 from collections.abc import Sequence
@@ -7,7 +13,7 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cells import fans
+from eigenshape.io.formats.cells import polygon_triangles
 from eigenshape.io.formats.numbers import (
     Line,
     coordinates,
@@ -19,13 +25,14 @@ from eigenshape.io.formats.numbers import (
     whole_table,
 )
 
-KEYWORD = re.compile(rb"(?:ST)?C?N?OFF(?P<glued>\d*)", re.IGNORECASE)  # some write OFF8 6 12
+# CGAL writes STCNOFF, MeshLab NCOFF, and some OFF8 6 12; nOFF has any number of coordinates.
+KEYWORD = re.compile(rb"(?!.*nOFF)(?i:(?:ST|C|N)*OFF)(?P<glued>\d*)")
 PLAIN = re.compile(rb"OFF", re.IGNORECASE)  # three numbers a vertex
 BINARY = re.compile(rb"OFF[ \t]+BINARY[ \t]*\r?\n", re.IGNORECASE)
 
 
-def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces; polygons become fans; colors and normals are ignored."""
+def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
+    """Read vertices and faces, and name what else vertices and faces have."""
     binary = BINARY.match(data)
     if binary:
         return _parse_binary(data[binary.end() :])
@@ -35,7 +42,8 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     match = KEYWORD.fullmatch(keyword)
     if match is None:
         raise FileFormatError(
-            f"An OFF file must begin with OFF, COFF, NOFF or the like; it begins with {quote_line(first)}."
+            "An OFF file must begin with OFF, COFF, NOFF or the like, and have three coordinates a "
+            f"vertex; it begins with {quote_line(first)}. Save it as OFF."
         )
     # The counts stand behind the keyword or in the next line.
     counts, rows = (first[0], b" ".join([match["glued"], *words]).strip()), lines[1:]
@@ -67,15 +75,20 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
                 f"All vertices must have equally many columns; the first has {widths[0]} and "
                 f"line {row[0]} is {quote_line(row)}."
             )
-    return coordinates(rows[:n_vertices]), _triangles(rows[n_vertices:])
+    vertices = coordinates(rows[:n_vertices])
+    faces = _faces(rows[n_vertices:])
+    n_words = sum(len(text.split()) for _, text in rows[n_vertices:])
+    has_more = max(widths, default=3) > 3 or n_words > len(faces) + sum(map(len, faces))
+    notes = ["colors, normals and texture coordinates are not read"] if has_more else []
+    return vertices, polygon_triangles(vertices, faces), *notes
 
 
-def _triangles(rows: Sequence[Line]) -> np.ndarray:
+def _faces(rows: Sequence[Line]) -> np.ndarray | list[list[int]]:
     table = whole_table(rows)
     if table is not None and 3 <= table[0, 0] < table.shape[1]:
         size = table[0, 0]
         if (table[:, 0] == size).all():
-            return fans(table[:, 1 : 1 + size])
+            return table[:, 1 : 1 + size]
     polygons = []
     for row in rows:
         words = row[1].split()
@@ -85,7 +98,7 @@ def _triangles(rows: Sequence[Line]) -> np.ndarray:
                 f"A face must have three corners or more, as many as it says; line {row[0]} is {quote_line(row)}."
             )
         polygons.append([whole(word, row, "A corner") for word in words[1 : 1 + count]])
-    return fans(polygons)
+    return polygons
 
 
 def _parse_stream(
@@ -101,7 +114,8 @@ def _parse_stream(
     if polygons is None:
         return None
     numbers = [number(word, (at, word)) for at, word in words[:n_numbers]]
-    return np.array(numbers).reshape(-1, 3), fans(polygons)
+    vertices = np.array(numbers).reshape(-1, 3)
+    return vertices, polygon_triangles(vertices, polygons)
 
 
 def _parse_binary(body: bytes) -> tuple[np.ndarray, np.ndarray]:
@@ -119,8 +133,9 @@ def _parse_binary(body: bytes) -> tuple[np.ndarray, np.ndarray]:
         for has_colors in True, False:
             polygons = _polygons(numbers[place:], n_faces, has_colors=has_colors)
             if polygons is not None:
-                vertices = np.frombuffer(body, f"{order}f4", 3 * n_vertices, 12).reshape(-1, 3)
-                return vertices.astype(np.float64), fans(polygons)
+                floats = np.frombuffer(body, f"{order}f4", 3 * n_vertices, 12)
+                vertices = floats.reshape(-1, 3).astype(np.float64)
+                return vertices, polygon_triangles(vertices, polygons)
     raise FileFormatError(
         f"A binary OFF file must hold 32-bit counts, x, y and z of each vertex, and faces that fill it; it does not, "
         f"in {len(body)} bytes."

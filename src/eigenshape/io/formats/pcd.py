@@ -1,4 +1,11 @@
-"""Point Cloud Data, versions .6 and .7: text, binary, and binary compressed by LZF."""
+"""Point Cloud Data, versions .6 and .7: text, binary, and binary compressed by LZF.
+
+Read: text, binary and compressed; a grid of a depth camera.
+Kept: nothing besides positions.
+Named: other fields, such as colors and intensities; points that are not finite, if they are left
+    out.
+Refused: fields of positions of other sizes.
+"""
 
 import struct
 from dataclasses import dataclass
@@ -31,16 +38,22 @@ class Header:
     places: list[int]  # of x, y and z among the words of a text file
     n_words: int
     n_points: int
+    others: tuple[bytes, ...]  # fields besides x, y and z
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray]:
-    """Read x, y and z; other fields are ignored. Missing returns remain NaN, as in the file."""
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str, ...]]:
+    """Read x, y and z; other fields are named. Missing returns remain NaN, as in the file."""
     lines, kind, body = _split(data)
     header = _header(lines)
     n_points, record = header.n_points, header.record
+    notes = (
+        [f"the fields {b', '.join(header.others).decode('latin-1')} are not read"]
+        if header.others
+        else []
+    )
     if kind == b"ascii":
         first = data[: len(data) - len(body)].count(b"\n") + 1
-        return _parse_text(header, lines_of(body, first)), NO_TRIANGLES
+        return _parse_text(header, lines_of(body, first)), NO_TRIANGLES, *notes
     if kind == b"binary":
         _require_bytes(header, body)
         rows = np.frombuffer(body, record, n_points)
@@ -69,7 +82,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray]:
         raise FileFormatError(
             f"DATA of a PCD file must be ascii, binary or binary_compressed; it is {quote_line((0, kind))}."
         )
-    return np.column_stack([column.astype(np.float64) for column in columns]), NO_TRIANGLES
+    return np.column_stack([column.astype(np.float64) for column in columns]), NO_TRIANGLES, *notes
 
 
 def n_rows(data: bytes) -> int:
@@ -135,7 +148,8 @@ def _header(lines: list[Line]) -> Header:
     record = np.dtype(
         {"names": [*"xyz"], "formats": types, "offsets": offsets, "itemsize": sum(n_bytes)}
     )
-    return Header(record, [sum(counts[:place]) for place in axes], sum(counts), n_points)
+    others = tuple(name for name in names if name not in (*AXES, b"_"))  # _ fills gaps
+    return Header(record, [sum(counts[:place]) for place in axes], sum(counts), n_points, others)
 
 
 def _numbers(line: Line, what: str) -> tuple[int, ...]:

@@ -1,4 +1,11 @@
-"""Polygon File Format: a header that declares tables, then their rows, as text or binary of either order."""
+"""Polygon File Format: a header that declares tables, then their rows, as text or binary of either order.
+
+Read: polygons of any outline and strips, text and binary of both orders, all types of numbers.
+Kept: texture coordinates, normals, colors of vertices and faces, labels, fields, the image of a
+    comment.
+Named: elements with corners under another name; lists; missing images.
+Refused: a row that is not there; a face that crosses itself.
+"""
 
 import re
 import struct
@@ -11,7 +18,12 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cells import NO_TRIANGLES, fans, strip_triangles
+from eigenshape.io.formats.cells import (
+    NO_TRIANGLES,
+    list_corners,
+    polygon_triangles,
+    strip_triangles,
+)
 from eigenshape.io.formats.numbers import (
     Line,
     lines_of,
@@ -31,6 +43,7 @@ Table = dict[str, Any]  # the values of each column, by name
 TYPES = {
     "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",
     "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f", "float64": "d",
+    "int64": "q", "uint64": "Q",  # which meshio writes
 }  # fmt: skip
 TEXT = "text"
 ORDERS = {"ascii": TEXT, "binary_little_endian": "<", "binary_big_endian": ">"}
@@ -76,8 +89,8 @@ class Header:
     n_lines: int
 
 
-def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Read vertices and faces; polygons and strips become triangles, the rest is ignored."""
+def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
+    """Read vertices and faces, where polygons and strips become triangles; name other elements."""
     tables = read_tables(data)
     vertices = np.column_stack(
         [np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES]
@@ -91,12 +104,20 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
                 f"A face must have three corners or more; face {index} is {list(map(int, corners))}."
             )
     if len(polygons):
-        triangles.append(fans(polygons.astype(np.int64) if are_equal else polygons))
+        corners = polygons.astype(np.int64) if are_equal else polygons
+        triangles.append(polygon_triangles(vertices, corners))
     for strip in read_lists(tables, "tristrips"):
         corners = np.asarray(strip, dtype=np.int64)
         pieces = np.split(corners, np.flatnonzero(corners == -1))  # -1 separates strips
-        triangles.append(strip_triangles([piece[piece != -1] for piece in pieces]))
-    return vertices, np.concatenate(triangles)
+        strips = list_corners([piece[piece != -1].tolist() for piece in pieces])
+        triangles.append(strip_triangles(strips)[0])
+    others = [name for name in tables if len(read_lists(tables, name))]
+    notes = [
+        f"the element {name}, which has {CORNERS[0]}, is not read"
+        for name in others
+        if name not in ("face", "tristrips")
+    ]
+    return vertices, np.concatenate(triangles), *notes
 
 
 def parse_header(data: bytes) -> Header:

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +12,15 @@ from jaxtyping import Float
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.polygons import triangulate_polygons
 from eigenshape.io.attributes import (
     Material,
     MeshAttributes,
-    SourceFile,
     WriteJob,
     corner_normals,
     plain_attributes,
 )
-from eigenshape.io.formats.cells import fans
+from eigenshape.io.formats.cells import list_corners
 from eigenshape.io.formats.obj_attributes import add_image, find_beside
 from eigenshape.io.formats.ply import (
     AXES,
@@ -34,6 +33,7 @@ from eigenshape.io.formats.ply import (
     read_lists,
     read_tables,
 )
+from eigenshape.io.opening import SourceFile
 
 IMAGE = re.compile(rb"(?m)^comment TextureFile[ \t]+(.+?)[ \t\r]*$")  # as MeshLab writes it
 TINTS = ("red", "green", "blue")
@@ -72,7 +72,8 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         if (coordinates := take("vertex", pair)) is not None:
             found["texture_coordinates"] = coordinates[mesh.faces]
     if are_faces and "texture_coordinates" not in found and ("face", WEDGES) in left:
-        found["texture_coordinates"] = _wedges(tables["face"][WEDGES], polygons)
+        points = np.column_stack([_numbers(tables["vertex"][axis]) for axis in AXES])
+        found["texture_coordinates"] = _wedges(tables["face"][WEDGES], polygons, points)
         del left["face", WEDGES]
     for element, rows in (("vertex", mesh.faces), ("face", np.column_stack([polygon_of] * 3))):
         names = [*TINTS, *(["alpha"] if (element, "alpha") in left else [])]
@@ -94,7 +95,9 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         is_of_faces = element == "face" and are_faces and mesh.n_faces != mesh.n_vertices
         if not column.length_kind and name not in fields and (element == "vertex" or is_of_faces):
             # As one of the types that PLY files are written in
-            kinds = {"B": np.uint8, "b": np.int32, "h": np.int32, "H": np.int32, "i": np.int32}
+            kinds = (
+                {"B": np.uint8} | dict.fromkeys("bhHi", np.int32) | dict.fromkeys("Iq", np.int64)
+            )
             values = (
                 _numbers(tables[element][name]).ravel().astype(kinds.get(column.kind, np.float64))
             )
@@ -119,16 +122,18 @@ def _read_images(source: SourceFile, end: int) -> tuple[tuple[Material, ...], li
     return (Material(path.stem, image=read_regular(path, "an image"), image_name=path.name),), []
 
 
-def _wedges(rows: Any, polygons: Any) -> Float[np.ndarray, "f 3 2"]:
+def _wedges(
+    rows: Any, polygons: Any, points: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "f 3 2"]:
     """Return the texture coordinates at the corners of triangles, from those of polygons."""
-    sizes = [len(row) for row in rows]
-    if sizes != [2 * len(polygon) for polygon in polygons]:
+    if [len(row) for row in rows] != [2 * len(polygon) for polygon in polygons]:
         raise FileFormatError(
             f"{WEDGES} of a face must hold two numbers for each corner; it does not."
         )
     pairs = np.concatenate([_numbers(row) for row in rows]).reshape(-1, 2)
-    ends = np.cumsum([0, *sizes]) // 2
-    return pairs[fans([range(first, last) for first, last in pairwise(ends.tolist())])]
+    lists = list_corners(polygons)
+    places = np.arange(len(pairs))
+    return pairs[triangulate_polygons(points[lists.corners], lists.starts, places)[0]]
 
 
 def _numbers(values: Any) -> Float[np.ndarray, "..."]:

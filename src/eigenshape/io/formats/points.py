@@ -1,4 +1,10 @@
-"""Tables of points: plain text, and the binary point sets that some scanners' programs write under the same suffix."""
+"""Tables of points: plain text, and the binary point sets that some scanners' programs write under the same suffix.
+
+Read: rows of three numbers.
+Kept: nothing besides positions.
+Named: columns after the third.
+Refused: a row with fewer numbers; landmarks under the same suffix.
+"""
 
 import numpy as np
 from jaxtyping import Float
@@ -10,10 +16,15 @@ from eigenshape.io.formats.numbers import coordinates, lines_of, quote_line, row
 EXPE = b"[Expe/PointSet/Binary/"
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray]:
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str, ...]]:
     """Read the first three numbers of each line; a first line with one number alone declares how many follow."""
     if data.startswith(EXPE):
         return _parse_binary(data), NO_TRIANGLES
+    if data.startswith(b"Version 1.0"):
+        raise FileFormatError(
+            "A file of points must hold rows of numbers; this one holds landmarks of Landmark Editor. "
+            "es.morphometrics.read_landmarks reads them."
+        )
     lines = lines_of(data)
     if lines and len(lines[0][1].split()) == 1:
         declared = whole(lines[0][1], lines[0], "A number of points")
@@ -24,7 +35,9 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray]:
             )
     if not lines:
         raise FileFormatError("A file of points must hold points; it holds none.")
-    return coordinates(lines), NO_TRIANGLES
+    more = len(lines[0][1].split()) - 3
+    notes = [f"{more} columns after x, y and z are not read"] if more > 0 else []
+    return coordinates(lines), NO_TRIANGLES, *notes
 
 
 def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:

@@ -55,17 +55,18 @@ class Format:
         - "attributes": the file holds more than positions and faces. The module whose name ends in
           ``_attributes`` has `read_attributes(source, mesh)`, and `write(job)`, which returns the
           files to write.
-        - "fields": `parse_fields(data)` returns the functions on points and those on cells;
+        - "fields": `parse_fields(data)` returns the functions on points, those on the simplices that
+          are read, and notes, as `parse` does;
           `format_fields(mesh, of_points, of_cells)` writes them with the mesh.
         - "maps": the file holds functions on vertices and no mesh. `parse_fields(data)` returns them and
           an empty dictionary; `format_maps(mesh, of_points, suffix)` writes those of a mesh.
         - "parcels": the file holds a parcellation and no mesh. `parse_parcels(data, mesh)` returns
-          it; `format_parcels(mesh, parcellation)` writes that of a mesh.
+          it, and notes; `format_parcels(mesh, parcellation)` writes that of a mesh.
         - "volume": the file holds a number for each voxel. `parse_volume(data)` returns them, and
           the affine map from voxels to space.
         - "colors": colors of vertices can be written.
         - "labels": labels of faces can be written. Other formats with colors get a material for each.
-        - "beside": parts of the file lie in its folder, which `parse` takes as well.
+        - "beside": parts of the file may lie in its folder, which the parsers take as well.
         - "scenes": the file may hold several scenes; `parse` takes the name or number of one.
         - "upright": the y axis points up, by the format (glTF) or by habit (OBJ).
         - "single": the binary form stores coordinates in single precision.
@@ -85,13 +86,15 @@ FORMATS = (
     Format(".obj", "obj", ("cells", "text", "colors", "attributes", "upright")),
     Format(".ply", "ply", ("cells", "text", "binary", "cloud", "colors", "labels", "attributes")),
     Format(".stl", "stl", ("cells", "text", "binary", "single")),
-    Format(".glb", "gltf", ("cells", "binary", "colors", "attributes", "upright")),
-    Format(".gltf", "gltf", ("cells", "attributes", "beside", "upright")),
+    Format(".glb", "gltf", ("cells", "binary", "colors", "attributes", "upright", "scenes")),
+    Format(".gltf", "gltf", ("cells", "attributes", "beside", "upright", "scenes")),
     Format(".vtu", "vtu", ("cells", "binary", "fields")),
+    Format(".vtp", "vtp", ("cells", "binary", "fields")),
     Format(".vtk", "vtk", ("cells", "binary", "fields")),
     Format(".npz", "npz", ("cells", "binary", "fields")),
-    Format(".gii", "neuro.gifti", ("cells", "binary", "fields", "single")),
-    Format(".surf", "neuro.freesurfer", ("cells", "binary", "single")),
+    Format(".gii", "neuro.gifti", ("cells", "binary", "fields", "attributes", "beside", "single")),
+    Format(".surf", "neuro.freesurfer", ("cells", "binary", "attributes", "single")),
+    Format(".mniobj", "neuro.mni_obj", ("cells",)),
     Format(".mesh", "medit", ("cells",)),
     Format(".meshb", "medit", ("cells",)),
     Format(".msh", "gmsh", ("cells",)),
@@ -99,25 +102,33 @@ FORMATS = (
     Format(".xyz", "points", ("points", "cloud")),
     Format(".pts", "points", ("points", "cloud")),
     Format(".pcd", "pcd", ("points",)),
-    Format(".func.gii", "neuro.gifti", ("maps",)),
-    Format(".shape.gii", "neuro.gifti", ("maps",)),
-    Format(".label.gii", "neuro.gifti", ("maps", "parcels")),
+    Format(".func.gii", "neuro.gifti", ("maps", "beside")),
+    Format(".shape.gii", "neuro.gifti", ("maps", "beside")),
+    Format(".label.gii", "neuro.gifti", ("maps", "parcels", "beside")),
     Format(".dscalar.nii", "neuro.cifti", ("maps",)),
     Format(".dtseries.nii", "neuro.cifti", ("maps",)),
     Format(".dlabel.nii", "neuro.cifti", ("maps", "parcels")),
+    Format(".nii", "neuro.nifti", ("maps", "volume")),
+    Format(".nii.gz", "neuro.nifti", ("maps", "volume")),
     Format(".curv", "neuro.freesurfer", ("maps",)),
     Format(".mgh", "neuro.freesurfer", ("maps", "volume")),
     Format(".mgz", "neuro.freesurfer", ("maps", "volume")),
-    Format(".nii", "neuro.nifti", ("volume",)),
-    Format(".nii.gz", "neuro.nifti", ("volume",)),
     Format(".annot", "neuro.annotations", ("parcels",)),
     Format(".label", "neuro.annotations", ("parcels",)),
 )
 # FreeSurfer names a surface by what it is, such as lh.pial and lh.thickness. Such files are
 # recognized by their first bytes, and named by the hemisphere if they are yet to be written.
-SIGNATURES = {b"\xff\xff\xfe": ".surf", b"\xff\xff\xff": ".curv"}
+SIGNATURES = {
+    b"\xff\xff\xfe": ".surf",
+    b"\xff\xff\xfd": ".surf",
+    b"\xff\xff\xff": ".curv",
+    b"#!ascii version of": ".surf",
+}
 HEMISPHERES = ("lh.", "rh.")
 GZ = ".gz"  # after the suffix of any format: the file is unpacked when it is read
+
+OTHER_VTK = (".vti", ".vtr", ".vts", ".vtm", ".vtmb", ".pvtu", ".pvtp", ".vtkhdf")
+VTK_REMEDY = ' In PyVista, pyvista.read(path).extract_surface().save("a.vtp") writes the surface.'
 
 
 def suffixes_with(*traits: Trait) -> tuple[str, ...]:
@@ -159,7 +170,18 @@ def suffix_in(name: str) -> str:
 def signed_suffix(path: Path) -> str:
     """Return the suffix of a file that is known by its first bytes, otherwise an empty text."""
     with path.open("rb") as file:
-        return SIGNATURES.get(file.read(3), "")
+        head = file.read(20)
+    return suffix_of_bytes(head, path.stat().st_size)
+
+
+def suffix_of_bytes(head: bytes, size: int) -> str:
+    """Return the suffix of the format whose first bytes or size a file has, or an empty text."""
+    if size == 6 + 2 * int.from_bytes(head[:3]):
+        return ".curv"  # its old form: the numbers of vertices and faces, then 16 bits a vertex
+    suffix = next((each for start, each in SIGNATURES.items() if head.startswith(start)), "")
+    # Old surfaces of quadrangles begin as functions do, which have a 1 in their header: one number
+    # a vertex. In a surface, the first vertex has its y and z there.
+    return ".surf" if suffix == ".curv" and int.from_bytes(head[11:15]) != 1 else suffix
 
 
 def written_suffix(path: Path, known: tuple[str, ...]) -> str:
@@ -190,11 +212,12 @@ def suffix_of(path: Path, file_format: str | None, known: tuple[str, ...]) -> st
             require_regular(path)
         found = f"is {suffix!r}" if suffix else "has no suffix"
         remedies = {
+            VOLUME_FORMATS: " es.io.read_volume reads the volume in it.",
             MAP_FORMATS: " es.io.read_fields reads the functions in it.",
             PARCEL_FORMATS: " es.io.read_parcellation reads the parcels in it.",
-            VOLUME_FORMATS: " es.io.read_volume reads the volume in it.",
+            OTHER_VTK: VTK_REMEDY,
         }
-        remedy = next((text for kind, text in remedies.items() if suffix in kind), "")
+        remedy = "".join(text for kind, text in remedies.items() if suffix in kind)
         raise FileFormatError(
             f"{path} must be of a known format, {', '.join(known)}; it {found}.{remedy}"
         )

@@ -1,45 +1,247 @@
-"""Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID, and functions on them."""
+"""Legacy VTK files, text or binary: POLYDATA and UNSTRUCTURED_GRID, and functions on them.
+
+Read: POLYDATA and UNSTRUCTURED_GRID, text and binary, cells of all kinds but polyhedra, by their
+    corners.
+Kept: functions on points and cells, of all types of numbers, masks and colors.
+Named: cells that were cut or read by their corners; arrays of text; data of unknown kinds.
+Refused: other data sets, with the call of PyVista that writes their surface; polyhedra.
+"""
 
 import re
+import string
+from typing import Any
+from urllib.parse import quote, unquote_to_bytes
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cells import (
-    FOUR_CORNERED,
-    NO_TRIANGLES,
-    SEGMENTS,
-    CellLists,
-    Cells,
-    cells_of_types,
-    fans,
-    strip_triangles,
-)
+from eigenshape.io.formats.cells import FOUR_CORNERED, CellLists, Cells
 from eigenshape.io.formats.numbers import Cursor, quote_line
+from eigenshape.io.formats.vtk_cells import (
+    POLY_VERTEX,
+    POLYGON,
+    POLYLINE,
+    STRIP,
+    Arrays,
+    VtkShape,
+    fit_fields,
+    other_dataset,
+    sort_cells,
+    surface_lists,
+)
 
 KINDS = {
-    b"float": ">f4", b"double": ">f8", b"char": ">i1", b"unsigned_char": ">u1", b"int": ">i4",
-    b"vtktypeint64": ">i8", b"vtktypeint32": ">i4", b"long": ">i8",
+    b"float": ">f4", b"double": ">f8", b"bit": ">u1", b"char": ">i1", b"signed_char": ">i1",
+    b"unsigned_char": ">u1", b"short": ">i2", b"unsigned_short": ">u2", b"int": ">i4",
+    b"unsigned_int": ">u4", b"long": ">i8", b"unsigned_long": ">u8",
     b"vtkidtype": ">i4",  # which VTK writes as an int, whatever its size in memory
+    **{f"vtktypeint{8 * size}".encode(): f">i{size}" for size in (1, 2, 4, 8)},
+    **{f"vtktypeuint{8 * size}".encode(): f">u{size}" for size in (1, 2, 4, 8)},
 }  # fmt: skip
-# Fewest points of a cell of each section.
-SECTIONS = {b"VERTICES": 1, b"LINES": 2, b"POLYGONS": 3, b"TRIANGLE_STRIPS": 3, b"CELLS": 1}
+TEXTS = (b"string", b"utf8_string", b"variant")
+OF_SURFACES = {
+    POLY_VERTEX: b"VERTICES", POLYLINE: b"LINES", POLYGON: b"POLYGONS", STRIP: b"TRIANGLE_STRIPS",
+}  # fmt: skip
+SECTIONS = (*OF_SURFACES.values(), b"CELLS")
 DATA_SECTIONS = (b"POINT_DATA", b"CELL_DATA")
-WIDTHS = {b"VECTORS": 3, b"NORMALS": 3, b"TENSORS": 9}  # numbers a row
+WIDTHS = {  # numbers a row
+    b"VECTORS": 3, b"NORMALS": 3, b"TENSORS": 9, b"TENSORS6": 6,
+    b"GLOBAL_IDS": 1, b"PEDIGREE_IDS": 1, b"EDGE_FLAGS": 1,
+}  # fmt: skip
 DATASETS = (b"POLYDATA", b"UNSTRUCTURED_GRID")
 LEGACY_TYPES = {
     "f8": "double", "f4": "float", "i8": "vtktypeint64", "i4": "int", "u1": "unsigned_char",
 }  # fmt: skip
-Arrays = dict[str, np.ndarray]
+# Characters of names that VTK writes as they are, besides letters and digits
+AS_THEY_ARE = "".join(set(string.punctuation) - set('"%'))
+BLANK_LINE = re.compile(rb"\n[ \t\r]*\n")
 
 
-def _open(data: bytes) -> Cursor:
-    """Return a cursor behind the version, the title, which may be blank, and the encoding."""
+def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...]]:
+    """Return points, cells by kind, and notes.
+
+    Raise FileFormatError if the content differs from the header.
+    """
+    shape, _ = _read(data)
+    return shape.points, shape.cells, *shape.notes
+
+
+def _read(data: bytes) -> tuple[VtkShape, Cursor]:
+    """Read the points and cells, and return a cursor before the functions on them."""
+    # The version, the title, which may be blank, and the encoding
     head = data.split(b"\n", 3)[:3]
     is_text = head[-1].strip().upper() != b"BINARY"
-    return Cursor(data, "A VTK file", is_text=is_text, place=sum(len(line) + 1 for line in head))
+    place = sum(len(line) + 1 for line in head)
+    cursor = Cursor(data, "A VTK file", is_text=is_text, place=place)
+    dataset = cursor.line().upper().removeprefix(b"DATASET").strip()
+    if dataset not in DATASETS:
+        raise other_dataset(dataset.decode("latin-1"))
+    held = _sections(cursor)
+    points = held.pop(b"POINTS")
+    if dataset == b"POLYDATA":
+        of_types = {kind: held[name] for kind, name in OF_SURFACES.items() if name in held}
+        shape = sort_cells(points, *surface_lists(of_types))
+        polygons = shape.cells.get("polygons")
+        if polygons and "triangles" not in shape.cells and (polygons.lengths == 4).all():
+            del shape.cells["polygons"]
+            shape.cells[FOUR_CORNERED] = polygons.corners.reshape(-1, 4)
+            shape.numbers[FOUR_CORNERED] = shape.numbers.pop("polygons")[::2]
+        return shape, cursor
+    if not held.keys() >= {b"CELLS", b"CELL_TYPES"}:
+        raise FileFormatError(
+            "An unstructured grid of a VTK file must have CELLS and CELL_TYPES; one is missing."
+        )
+    cells, types = held[b"CELLS"], held[b"CELL_TYPES"]
+    n_cells = len(cells.lengths)
+    if len(types) != n_cells:
+        raise FileFormatError(
+            f"Each cell of a VTK file must have a type; it has {n_cells} cells, {len(types)} types."
+        )
+    return sort_cells(points, cells, types), cursor
+
+
+def _sections(cursor: Cursor) -> dict[bytes, Any]:
+    """Read points, types of cells, and lists of cells by the name of their section."""
+    held: dict[bytes, Any] = {}
+    start = cursor.place
+    while text := cursor.line():
+        words = [*text.split(), b"", b""]
+        name = words[0].upper()
+        if name in DATA_SECTIONS:
+            cursor.place = start
+            break
+        if name in held:
+            raise FileFormatError(f"A VTK file must have one section {name.decode()}; it has two.")
+        if name == b"FIELD":  # functions on nothing, such as the time
+            _take_fields(cursor, _count(words[2]))
+        elif name == b"POINTS":
+            numbers = cursor.take(_kind_of(words[2]), 3 * _count(words[1]))
+            held[name] = numbers.reshape(-1, 3).astype(np.float64)
+        elif name == b"CELL_TYPES":
+            held[name] = cursor.wholes(">i4", _count(words[1]))
+        elif name in SECTIONS:
+            held[name] = _cells(cursor, _count(words[1]), _count(words[2]))
+        else:
+            raise FileFormatError(
+                f"Sections of a VTK file must be POINTS, {b', '.join(SECTIONS).decode()}, CELL_TYPES, "
+                f"POINT_DATA or CELL_DATA; one begins with {quote_line((0, text))}."
+            )
+        _skip_metadata(cursor)
+        start = cursor.place
+    if b"POINTS" not in held:
+        raise FileFormatError("A VTK file must have a section POINTS; it has none.")
+    return held
+
+
+def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
+    """Return the functions on points and those on simplices, by name, and notes; see `parse`.
+
+    Raise FileFormatError if the content differs from the header.
+    """
+    shape, cursor = _read(data)
+    fields: dict[bytes, Arrays] = {name: {} for name in DATA_SECTIONS}
+    notes: list[str] = []
+    section, count = DATA_SECTIONS[0], 0
+    while text := cursor.line():
+        words = [*text.split(), b"", b"", b""]
+        keyword, name = words[0].upper(), _decode(words[1])
+        found: dict[str, np.ndarray | None] = {}
+        if keyword in DATA_SECTIONS:
+            section, count = keyword, _count(words[1])
+        elif keyword == b"FIELD":
+            found = _take_fields(cursor, _count(words[2]))
+        elif keyword == b"SCALARS":
+            cursor.line()  # LOOKUP_TABLE
+            found[name] = _take_array(cursor, words[2], count, _count(words[3] or b"1"))
+        elif keyword == b"COLOR_SCALARS":
+            values = _take_array(cursor, b"unsigned_char", count, _count(words[2]))
+            # In text they are shares of 255.
+            found[name] = (
+                np.rint(255 * np.asarray(values)).astype(np.uint8) if cursor.is_text else values
+            )
+        elif keyword == b"TEXTURE_COORDINATES":
+            found[name] = _take_array(cursor, words[3], count, _count(words[2]))
+        elif keyword in WIDTHS:
+            found[name] = _take_array(cursor, words[2], count, WIDTHS[keyword])
+        elif keyword == b"LOOKUP_TABLE":
+            cursor.take(">u1", 4 * _count(words[2]))
+        else:
+            notes.append(
+                f"what follows {quote_line((0, text))} is not read: no such data are known"
+            )
+            break
+        notes += [
+            f"the array {name!r} of text is not read"
+            for name, values in found.items()
+            if values is None
+        ]
+        fields[section] |= {name: values for name, values in found.items() if values is not None}
+    of_points, of_cells = fit_fields(shape, *fields.values())
+    return of_points, of_cells, *notes
+
+
+def _take_fields(cursor: Cursor, count: int) -> dict[str, np.ndarray | None]:
+    """Read arrays by name, each after a line with its name, width, number of rows and kind."""
+    found = {}
+    for _ in range(count):
+        line = cursor.line()
+        *name, width, rows, kind = [b"", b"", b"", *line.split()]
+        found[_decode(b" ".join(name).strip())] = _take_array(
+            cursor, kind, _count(rows), _count(width)
+        )
+    return found
+
+
+def _decode(name: bytes) -> str:
+    """Return a name as it was before VTK replaced its spaces and other characters by percent codes."""
+    return unquote_to_bytes(name).decode(errors="replace")
+
+
+def _take_array(cursor: Cursor, kind: bytes, rows: int, width: int) -> np.ndarray | None:
+    """Read an array; return None for one of text."""
+    count = rows * width
+    values = None
+    if kind.lower() in TEXTS:
+        _skip_texts(cursor, count, is_packed=not cursor.is_text and kind.lower() != b"variant")
+    elif kind.lower() == b"bit" and not cursor.is_text:
+        values = np.unpackbits(cursor.take(">u1", -(-count // 8)))[:count]
+    else:
+        values = cursor.take(_kind_of(kind), count)
+    _skip_metadata(cursor)
+    if values is None:
+        return None
+    values = values.astype(values.dtype.newbyteorder("="))
+    return values if width == 1 else values.reshape(rows, width)
+
+
+def _skip_texts(cursor: Cursor, count: int, *, is_packed: bool) -> None:
+    """Pass over lines of text, or over texts after their lengths.
+
+    The first two bits of a length in a binary file say how many bytes it takes: 8, 4, 2 or 1.
+    """
+    for _ in range(count):
+        if is_packed:
+            size = 8 >> (int(cursor.take(">u1", 1)[0]) >> 6)
+            cursor.place -= 1
+            length = int(cursor.take(f">u{size}", 1)[0]) & (2 ** (8 * size - 2) - 1)
+            cursor.take(">u1", length)
+        else:
+            end = cursor.data.find(b"\n", cursor.place)
+            if end < 0:
+                raise cursor.too_many(count)
+            cursor.place = end + 1
+
+
+def _skip_metadata(cursor: Cursor) -> None:
+    """Pass over names of components and the like, which end with a blank line."""
+    start = cursor.place
+    if cursor.line().upper() != b"METADATA":
+        cursor.place = start
+        return
+    blank = BLANK_LINE.search(cursor.data, cursor.place - 1)
+    cursor.place = blank.end() if blank else len(cursor.data)
 
 
 def _kind_of(word: bytes) -> str:
@@ -52,137 +254,15 @@ def _kind_of(word: bytes) -> str:
     return kind
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells]:
-    """Return points and cells by kind.
-
-    Raise FileFormatError if the content differs from the header.
-    """
-    cursor = _open(data)
-    dataset = cursor.line().split()
-    if dataset[:1] != [b"DATASET"] or dataset[-1].upper() not in DATASETS:
-        raise FileFormatError(
-            f"A VTK file must hold the DATASET UNSTRUCTURED_GRID or POLYDATA; its line is "
-            f"{quote_line((0, b' '.join(dataset)))}."
-        )
-    points, types, lists = _sections(cursor)
-    if dataset[-1].upper() == b"POLYDATA":
-        return points, _polydata_cells(lists)
-    if types is None or b"CELLS" not in lists:
-        raise FileFormatError(
-            "An unstructured grid of a VTK file must have CELLS and CELL_TYPES; one is missing."
-        )
-    n_cells = len(lists[b"CELLS"].lengths)
-    if len(types) != n_cells:
-        raise FileFormatError(
-            f"Each cell of a VTK file must have a type; it has {n_cells} cells, {len(types)} types."
-        )
-    return points, cells_of_types(lists[b"CELLS"], types)
-
-
-def _sections(cursor: Cursor) -> tuple[np.ndarray, np.ndarray | None, dict[bytes, CellLists]]:
-    """Read points, types of cells, and lists of cells by the name of their section."""
-    points, types = None, None
-    lists: dict[bytes, CellLists] = {}
-    seen: set[bytes] = set()
-    start = cursor.place
-    while text := cursor.line():
-        words = text.split()
-        name = words[0].upper()
-        if name in DATA_SECTIONS:
-            cursor.place = start
-            break
-        n_words = {b"CELL_TYPES": 2}.get(name, 3)
-        if len(words) != n_words or name not in (b"POINTS", b"CELL_TYPES", *SECTIONS):
-            start = cursor.place
-            continue
-        if name in seen:
-            raise FileFormatError(f"A VTK file must have one section {name.decode()}; it has two.")
-        seen.add(name)
-        count = _count(words[1])
-        if name == b"POINTS":
-            numbers = cursor.take(_kind_of(words[2]), 3 * count)
-            points = numbers.reshape(-1, 3).astype(np.float64)
-        elif name == b"CELL_TYPES":
-            types = cursor.wholes(">i4", count)
-        else:
-            lists[name] = _cells(cursor, name, count, _count(words[2]))
-        start = cursor.place
-    if points is None:
-        raise FileFormatError("A VTK file must have a section POINTS; it has none.")
-    return points, types, lists
-
-
-def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
-    """Return the functions on points and those on cells, by name; see `parse`.
-
-    Raise FileFormatError if the content differs from the header.
-    """
-    cursor = _open(data)
-    cursor.line()
-    _sections(cursor)
-    fields: dict[bytes, dict[str, np.ndarray]] = {name: {} for name in DATA_SECTIONS}
-    section, count = DATA_SECTIONS[0], 0
-    n_arrays = 0  # that the current FIELD still holds
-    while text := cursor.line():
-        words = text.split()
-        keyword = words[0].upper()
-        if n_arrays and len(words) == 4 and words[1].isdigit():
-            width, rows, kind = int(words[1]), _count(words[2]), words[3]
-            name = words[0]
-            n_arrays -= 1
-        elif keyword in DATA_SECTIONS and len(words) == 2:
-            section, count = keyword, _count(words[1])
-            continue
-        elif keyword == b"FIELD" and len(words) == 3:
-            n_arrays = _count(words[2])
-            continue
-        elif keyword == b"SCALARS" and len(words) >= 3:
-            name, kind, rows = words[1], words[2], count
-            width = _count(words[3]) if len(words) > 3 else 1
-            cursor.line()  # LOOKUP_TABLE
-        elif keyword in WIDTHS and len(words) == 3:
-            name, kind, rows, width = words[1], words[2], count, WIDTHS[keyword]
-        else:
-            continue
-        values = cursor.take(_kind_of(kind), rows * width)
-        values = values.astype(values.dtype.newbyteorder("="))
-        held = fields[section]
-        held[name.decode("latin-1")] = values if width == 1 else values.reshape(-1, width)
-    of_points, of_cells = fields.values()
-    return of_points, of_cells
-
-
-def _polydata_cells(lists: dict[bytes, CellLists]) -> Cells:
-    blocks = {}
-    if b"LINES" in lists:
-        blocks[SEGMENTS] = lists[b"LINES"].pairs(np.arange(len(lists[b"LINES"].lengths)))
-    triangles = NO_TRIANGLES
-    if b"TRIANGLE_STRIPS" in lists:
-        triangles = strip_triangles(lists[b"TRIANGLE_STRIPS"].split())
-    polygons = lists.get(b"POLYGONS")
-    if polygons is not None and len(polygons.lengths):
-        sizes = np.unique(polygons.lengths)
-        everyone = np.arange(len(polygons.lengths))
-        if sizes.tolist() == [4] and not len(triangles):
-            return blocks | {FOUR_CORNERED: polygons.rows(everyone, 4)}
-        if len(sizes) == 1:
-            fanned = fans(polygons.rows(everyone, int(sizes[0])))
-        else:
-            fanned = fans([row.tolist() for row in polygons.split()])
-        triangles = np.concatenate([triangles, fanned])
-    return blocks | {"triangles": triangles} if len(triangles) else blocks
-
-
 def _count(word: bytes) -> int:
-    try:
-        return int(word)
-    except ValueError as err:
+    if not word.isdigit():
         raise FileFormatError(
-            f"A VTK file must count its cells by whole numbers; it says {word[:30]!r}."
-        ) from err
+            f"A VTK file must count what it holds by whole numbers; it says {word[:30]!r}."
+        )
+    return int(word)
 
 
-def _cells(cursor: Cursor, name: bytes, count: int, size: int) -> CellLists:
+def _cells(cursor: Cursor, count: int, size: int) -> CellLists:
     """Read lists of points; version 5 has offsets and connectivity instead of counts per cell."""
     start = cursor.place
     words = cursor.line().split()
@@ -193,41 +273,25 @@ def _cells(cursor: Cursor, name: bytes, count: int, size: int) -> CellLists:
             raise FileFormatError(
                 f"Offsets of a VTK file must rise from 0 to {size}; they are {offsets[:9].tolist()}."
             )
-        cells = CellLists(offsets, corners)
-    else:
-        cursor.place = start
-        cells = _cells_by_counts(cursor.wholes(">i4", size), count)
-    short = np.flatnonzero(cells.lengths < SECTIONS[name])
-    if short.size:
-        raise FileFormatError(
-            f"A cell of {name.decode()} must have {SECTIONS[name]} points or more; cell {short[0]} has "
-            f"{cells.lengths[short[0]]}."
-        )
-    return cells
+        return CellLists(offsets, corners)
+    cursor.place = start
+    return _cells_by_counts(cursor.wholes(">i4", size), count)
 
 
 def _cells_by_counts(flat: Int[np.ndarray, " k"], count: int) -> CellLists:
-    size = len(flat)
-    length = int(flat[0]) if size else 0
-    if length > 0 and size == count * (1 + length) and (flat[:: 1 + length] == length).all():
-        return CellLists(
-            np.arange(0, count * length + 1, length), flat.reshape(count, -1)[:, 1:].ravel()
-        )
+    numbers = flat.tolist()
     places = []  # where the counts are
     place = 0
-    for index in range(count):
-        if place >= size or not 0 <= flat[place] < size - place:
-            raise FileFormatError(
-                f"Cells of a VTK file must fill {size} numbers; cell {index} of {count} does not."
-            )
+    while place < len(numbers) and numbers[place] >= 0:
         places.append(place)
-        place += 1 + int(flat[place])
-    if place != size:
+        place += 1 + numbers[place]
+    if place != len(numbers) or len(places) != count:
         raise FileFormatError(
-            f"Cells of a VTK file must fill {size} numbers; {count} cells fill {place}."
+            f"A VTK file must hold {count} cells in {len(numbers)} numbers; {len(places)} cells take "
+            f"{place}."
         )
-    starts = np.cumsum([0, *flat[places]]) if places else np.zeros(1, dtype=np.int64)
-    return CellLists(starts, np.delete(flat, places))
+    starts = np.append(places, place) - np.arange(count + 1)
+    return CellLists(starts.astype(np.int64), np.delete(flat, places))
 
 
 def format_fields(mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:
@@ -250,7 +314,7 @@ def format_fields(mesh: TriangleMesh, of_vertices: Arrays, of_faces: Arrays) -> 
             continue
         pieces.append(f"{section} {count}\nFIELD FieldData {len(fields)}\n".encode())
         for name, values in fields.items():
-            word = re.sub(r"\s", "_", name)  # names in legacy files have no spaces
+            word = quote(name, safe=AS_THEY_ARE)
             width = values.shape[1] if values.ndim == 2 else 1
             kind = LEGACY_TYPES[values.dtype.str[1:]]
             pieces += [f"{word} {width} {count} {kind}\n".encode(), big_endian(values)]

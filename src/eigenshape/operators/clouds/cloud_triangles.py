@@ -10,7 +10,7 @@ from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import require_different_points
-from eigenshape.geometry.simplices import size_one
+from eigenshape.geometry.simplices import require_span, size_one
 from eigenshape.operators.clouds import pair_loops
 from eigenshape.operators.tufted import (
     MOLLIFY,
@@ -113,6 +113,7 @@ def local_triangles(
     triangles = triangles[spans]
     bare = np.setdiff1d(np.arange(cloud.n_points), triangles)
     if bare.size:
+        require_span(cloud.points, 2, "The points of a cloud")
         raise InvalidShapeError(
             f"Every point must have a triangle; point {bare[0]} at "
             f"{cloud.points[bare[0]].tolist()} has none, as its {count} neighbors lie on a line "

@@ -84,7 +84,7 @@ def choose_kernel(options: KernelOptions, edge: float) -> GaussianKernel:
     if factor < NARROWEST:
         raise InvalidParameterError(
             f"A kernel must reach the neighbors, h ≥ e; h = 2√t is {factor:.3g} of the mean edge length "
-            f"e = {edge:.4g}, t = {t:.4g}. Choose t ≥ {edge**2 / 4:.4g}; t = e² is the default."
+            f"e = {edge:.4g}, t = {t:.4g}. Choose t = e² = {edge**2:.4g}, the default."
         )
     return GaussianKernel(
         t, factor, corrected=options.correct == "log", form=options.form, cutoff=options.cutoff

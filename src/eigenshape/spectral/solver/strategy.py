@@ -248,6 +248,13 @@ def require_memory_for_pairs(pencil: Pencil, k: int, factors: int | None = None)
         8 * pencil.n * (3 * k + FEWEST_VECTORS + 2 * min(k, ONE_SHIFT_PAIRS))
     )  # a space of twice the pairs, results, a copy
     advice = "Request fewer pairs, or pass method='approximate' to solve_spectrum, which needs no factor."
+    n_pieces = int(pencil.labels.max()) + 1
+    if 2 * n_pieces > k:  # as in a soup of faces that share no vertices
+        advice = (
+            f"The shape is in {n_pieces} pieces, each of which has a lowest eigenvalue. Try "
+            'repair(mesh, ["auto", "largest_component"]), or --repair auto,largest_component on the '
+            "command line: it joins pieces that lie edge on edge, and drops others."
+        )
     require_memory(
         "A spectrum",
         f"{k} pairs of {pencil.n} points",

@@ -24,7 +24,7 @@ export interface State {
   capabilities: string[]; // rig, finish, query, open, repair, solve
   suffixes: string; // of the files that can be opened, as a file dialog takes them
   most_bytes: number; // of a file
-  notes: string[]; // what could not be opened
+  notes: string[]; // what could not be opened, and what was repaired
   large: string; // what to say of a large shape of which nothing is computed unasked; or ""
   health: {
     status: Progress["status"]; // all else is null or empty until it is ready
@@ -45,6 +45,7 @@ export interface State {
   digest: string; // tells the mesh at rest from all others
   selected: number; // tells the present regions from others; 0: none
   pose: number; // tells the pose from others of the shape, and the shape from others
+  n_images: number; // on the shape; -1 if its file does not say how it looks
   n_points: number; // that the surface was made of; 0 if it is that of the file
   beside: Second | null;
   landmarks: Landmark[];
@@ -118,6 +119,7 @@ export interface RigRequest {
 export interface RigAnswer {
   n_modes: number[];
   pivots: Vec3[]; // the middle of the rim of each region
+  warnings: string[];
   shares: Float32Array; // four numbers a vertex: how far it follows each region
 }
 export interface Match {

@@ -6,16 +6,21 @@ import { colorMap, findRange, rgbOf, type Scale } from "./colors";
 import { define, type Motion } from "./motion";
 import { orderFaces } from "./order";
 import { MAX_REGIONS } from "./regions";
+import type { Skin } from "./skin";
 import surfaceFragment from "../shaders/surface.frag.glsl?raw";
 import surfaceVertex from "../shaders/surface.vert.glsl?raw";
 
 const PLAIN = "#cdc8c0";
-const [UNCOLORED, BY_VALUE, BY_PAINT] = [0, 1, 2]; // COLORING of the shader
+const [UNCOLORED, BY_VALUE, BY_PAINT, BY_IMAGE] = [0, 1, 2, 3]; // COLORING of the shader
+const [SEEN, UNSEEN] = [0, 1]; // layers; the camera sees the first one
 
 export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMaterial> {
   vertices = new Float32Array(0);
   faces = new Uint32Array(0);
   labels: Int32Array | null = null;
+  skin: Skin | null = null;
+  private coloring = UNCOLORED;
+  private textured = true; // whether the skin is shown where no result colors the surface
 
   constructor(motion: Motion, plain = PLAIN) {
     const material = motion.material(surfaceVertex, surfaceFragment, {
@@ -28,6 +33,7 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
       plain: { value: new three.Vector3(...rgbOf(plain)).divideScalar(255) },
       opacity: { value: 1 },
       picture: { value: new three.Vector2() },
+      images: { value: null },
     });
     material.side = three.DoubleSide;
     material.defines = { COLORING: UNCOLORED };
@@ -40,6 +46,7 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
   setMesh(vertices: Float32Array, faces: Uint32Array): void {
     const count = vertices.length / 3;
     Object.assign(this, { vertices, faces });
+    this.setSkin(null);
     const attributes = {
       position: [vertices, 3],
       normal: [vertexNormals(vertices, faces), 3],
@@ -72,11 +79,35 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
     this.replace("exact_normal", vertexNormals(vertices, this.faces));
   }
 
+  /** Show how the file says that the surface looks, while no result colors it. */
+  setSkin(skin: Skin | null): void {
+    this.skin?.removeFromParent();
+    this.skin?.dispose();
+    this.skin = skin;
+    if (skin) this.add(skin);
+    this.material.uniforms.images!.value = skin?.images ?? null;
+    this.colorBy(this.coloring);
+  }
+
+  showTexture(textured: boolean): void {
+    this.textured = textured;
+    this.colorBy(this.coloring);
+  }
+
+  private colorBy(coloring: number): void {
+    this.coloring = coloring;
+    const bare = coloring === UNCOLORED && this.textured && this.skin !== null;
+    define(this.material, "COLORING", bare ? BY_IMAGE : coloring);
+    // One of both is drawn. What is made invisible would hide what belongs to it, too.
+    this.layers.set(bare ? UNSEEN : SEEN);
+    if (this.skin) this.skin.visible = bare;
+  }
+
   /** Color by a function; nodal lines mark where it is zero. */
   setScalars(values: Float32Array | null, scale?: Scale): void {
     const { table, range, nodal } = this.material.uniforms;
     this.labels = null;
-    define(this.material, "COLORING", values ? BY_VALUE : UNCOLORED);
+    this.colorBy(values ? BY_VALUE : UNCOLORED);
     if (!values || !scale) return;
     this.replace("value", values);
     table!.value?.dispose();
@@ -98,7 +129,7 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
     this.replace("soft", soft);
     this.replace("beyond", beyond);
     this.turnCorners(labels);
-    define(this.material, "COLORING", BY_PAINT);
+    this.colorBy(BY_PAINT);
   }
 
   /** Let each face end with a corner of its most frequent label: the shader takes that color. */
@@ -138,6 +169,7 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
     const attribute = this.geometry.getAttribute(name) as three.BufferAttribute;
     attribute.array.set(values);
     attribute.needsUpdate = true;
+    this.skin?.follow(name);
   }
 
   /** Return a geometry that uses the buffers of this one with corners of its own. */

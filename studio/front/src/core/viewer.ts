@@ -11,6 +11,7 @@ import { Motion } from "./motion";
 import { Picker, type Hit } from "./picking";
 import { Pointer, type Click, type PointerTool } from "./pointer";
 import { startRenderer } from "./renderer";
+import type { Skin } from "./skin";
 import { Surface, vertexNormals } from "./surface";
 import pickFragment from "../shaders/pick.frag.glsl?raw";
 import pickVertex from "../shaders/pick.vert.glsl?raw";
@@ -179,6 +180,17 @@ export class Viewer {
     this.folded = folded;
     this.setSolid(this.solid);
     this.ambient?.start(this.up);
+  }
+
+  /** Show how the file says that the shape looks, while no result colors it. */
+  setSkin(skin: Skin): void {
+    this.surface.setSkin(skin);
+    this.invalidate();
+  }
+
+  showTexture(textured: boolean): void {
+    this.surface.showTexture(textured);
+    this.invalidate();
   }
 
   /** Set by how much each vertex follows each region: one number for each of `MAX_REGIONS`. */

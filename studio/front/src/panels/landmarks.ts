@@ -7,7 +7,7 @@ import { download, Form, h, type NamedFile } from "../core/dom";
 import type { Hit } from "../core/viewer";
 import markup from "./landmarks.html?raw";
 
-const FORMATS = ".mrk.json,.json,.fcsv,.csv,.tps,.txt";
+const FORMATS = ".mrk.json,.json,.fcsv,.csv,.tps,.txt,.nts,.dta,.pts,.pp,.landmarkAscii";
 
 export class LandmarksPanel implements Panel {
   readonly id = "landmarks";

@@ -3,7 +3,7 @@ in vec3 v_normal;
 in float v_ambient; // share of the sky that is seen
 uniform mat4 projectionMatrix;
 uniform vec2 picture; // its width and height
-// COLORING is 0: plain, 1: values through the table, 2: paint. Without a graphics card a branch
+// COLORING is 0: plain, 1: values through the table, 2: paint, 3: images and tints. Without a graphics card a branch
 // that is not taken costs a sixth of a frame, so the shader is compiled for each of them.
 #if COLORING == 1
 in float v_value;
@@ -15,6 +15,10 @@ uniform float line; // pixels of the picture for each of the page
 flat in vec3 v_paint;
 flat in vec3 v_beyond;
 in vec3 v_soft;
+#elif COLORING == 3
+in vec2 v_place_in_image; // the second number goes upward
+in vec4 v_tint; // a color, and the number of the image from 1 on; 0 for none
+uniform highp sampler2DArray images;
 #else
 uniform vec3 plain;
 #endif
@@ -46,6 +50,10 @@ void main() {
   float share = dot(v_soft - v_paint, way) / max(dot(way, way), 1e-6);
   float step_wide = max(fwidth(share), 1e-4);
   vec3 base = v_paint + way * smoothstep(0.5 - step_wide, 0.5 + step_wide, share);
+#elif COLORING == 3
+  float layer = round(255.0 * v_tint.a);
+  vec3 there = vec3(v_place_in_image.x, 1.0 - v_place_in_image.y, max(layer - 1.0, 0.0));
+  vec3 base = v_tint.rgb * mix(vec3(1.0), texture(images, there).rgb, min(layer, 1.0));
 #else
   vec3 base = plain;
 #endif

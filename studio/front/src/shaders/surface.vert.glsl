@@ -12,6 +12,11 @@ in vec3 beyond;
 flat out vec3 v_paint; // of the last corner of the face
 flat out vec3 v_beyond; // beyond the border that is near
 out vec3 v_soft;
+#elif COLORING == 3
+in vec2 place_in_image;
+in vec4 tint;
+out vec2 v_place_in_image;
+out vec4 v_tint;
 #endif
 #ifdef MARKED
 in vec4 mark;
@@ -38,6 +43,9 @@ void main() {
   v_paint = paint;
   v_beyond = beyond;
   v_soft = soft;
+#elif COLORING == 3
+  v_place_in_image = place_in_image;
+  v_tint = tint;
 #endif
 #ifdef MARKED
   v_mark = mark;

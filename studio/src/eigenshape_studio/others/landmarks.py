@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 import eigenshape as es
+from eigenshape.morphometrics.placement import require_on_surfaces
 from eigenshape_studio.calls import RequestError
 
 FORMATS = ("mrk.json", "fcsv", "csv")
@@ -57,16 +58,17 @@ class SurfaceLandmarks:
 
 
 def place_landmarks(
-    mesh: es.TriangleMesh, names: Sequence[Any], points: np.ndarray
+    mesh: es.TriangleMesh, names: Sequence[Any], points: np.ndarray, shape: str
 ) -> tuple[SurfaceLandmarks, list[str]]:
-    """Put points on a surface, and return them with a warning if some lay beside it.
+    """Put points on the surface of a shape, and return them with a warning if some lay beside it.
 
     Raises
     ------
     RequestError
         If there are too many, or not three coordinates for each.
     InvalidParameterError
-        As `es.morphometrics.Landmarks`: names that are empty or twice, points that are not finite.
+        As `es.morphometrics.Landmarks`: names that are empty or twice, points that are not finite;
+        and if they lie far from the surface, as in another unit or frame.
     """
     if len(names) > MOST_LANDMARKS or points.size != 3 * len(names):
         raise RequestError(
@@ -79,11 +81,14 @@ def place_landmarks(
     warnings = [f"{name} is not placed in the file." for name in np.array(names)[~known]]
     if not known.any():
         return SurfaceLandmarks(), warnings
+    placement = require_on_surfaces([(shape, mesh, given)])[shape]
     there = es.geometry.closest_points(mesh, given.points[known])
-    away = float(np.linalg.norm(there.points - given.points[known], axis=1).max())
+    away = float(placement.distances[known].max())
     size = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     if away > FARTHEST * size:
         warnings.append(f"Points were moved to the surface, by {away:.3g} at most.")
+    if placement.is_beside:
+        warnings.append("All landmarks lie beside the surface: they may be of another shape.")
     kept = tuple(name for name, placed in zip(given.names, known, strict=True) if placed)
     return SurfaceLandmarks(kept, there.simplices, there.weights), warnings
 
@@ -99,7 +104,10 @@ def parse_landmarks(name: str, data: bytes) -> es.morphometrics.Landmarks:
     with TemporaryDirectory() as folder:
         path = Path(folder, name)
         path.write_bytes(data)
-        return es.morphometrics.read_landmarks(path)
+        try:
+            return es.morphometrics.read_landmarks(path)
+        except es.EigenshapeError as error:  # without the folder, which is the server's
+            raise type(error)(str(error).replace(f"{path.parent}/", "")) from error
 
 
 def landmark_file(names: Sequence[str], points: np.ndarray, ending: str) -> np.ndarray:

@@ -1,7 +1,6 @@
 """What is known of a shape before anything is computed: its mesh, attributes and functions."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import eigenshape as es
 from eigenshape.geometry.repairs.masks import hemisphere_of
 from eigenshape.io.formats.registry import SHAPE_FORMATS, UPRIGHT, suffix_of
 from eigenshape.plot.camera import Up, View
-from eigenshape_studio.shape.parse import points_in
+from eigenshape_studio.shape.parse import SEAMS, attributes_in, points_in
 from eigenshape_studio.shape.sides import recall_side
 
 # Formats of brains, in which x points to the right of the body, y to the front and z up, and where
@@ -45,6 +44,8 @@ class Loaded:
         From which the page looks, as in `es.plot.aim_camera`.
     points : (p, 3) float, optional
         Those that the surface was made of.
+    report : tuple of str
+        What was done to the file's shape, in sentences.
     """
 
     mesh: es.TriangleMesh
@@ -52,22 +53,21 @@ class Loaded:
     fields: Mapping[str, Field] = field(default_factory=dict)
     side: tuple[View, Up] = ("auto", "auto")
     points: np.ndarray | None = None
+    report: tuple[str, ...] = ()
 
 
 def load_file(path: str | Path) -> Loaded:
     """Read a shape with what else its file holds."""
-    path, found = Path(path), es.io.read_surface(path)
+    path = Path(path)
+    found = es.io.read_surface(path, repair=SEAMS)
     mesh = found.mesh
-    attributes, values = None, {}
-    with suppress(es.FileFormatError):  # points have no attributes
-        attributes = es.read_mesh(path, attributes=True, drop_missing=True)[1]
-        attributes = es.io.carry_attributes(attributes, mesh)
-        # The page can choose from the functions in the file that it can draw.
-        values = {
-            title: numbers
-            for title, numbers in attributes.fields.items()
-            if _is_field(numbers, mesh.n_vertices)
-        }
+    attributes = attributes_in(path, mesh)
+    # The page can choose from the functions in the file that it can draw.
+    values = {
+        title: numbers
+        for title, numbers in (attributes.fields.items() if attributes else ())
+        if _is_field(numbers, mesh.n_vertices)
+    }
     fields = check_fields(values, mesh.n_vertices)
     side: tuple[View, Up] = ("auto", "auto")
     if recall_side(mesh) is None:  # nobody has turned this shape
@@ -76,7 +76,8 @@ def load_file(path: str | Path) -> Loaded:
             side = (TOWARDS[hemisphere_of(mesh)], "z")
         elif suffix in UPRIGHT:
             side = ("auto", "y")
-    return Loaded(mesh, attributes, fields, side, points_in(path, found.report))
+    points = points_in(path, found.report)
+    return Loaded(mesh, attributes, fields, side, points, found.report)
 
 
 def check_fields(values: Mapping[str, Any], n_vertices: int) -> dict[str, Field]:

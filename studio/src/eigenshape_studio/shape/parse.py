@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -15,8 +16,10 @@ import numpy as np
 
 import eigenshape as es
 from eigenshape.io.formats.registry import HEMISPHERES, suffix_in
+from eigenshape_studio.shape.look import pack_look, unpack_look
 from eigenshape_studio.wire import WireError, decode, encode
 
+SEAMS = ("weld_seams",)  # textured shapes would come apart along their seams
 LONGEST_NAME = 120  # characters that are kept of a file's name
 
 
@@ -41,10 +44,11 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Upload:
-    """A mesh of a file, what it was made of in sentences, and the points that it was made of."""
+    """A mesh of a file, what was done to it in sentences, its look, and the points it was made of."""
 
     mesh: es.TriangleMesh
     report: tuple[str, ...]
+    attributes: es.io.MeshAttributes | None
     points: np.ndarray | None
 
 
@@ -111,7 +115,16 @@ def parse_surface(name: str, data: bytes, limits: Limits | None = None) -> Uploa
     if "error" in meta:
         raise es.FileFormatError(meta["error"])
     mesh, points = es.TriangleMesh(arrays["vertices"], arrays["faces"]), arrays["points"]
-    return Upload(mesh, tuple(meta["report"]), points if len(points) else None)
+    held = None if meta["look"] is None else unpack_look(mesh, meta["look"], arrays)
+    return Upload(mesh, tuple(meta["report"]), held, points if len(points) else None)
+
+
+def attributes_in(path: Path, mesh: es.TriangleMesh) -> es.io.MeshAttributes | None:
+    """Return what a file holds beside the shape; None of points, and where that is broken."""
+    with suppress(es.FileFormatError):
+        held = es.read_mesh(path, attributes=True, drop_missing=True)[1]
+        return es.io.carry_attributes(held, mesh)
+    return None
 
 
 def points_in(path: Path, report: Sequence[str]) -> np.ndarray | None:
@@ -129,14 +142,19 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, f"shape{suffix}")
             path.write_bytes(sys.stdin.buffer.read())
-            found = read_upload(path, int(n_faces))
+            found = read_upload(path, int(n_faces), SEAMS)
             points = points_in(path, found.report)
+            held = attributes_in(path, found.mesh)
         arrays = {
             "vertices": found.mesh.vertices,
             "faces": found.mesh.faces.astype("<u4"),
             "points": np.empty((0, 3)) if points is None else points,
         }
-        message = encode({"report": list(found.report)}, arrays)
+        look = None
+        if held is not None:
+            look, more = pack_look(held)
+            arrays |= more
+        message = encode({"report": list(found.report), "look": look}, arrays)
     except MemoryError:
         message = encode({"error": "The file takes more memory than a mesh may."})
     except (es.EigenshapeError, OSError) as error:

@@ -50,6 +50,7 @@ class ShapeArrays:
             "values": self._values,
             "disc": lambda tail: brush.disc(scene.mesh, tail),
             "sample": sample_picture,
+            "skin": self._skin,
         }
 
     def _regions(self, _meta: Meta) -> np.ndarray:
@@ -62,6 +63,17 @@ class ShapeArrays:
         if points is None:
             raise RequestError("There must be points that the surface was made of; there are none.")
         return points.astype("<f4")
+
+    def _skin(self, tail: str) -> np.ndarray:
+        """Return how the shape looks: the table of split vertices, their corners, or an image."""
+        skin = self._of.history.now.shape.skin
+        if skin is None:
+            raise RequestError("The file of the shape must hold colors or a texture; it does not.")
+        if tail in ("rows", "corners"):
+            return skin.rows if tail == "rows" else skin.corners
+        if not tail.isdecimal() or int(tail) >= len(skin.images):
+            raise RequestError(f"There are {len(skin.images)} images; {tail[:80]!r} is none.")
+        return np.frombuffer(skin.images[int(tail)], np.uint8)
 
     def _spectrum(self) -> es.Spectrum:
         found = self._of.analysis.spectrum.result

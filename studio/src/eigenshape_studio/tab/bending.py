@@ -32,7 +32,7 @@ MOST_REGIONS = 4  # one component each of the attribute `shares` of the vertex s
 MOST_MODES = 2000  # that the page may request
 MODES = ("graded", "uncrossed", "thesis")
 # The filters of warnings belong to the whole process, so only one thread may listen at a time.
-# Only the mode "uncrossed" warns.
+# Only bends in the mode "uncrossed" warn, and bindings.
 LISTENING = Lock()
 
 
@@ -128,9 +128,10 @@ class Bending:
         bound = Bound(regions, fixed, _n_modes(meta))
         began = perf_counter()
         with self._of.changing:
-            self.bound = None
-            binding = self._drag(bound, [None] * n_regions)
+            self.bound, self._of.warnings = None, []
+            binding = self._listen(lambda: self._drag(bound, [None] * n_regions))
         facts = {
+            "warnings": self._of.warnings,
             "n_modes": binding.n_modes.tolist(),
             "pivots": [_rim_center(self._of.mesh, region) for region in regions],
             "seconds": perf_counter() - began,
@@ -156,13 +157,14 @@ class Bending:
         bound, entries, mode = self._motion(meta)
         binding = self._drag(bound, entries)
         handles = [handle_from(entry) for entry in entries]
-        return self._listen(mode, lambda: es.deformation.bend(binding, handles, mode=mode).vertices)
+        bent = self._bent(mode, lambda: es.deformation.bend(binding, handles, mode=mode))
+        return bent.vertices
 
     def _commit(self, meta: Meta, _arrays: Arrays) -> None:
         bound, entries, mode = self._motion(meta)
         self._drag(bound, entries)
         session = self._session()
-        bent = self._listen(mode, lambda: session.commit(mode=mode))
+        bent = self._bent(mode, lambda: session.commit(mode=mode))
         self._mode = mode
         self._of.history.bend(session.edits, bent, "Bend")
 
@@ -194,10 +196,12 @@ class Bending:
         regions = [region for region in members if len(region)]
         return Bound(regions, fixed if len(fixed) else None, _n_modes(meta)) if regions else None
 
-    def _listen(self, mode: str, work: Callable[[], Any]) -> Any:
+    def _bent(self, mode: str, work: Callable[[], Any]) -> Any:
+        """Return what some work returns that bends the shape; only in one mode can it warn."""
+        return self._listen(work) if mode == "uncrossed" else work()
+
+    def _listen(self, work: Callable[[], Any]) -> Any:
         """Do some work, and keep what it warns of for the page."""
-        if mode != "uncrossed":
-            return work()
         with LISTENING, warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always", UserWarning)
             result = work()

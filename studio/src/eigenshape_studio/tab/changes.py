@@ -77,7 +77,10 @@ class Changes:
 
     def _choose(self, meta: Meta, _arrays: Arrays) -> None:
         """Show a shape of the list."""
-        self._history.choose(self._of.listed_shape(meta.get("shape")))
+        shape = self._of.listed_shape(meta.get("shape"))
+        is_new = not shape.loaded
+        self._history.choose(shape)
+        self._of.warnings += shape.report if is_new else ()
 
     def _reset(self, _meta: Meta, _arrays: Arrays) -> None:
         self._history.did("All undone", pose=self._history.now.shape.rest)
@@ -120,7 +123,7 @@ class Changes:
             return
         name = display_name(meta.get("name"))
         found = self._of.parse(name, file_bytes(arrays, "file"))
-        loaded = Loaded(found.mesh, points=found.points)
+        loaded = Loaded(found.mesh, found.attributes, points=found.points)
         self._history.show(loaded, name, f"Open {name}")
 
     def _open_folder(self, meta: Meta, _arrays: Arrays) -> None:

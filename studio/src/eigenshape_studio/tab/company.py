@@ -1,6 +1,7 @@
 """What stands beside the shape of a tab: a second shape with a map, landmarks, a collection."""
 
 import threading
+import warnings
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from eigenshape_studio.others.mapping import DenseMap
 from eigenshape_studio.others.specimens import Specimens
 from eigenshape_studio.shape.loading import Loaded
 from eigenshape_studio.shape.parse import display_name
+from eigenshape_studio.tab.bending import LISTENING
 from eigenshape_studio.tab.history import Shape
 from eigenshape_studio.tab.scene import Scene
 from eigenshape_studio.tab.searching import Searching
@@ -182,15 +184,20 @@ class Company:
     def _set_landmarks(self, meta: Meta, arrays: Arrays) -> None:
         """Take all landmarks anew: by names and points, or from a file."""
         names, points = meta.get("names"), arrays.get("points", np.empty(0))
+        notes = []
         if "file" in arrays:
             name = display_name(meta.get("name"))
-            given = parse_landmarks(name, file_bytes(arrays, "file"))
+            with LISTENING, warnings.catch_warnings(record=True) as heard:
+                warnings.simplefilter("always", UserWarning)
+                given = parse_landmarks(name, file_bytes(arrays, "file"))
+            # A warning begins with the path of the file, whose folder is the server's.
+            notes = [name + str(each.message).rpartition(name)[2] for each in heard]
             names, points = list(given.names), given.points
         if not isinstance(names, list):
             raise RequestError("names must be a list of the names of landmarks.")
-        placed, told = place_landmarks(self._of.mesh, names, points)
+        placed, told = place_landmarks(self._of.mesh, names, points, self._of.analysis.name)
         self._of.history.did("Landmarks", landmarks=placed.write())
-        self._of.warnings += told
+        self._of.warnings += notes + told
 
     def _landmarks_array(self, tail: str) -> np.ndarray:
         """Return a file of the landmarks of a side, as "0/fcsv", or vertices near carried ones."""

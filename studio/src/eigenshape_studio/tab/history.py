@@ -5,7 +5,7 @@ import threading
 import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from eigenshape_studio.calls import RequestError
 from eigenshape_studio.others.folders import MOST_LISTED
 from eigenshape_studio.shape.analysis import Analysis
 from eigenshape_studio.shape.loading import Field, Loaded, load_file
+from eigenshape_studio.shape.look import Skin, count_images, find_skin
 from eigenshape_studio.tab.sessions import Row, SessionFile, edits_text
 from eigenshape_studio.wire import decode, encode
 
@@ -92,6 +93,20 @@ class Shape:
         """The points that the surface was made of, if it was."""
         with self._lock:
             return self._read().points
+
+    @property
+    def report(self) -> tuple[str, ...]:
+        """What was done to the file's shape when it was read, in sentences."""
+        with self._lock:
+            return self._read().report
+
+    @cached_property
+    def skin(self) -> Skin | None:
+        """How the shape looks, if its file says so."""
+        if count_images(self.attributes) < 0:
+            return None
+        assert self.attributes is not None  # noqa: S101  they are counted
+        return find_skin(self.attributes)
 
     @property
     def digest(self) -> str:

@@ -19,6 +19,7 @@ from eigenshape_studio.others.search import Shelf
 from eigenshape_studio.shape.analysis import N_MODES, Analysis
 from eigenshape_studio.shape.jobs import PreparingError, window_message
 from eigenshape_studio.shape.loading import Field, Loaded, check_fields
+from eigenshape_studio.shape.look import count_images
 from eigenshape_studio.shape.parse import display_name
 from eigenshape_studio.shape.samples import SAMPLES
 from eigenshape_studio.tab.arrays import ShapeArrays
@@ -191,6 +192,7 @@ class Workspace(Scene):
             "deformation": self.bending.facts(),
             "index": None if shelf is None else shelf.facts(),
             **self.company.facts(),
+            "n_images": count_images(now.shape.attributes),
             "n_points": 0 if now.shape.points is None else len(now.shape.points),
             "shapes": [[shape.number, shape.name] for shape in history.shapes.values()],
             "history": [moment.text for moment in history.moments[1:]],

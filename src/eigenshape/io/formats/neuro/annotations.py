@@ -1,20 +1,28 @@
-"""Annotation and label files of FreeSurfer: parcels with names and colors, and one parcel as a list of vertices."""
+"""Annotation and label files of FreeSurfer: parcels with names and colors, and one parcel as a list of vertices.
+
+Read: annotations of versions 1 and 2, and labels.
+Kept: names, colors and opacity of parcels.
+Named: parcels of one color, black and transparent ones; points without a vertex.
+Refused: an annotation without its table of colors; writing parcels of one color.
+"""
+
+from typing import Any
 
 import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.neuro.shared import find_keys
+from eigenshape.io.formats.neuro.shared import NO_PARCEL, find_keys, shared_keys
 from eigenshape.io.formats.numbers import Cursor, coordinates, lines_of, whole, wholes
 
 WHAT = "An annotation file"
 PACKING = np.array([1, 2**8, 2**16])  # of red, green and blue into the number of a parcel
-OPAQUE = 255.0  # full opacity of a color in bytes
+OPAQUE = 255.0  # full opacity of a color in bytes; files have the transparency, 255 - opacity
 
 
-def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
-    """Return the parcels of an annotation, or the one of a label file of a mesh."""
+def parse_parcels(data: bytes, mesh: TriangleMesh) -> tuple[Any, ...]:
+    """Return the parcels of an annotation, or the one of a label file of a mesh; and notes."""
     if data.startswith(b"#!ascii"):
         return _parse_label(data, mesh.n_vertices)
     cursor = Cursor(data, WHAT)
@@ -61,19 +69,37 @@ def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
             f"Colors of {WHAT} must lie in 0..255; that of {names[bad[0]]!r} is {table[bad[0]].tolist()}."
         )
     keys = table[:, :3] @ PACKING
-    labels = np.full(n_vertices, -1)
-    labels[vertices] = find_keys(keys, values)
-    lost = np.flatnonzero((labels[vertices] < 0) & (values != 0))
+    found = find_keys(keys, values)
+    lost = np.flatnonzero((found < 0) & (values != 0))
     if lost.size:
         raise FileFormatError(
             f"Colors of {WHAT} must stand in its table; that of vertex {vertices[lost[0]]} is "
             f"{values[lost[0]]} ({lost.size} such)."
         )
+    notes = shared_keys("colors", keys, names, values[values != 0])
+    # The number 0 is that of black, and of vertices in no parcel; nibabel and FreeSurfer's tools
+    # take it for the latter.
+    black = np.flatnonzero((values == 0) & (found >= 0))
+    if black.size and names[found[black[0]]].lower() not in ("unknown", NO_PARCEL):
+        notes.append(
+            f"black stands for no parcel in an annotation, and it is the color of "
+            f"{names[found[black[0]]]!r}: its {black.size} vertices have the label -1"
+        )
+    found[values == 0] = -1
+    hidden = np.intersect1d(found, np.flatnonzero(table[:, 3] == OPAQUE))
+    if hidden.size:
+        notes.append(
+            f"the last number of a color in an annotation is its transparency, and that of "
+            f"{names[hidden[0]]!r} is 255 ({hidden.size} such), so it has the opacity 0. If opacity was "
+            "meant, set it to 1 in a copy of the colors, and make a Parcellation with that"
+        )
+    labels = np.empty(n_vertices, dtype=np.int64)
+    labels[vertices] = found
     rgba = np.column_stack([table[:, :3], OPAQUE - table[:, 3]]) / OPAQUE
-    return Parcellation(labels, tuple(names), rgba)
+    return Parcellation(labels, tuple(names), rgba), *notes
 
 
-def _parse_label(data: bytes, n_points: int) -> Parcellation:
+def _parse_label(data: bytes, n_points: int) -> tuple[Any, ...]:
     lines = lines_of(data)  # the first line is a comment
     count = whole(lines[0][1], lines[0], "The number of vertices") if lines else -1
     if count != len(lines) - 1:
@@ -83,15 +109,19 @@ def _parse_label(data: bytes, n_points: int) -> Parcellation:
         )
     numbers = coordinates(lines[1:])[:, 0] if count else np.empty(0)
     vertices = wholes(numbers, "Vertices of a label file")
-    bad = np.flatnonzero((vertices < 0) | (vertices >= n_points))
+    bad = np.flatnonzero((vertices < -1) | (vertices >= n_points))
     if bad.size:
         raise FileFormatError(
             f"A label file must belong to the surface, whose vertices are 0..{n_points - 1}; it "
             f"lists {vertices[bad[0]]}."
         )
+    # Points of a volume that FreeSurfer has not assigned to vertices. Their places are no help: they
+    # are those on one surface, such as the white one, and the mesh may be another.
+    n_loose = int((vertices < 0).sum())
+    notes = [f"{n_loose} of its {count} points have no vertex, but -1, and are left out"]
     labels = np.full(n_points, -1)
-    labels[vertices] = 0
-    return Parcellation(labels, ("label",))
+    labels[vertices[vertices >= 0]] = 0
+    return Parcellation(labels, ("label",)), *notes[: n_loose > 0]
 
 
 def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) -> bytes:
@@ -110,14 +140,14 @@ def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) 
     table = np.rint(OPAQUE * parcellation.colors).astype(np.int64)
     table[:, 3] = OPAQUE - table[:, 3]
     keys = table[:, :3] @ PACKING
-    _, firsts, counts = np.unique(keys, return_index=True, return_counts=True)
-    if (counts > 1).any() or 0 in keys:
-        twin = (
-            int(firsts[counts > 1][0]) if (counts > 1).any() else int(np.flatnonzero(keys == 0)[0])
-        )
+    firsts = find_keys(keys, keys)
+    bad = np.flatnonzero((firsts != np.arange(len(keys))) | (keys == 0))
+    if bad.size:
+        twin = firsts[bad[0]]
         raise FileFormatError(
             f"Parcels of {WHAT} must differ in their colors, and none is black; that of "
-            f"{parcellation.names[twin]!r} is {table[twin, :3].tolist()}."
+            f"{parcellation.names[twin]!r} is {table[twin, :3].tolist()}. Write .label.gii, which keeps "
+            "any colors."
         )
     of_vertices = np.where(parcellation.labels < 0, 0, np.append(keys, 0)[parcellation.labels])
 

@@ -1,4 +1,10 @@
-"""CIFTI files: functions, series and parcels on the vertices of both hemispheres, and on voxels below them."""
+"""CIFTI files: functions, series and parcels on the vertices of both hemispheres, and on voxels below them.
+
+Read: scalars, series and labels of both hemispheres.
+Kept: names of maps; names and colors of parcels.
+Named: nothing.
+Refused: files without surfaces.
+"""
 
 from typing import Any
 
@@ -75,7 +81,7 @@ def _parse(data: bytes) -> tuple[Any, Arrays]:
     return maps, found
 
 
-def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
+def parse_parcels(data: bytes, mesh: TriangleMesh) -> tuple[Parcellation]:
     """Return the parcellation of the hemisphere that a mesh is of; the label named ??? is no parcel.
 
     Raise FileFormatError if the file does not hold one function of labels on that hemisphere.
@@ -101,7 +107,8 @@ def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
             f"Labels of a CIFTI file must stand in its table; that of vertex {odd[0]} is "
             f"{labels[odd[0]]:g} ({odd.size} such)."
         )
-    return Parcellation(places, tuple(name for _, name, _ in rows), [color for *_, color in rows])
+    names, colors = tuple(name for _, name, _ in rows), [color for *_, color in rows]
+    return (Parcellation(places, names, colors),)
 
 
 def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) -> bytes:

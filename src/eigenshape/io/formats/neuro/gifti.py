@@ -1,46 +1,62 @@
-"""GIFTI files: surfaces, functions and labels of vertices, in XML. nibabel writes them."""
+"""GIFTI files: surfaces, functions and labels of vertices, in XML. nibabel writes them.
+
+Read: surfaces, functions and labels of all ten types of numbers; text, binary, packed, and in a
+    file beside.
+Kept: from GIFTI to GIFTI the transformations, metadata and structure.
+Named: the transformation and metadata in other formats; parcels of one key; digits that are lost.
+Refused: several surfaces; files outside the folder; labels without names as parcels.
+"""
 
 import base64
 import binascii
+from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
+from eigenshape._files import read_regular
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.neuro.shared import (
     NO_PARCEL,
+    UNNAMED,
     Arrays,
     find_keys,
     narrow,
     require_nibabel,
+    shared_keys,
 )
 from eigenshape.io.formats.numbers import ZLIB, numbers_of, require_reasonable, unpack_block
+from eigenshape.io.formats.obj_attributes import find_beside
 from eigenshape.io.formats.stl import single_precision
 
+# The standard has uint8, int32 and float32; other programs write more of the types of NIfTI.
 NUMBERS = {
-    "NIFTI_TYPE_UINT8": "u1", "NIFTI_TYPE_INT32": "i4", "NIFTI_TYPE_FLOAT32": "f4",
-    "NIFTI_TYPE_INT64": "i8", "NIFTI_TYPE_FLOAT64": "f8",
-}  # fmt: skip
+    f"NIFTI_TYPE_{np.dtype(kind).name.upper()}": kind
+    for kind in ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8")
+}
 ORDERS = {
     "LittleEndian": "<", "BigEndian": ">", "GIFTI_ENDIAN_LITTLE": "<", "GIFTI_ENDIAN_BIG": ">",
 }  # fmt: skip
 TEXT = ("ASCII", "GIFTI_ENCODING_ASCII")  # encodings, by their names now and in version 1.0 of 2008
 PLAIN = ("Base64Binary", "GIFTI_ENCODING_B64BIN")
 PACKED = ("GZipBase64Binary", "GIFTI_ENCODING_B64GZ")
+OUTSIDE = ("ExternalFileBinary", "GIFTI_ENCODING_EXTBIN")
 POINTS, TRIANGLES, LABELS = "NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE", "NIFTI_INTENT_LABEL"
-UNNAMED = "values"
 STRUCTURE = "AnatomicalStructurePrimary"
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "f 3"]]:
+def parse(
+    data: bytes, folder: Path | None = None
+) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "f 3"]]:
     """Return vertices and faces; the transformation to other coordinates is not applied.
 
     Raise FileFormatError if the file does not hold one surface, or not what it declares.
     """
-    arrays = _parse_tags(data).findall("DataArray")
+    arrays = parse_tags(data).findall("DataArray")
     found = []
     for intent, kind in ((POINTS, "f"), (TRIANGLES, "iu")):
         fitting = [array for array in arrays if array.get("Intent") == intent]
@@ -49,7 +65,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "f 3"]
                 f"A GIFTI file of a surface must have one array {intent}; it has {len(fitting)}. "
                 "es.io.read_fields reads the functions in it."
             )
-        rows = _values(fitting[0], len(data))
+        rows = _values(fitting[0], len(data), folder)
         if rows.ndim != 2 or rows.shape[1] != 3 or rows.dtype.kind not in kind:
             raise FileFormatError(
                 f"{intent} of a GIFTI file must have three numbers a row, coordinates or whole numbers; "
@@ -59,17 +75,17 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Int[np.ndarray, "f 3"]
     return found[0].astype(np.float64), found[1].astype(np.int64)
 
 
-def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
+def parse_fields(data: bytes, folder: Path | None = None) -> tuple[Arrays, Arrays]:
     """Return the functions on vertices by name, and none on faces; arrays of one name are columns.
 
     Raise FileFormatError if the file does not hold what it declares.
     """
     columns: dict[str, list[np.ndarray]] = {}
-    for array in _parse_tags(data).findall("DataArray"):
+    for array in parse_tags(data).findall("DataArray"):
         intent = array.get("Intent")
         if intent in (POINTS, TRIANGLES):
             continue
-        values = _values(array, len(data))
+        values = _values(array, len(data), folder)
         name = _meta(array).get("Name", "") or UNNAMED
         before = columns.setdefault(name, [])
         if intent == "NIFTI_INTENT_NODE_INDEX" or (before and len(before[0]) != len(values)):
@@ -84,34 +100,41 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     }, {}
 
 
-def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
-    """Return the parcellation of a file of labels; the label named ??? is no parcel.
+def parse_parcels(data: bytes, mesh: TriangleMesh, folder: Path | None = None) -> tuple[Any, ...]:
+    """Return the parcellation of a file of labels, and notes; the label named ??? is no parcel.
 
-    Raise FileFormatError if there is not one array of labels, or a label has no name or color.
+    Labels without a color get the hues of `Parcellation`.
+
+    Raise FileFormatError if there is not one array of labels, or a label has no name or half a color.
     """
-    root = _parse_tags(data)
+    root = parse_tags(data)
     arrays = [array for array in root.findall("DataArray") if array.get("Intent") == LABELS]
     if len(arrays) != 1:
         raise FileFormatError(
-            f"A GIFTI file of labels must have one array {LABELS}; it has {len(arrays)}."
+            f"A GIFTI file of labels must have one array {LABELS}; it has {len(arrays)}. "
+            "es.io.read_fields reads the numbers of all arrays."
         )
-    labels = _values(arrays[0], len(data)).ravel()
+    labels = _values(arrays[0], len(data), folder).ravel()
     keys, names, colors = [], [], []
     for label in root.findall("./LabelTable/Label"):
-        words = [label.get(each, "") for each in ("Key", "Red", "Green", "Blue", "Alpha")]
-        name = (label.text or "").strip()
+        name, facts = (label.text or "").strip(), label.attrib
+        shades = [facts[each] for each in ("Red", "Green", "Blue") if each in facts]
+        color = []
         try:
-            keys.append(int(words[0]))
-            color = [float(word) for word in words[1:]] if name != NO_PARCEL else []
+            keys.append(int(facts.get("Key", facts.get("Index", ""))))  # Index in files of 2008
+            if shades and name != NO_PARCEL:
+                color = [float(word) for word in (*shades, facts.get("Alpha", "1"))]
         except ValueError:
             color = [np.nan]
-        if not all(0 <= share <= 1 for share in color):
+        if len(color) not in (0, 4) or not all(0 <= share <= 1 for share in color):
             raise FileFormatError(
-                f"Labels of a GIFTI file must have a key and a color; {name!r} has {words}."
+                f"Labels of a GIFTI file must have a key and a color; {name!r} has {facts}."
             )
-        colors += [color] if color else []
         names.append(name)
-    if not colors:
+        if name != NO_PARCEL:
+            colors.append(color)
+    parcels = tuple(name for name in names if name != NO_PARCEL)
+    if not parcels:
         raise FileFormatError(
             "A GIFTI file of labels must have a table of names and colors; it has none. "
             "es.io.read_fields reads its numbers, such as those of a mask."
@@ -125,18 +148,21 @@ def parse_parcels(data: bytes, mesh: TriangleMesh) -> Parcellation:
         )
     is_parcel = np.array([name != NO_PARCEL for name in names])
     numbers = np.append(np.where(is_parcel, np.cumsum(is_parcel) - 1, -1), -1)
-    parcels = tuple(name for name in names if name != NO_PARCEL)
-    return Parcellation(numbers[places], parcels, np.array(colors))
+    hues = Parcellation([], parcels).colors
+    chosen = [color or hue for color, hue in zip(colors, hues.tolist(), strict=True)]
+    notes = shared_keys("keys", np.array(keys), names, labels)
+    return Parcellation(numbers[places], parcels, chosen), *notes
 
 
 def structure_of(data: bytes) -> str:
     """Return the structure that the file names, such as CortexLeft, or an empty text."""
-    root = _parse_tags(data)
+    root = parse_tags(data)
     found = (_meta(each).get(STRUCTURE) for each in [root, *root.iter("DataArray")])
     return next(filter(None, found), "")
 
 
-def _parse_tags(data: bytes) -> ElementTree.Element:
+def parse_tags(data: bytes) -> ElementTree.Element:
+    """Return the root of a file, and raise FileFormatError if that does not hold its arrays."""
     if b"<!ENTITY" in data:
         raise FileFormatError(
             "A GIFTI file must be plain XML; it declares entities, which could be of any size."
@@ -161,8 +187,8 @@ def _meta(element: ElementTree.Element) -> dict[str, str]:
     }
 
 
-def _values(array: ElementTree.Element, n_bytes: int) -> np.ndarray:
-    """Return the numbers of an array; `n_bytes` is the size of the file."""
+def _values(array: ElementTree.Element, n_bytes: int, folder: Path | None) -> np.ndarray:
+    """Return the numbers of an array; `n_bytes` is the size of the file, and `folder` its place."""
     intent, encoding = array.get("Intent", "an array"), array.get("Encoding", "")
     kind, order = NUMBERS.get(array.get("DataType", "")), ORDERS.get(array.get("Endian", ""))
     try:
@@ -195,10 +221,19 @@ def _values(array: ElementTree.Element, n_bytes: int) -> np.ndarray:
         if encoding in PACKED:
             require_reasonable(size, n_bytes)
             data = unpack_block(data, size, ZLIB)
+    elif encoding in OUTSIDE:
+        name, start = array.get("ExternalFileName", ""), array.get("ExternalFileOffset", "") or "0"
+        path = find_beside(name, folder) if name and folder else None
+        if path is None or not start.isdecimal():
+            raise FileFormatError(
+                f"Numbers outside a GIFTI file must lie in a file in its folder; {intent} is in "
+                f"{name[:80]!r} from byte {start[:30]} on, which is not there. Save it with the data inside."
+            )
+        data = read_regular(path, "numbers")[int(start) :][:size]
     else:
         raise FileFormatError(
-            f"Arrays of a GIFTI file must be in it, as text or in base64; {intent} is {encoding[:30]!r}. "
-            "Save it with the data inside."
+            f"Arrays of a GIFTI file must be text, in base64 or in a file beside it; {intent} is "
+            f"{encoding[:30]!r}. Save it with the data inside."
         )
     if len(data) != size:
         raise FileFormatError(

@@ -1,18 +1,32 @@
-"""NIfTI files: a number for each voxel, and where the voxels lie."""
+"""NIfTI files: a number for each voxel, and where the voxels lie.
 
+Read: volumes of three axes; one number for each vertex, as n x 1 x 1.
+Kept: the map from voxels to space.
+Named: nothing.
+Refused: several frames as a volume; a map that is not finite.
+"""
+
+import math
 import zlib
 
 import numpy as np
 from jaxtyping import Float, Shaped
 
-from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.neuro.shared import GZIP, VOLUME_SIZE, require_nibabel
+from eigenshape._errors import FileFormatError, MissingExtraError
+from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.io.formats.neuro.shared import (
+    GZIP,
+    UNNAMED,
+    VOLUME_SIZE,
+    Arrays,
+    count_vertices,
+    require_nibabel,
+)
 from eigenshape.io.formats.numbers import require_reasonable
 
-# Of each version: the size of its header, which is the first number of a file, the class of nibabel,
-# the type and the place of the shape, and the place of the number of bits of a voxel.
-HEADERS = {348: ("Nifti1Image", "i2", 40, 72), 540: ("Nifti2Image", "i8", 16, 14)}
-LONGEST_HEADER = 540
+# Sizes of headers, which files begin with, and classes of nibabel
+HEADERS = {348: "Nifti1Image", 540: "Nifti2Image"}
+LONGEST_HEADER = 540  # bytes
 MOST_BEFORE = 2**20  # bytes of notes between the header and the numbers
 
 
@@ -21,25 +35,33 @@ def parse_volume(data: bytes) -> tuple[Shaped[np.ndarray, "a b c"], Float[np.nda
 
     Raise FileFormatError if the file does not hold what it declares, or has several frames.
     """
-    nibabel = require_nibabel("nibabel")
-    packed = data.startswith(GZIP)
-    unpacker = zlib.decompressobj(wbits=31)
+    values, to_space = _parse(data, is_volume=True)
+    return np.ascontiguousarray(values.reshape(values.shape[:3])), to_space
+
+
+def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
+    """Return the one function that is stored as a volume, or its frames as columns, and none on faces.
+
+    Raise FileFormatError if the file does not hold what it declares, or holds a volume.
+    """
+    values, _ = _parse(data, is_volume=False)
+    table = values.reshape(-1, math.prod(values.shape[3:]), order="F")
+    return {UNNAMED: table[:, 0] if table.shape[1] == 1 else np.ascontiguousarray(table)}, {}
+
+
+def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
+    """Raise an error, since functions in such files are only read."""
+    raise FileFormatError(f"Functions in {suffix} are only read. Write .mgh or .func.gii.")
+
+
+def _parse(data: bytes, *, is_volume: bool) -> tuple[np.ndarray, Float[np.ndarray, "4 4"]]:
+    """Return the numbers in the shape of the file, and the map from voxels to space."""
     try:
-        head = unpacker.decompress(data, LONGEST_HEADER) if packed else data[:LONGEST_HEADER]
-        kind, size = _read_header(head)
-        if packed:
-            require_reasonable(size, len(data), VOLUME_SIZE)
-            data = head + unpacker.decompress(unpacker.unconsumed_tail, size + MOST_BEFORE)
+        values, to_space = _load(data, is_volume=is_volume)
+    except (FileFormatError, MissingExtraError):
+        raise
     except zlib.error as err:
         raise FileFormatError(f"A packed NIfTI file must be whole; {err}.") from err
-    if size > len(data):
-        raise FileFormatError(
-            f"A NIfTI file must hold what it declares; {size} bytes do not fit into its {len(data)}."
-        )
-    try:
-        image = getattr(nibabel, kind).from_bytes(data)
-        values = np.asanyarray(image.dataobj).reshape(image.shape[:3])
-        to_space = np.asarray(image.affine, dtype=np.float64)
     except Exception as err:  # nibabel and what it calls each raise their own
         cause = " ".join(str(err).split())
         raise FileFormatError(
@@ -50,30 +72,42 @@ def parse_volume(data: bytes) -> tuple[Shaped[np.ndarray, "a b c"], Float[np.nda
             "A volume must hold one number for each voxel, and a place for each that is finite; it holds "
             f"{values.dtype}, and the map is {to_space.tolist()}."
         )
-    return np.ascontiguousarray(values, values.dtype.newbyteorder("=")), to_space
+    return values.astype(values.dtype.newbyteorder("="), copy=False), to_space
 
 
-def _read_header(head: bytes) -> tuple[str, int]:
-    """Return the class of nibabel that reads a file, and the number of bytes of its voxels.
-
-    Raise FileFormatError if the header is damaged, or declares more than one frame.
-    """
-    first = [int(np.frombuffer(head.ljust(4, b"\0"), f"{order}i4", 1)[0]) for order in "<>"]
-    order, length = next(
-        ((o, n) for o, n in zip("<>", first, strict=True) if n in HEADERS), ("", 0)
+def _load(data: bytes, *, is_volume: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return what nibabel reads, once the header has told that the file is whole, and its size."""
+    nibabel = require_nibabel("nibabel")
+    packed = data.startswith(GZIP)
+    unpacker = zlib.decompressobj(wbits=31)
+    head = unpacker.decompress(data, LONGEST_HEADER) if packed else data[:LONGEST_HEADER]
+    length = next(
+        (n for n in HEADERS for o in ("little", "big") if head.startswith(n.to_bytes(4, o))), 0
     )
-    if not order or len(head) < length:
+    if not length or len(head) < length:
         raise FileFormatError(
             "A NIfTI file must begin with its header, of 348 or 540 bytes; it begins with "
             f"{head[:4].hex(' ')}, and has {len(head)} bytes of one."
         )
-    kind, number, place, place_of_bits = HEADERS[length]
-    n_axes, *shape = np.frombuffer(head, f"{order}{number}", 8, place).tolist()
-    bits = int(np.frombuffer(head, f"{order}i2", 1, place_of_bits)[0])
-    axes = shape[:n_axes] if n_axes > 0 else []
-    if not 3 <= n_axes <= 7 or min(axes) < 1 or max(axes[3:], default=1) > 1 or bits < 1:
+    kind = getattr(nibabel, HEADERS[length])
+    header = kind.header_class(head[:length], check=False)
+    # nibabel returns the number of vertices that FreeSurfer stores elsewhere if 16 bits are too few.
+    axes, bits = list(header.get_data_shape()), int(header["bitpix"])
+    if is_volume:
+        rule = "a volume must have three axes and one frame"
+        fits = len(axes) >= 3 and max(axes[3:], default=1) == 1
+    else:
+        rule = "functions on vertices must be n x 1 x 1, or that and frames"
+        fits = count_vertices([*axes, 1, 1, 1][:3]) > 0
+    if not fits or min(axes) < 1 or bits < 1:
+        raise FileFormatError(f"A NIfTI file of {rule}; it has {axes}, of {bits} bits each.")
+    size = math.prod(axes) * bits // 8
+    if packed:
+        require_reasonable(size, len(data), VOLUME_SIZE)
+        data = head + unpacker.decompress(unpacker.unconsumed_tail, size + MOST_BEFORE)
+    if size > len(data):
         raise FileFormatError(
-            f"A volume must have three axes and one frame; it has {axes}, of {bits} bits each."
+            f"A NIfTI file must hold what it declares; {size} bytes do not fit into its {len(data)}."
         )
-    n_voxels = axes[0] * axes[1] * axes[2]  # whole numbers of Python, which do not overflow
-    return kind, n_voxels * bits // 8
+    image = kind.from_bytes(data)
+    return np.asanyarray(image.dataobj), np.asarray(image.affine, dtype=np.float64)

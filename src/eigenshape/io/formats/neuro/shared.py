@@ -1,6 +1,7 @@
 """What the formats of brains share: nibabel, if it is installed, and numbers of 32 bits."""
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ GZIP = b"\x1f\x8b"  # first bytes
 # Bytes that a packed volume may always unpack to: labels of a head, 256 voxels a side in 32 bits,
 # are 64 MiB, and pack 200 times.
 VOLUME_SIZE = 2**28
+UNNAMED = "values"  # name of a function that has none in its file
 NO_PARCEL = "???"  # name of the label 0 in files of Connectome Workbench
 
 # Names of files that name a hemisphere: lh.aparc.annot, sub-01_hemi-L.label.gii, S1.L.aparc.label.gii
@@ -74,6 +76,28 @@ def one_table(of_vertices: Arrays, what: str) -> np.ndarray:
         )
     (item,) = of_vertices.items()
     return narrow(*item)
+
+
+def count_vertices(shape: Sequence[int]) -> int:
+    """Return the number of vertices of functions that are stored as a volume, or 0 for a volume.
+
+    They lie along its first axis. FreeSurfer factors a number that is too large for a header, as in
+    163842 = 27307 x 1 x 6, where the first axis is the fastest.
+    """
+    n, height, depth = shape
+    return n * depth if height == 1 and (depth == 1 or depth < n) else 0
+
+
+def shared_keys(what: str, keys: np.ndarray, names: Sequence[str], values: np.ndarray) -> list[str]:
+    """Say which parcels are empty because an earlier one has their key, such as a color."""
+    firsts = find_keys(keys, keys)
+    is_twin = (firsts != np.arange(len(keys))) & np.isin(keys, values)
+    return [
+        f"parcels are told apart by their {what}, and those of {names[first]!r} and {names[twin]!r} "
+        f"are equal: the vertices of both are in {names[first]!r}"
+        for twin, first in enumerate(firsts.tolist())
+        if is_twin[twin]
+    ]
 
 
 def find_keys(keys: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -127,7 +127,8 @@ export class Motion {
       if (answer) {
         app.viewer.setShares(answer.shares);
         this.rows.forEach((region, row) => (this.rims[region] = answer.pivots[row]!));
-        form.text("bound", `Ready: the motion is spread by ${answer.n_modes.join(", ")} modes.`);
+        const ready = `Ready: the motion is spread by ${answer.n_modes.join(", ")} modes.`;
+        form.text("bound", [ready, ...answer.warnings].join(" "));
         this.ready = true;
       }
     }
