@@ -108,6 +108,9 @@ class Exchange:
                 self.about[tool] = answers[0]
         self.found: dict[tuple[Path, str], Found] = {}  # by file and program
         self.compared: dict[Path, dict[str, Found]] = {}  # by file, then by program
+        self.missed: dict[
+            Path, set[str]
+        ] = {}  # aspects that eigenshape finds to be others, by file
 
     def command(self, tool: str) -> list[str] | None:
         """Return the command that starts a program; None if it is not installed."""
@@ -238,7 +241,7 @@ class Written(NamedTuple):
 def is_named(aspect: str, messages: list[str]) -> str:
     """Return the message that names an aspect, if there is one."""
     if aspect.startswith("field"):
-        words = ("field", aspect.removeprefix("field ").lower())
+        words = ("fields", repr(aspect.removeprefix("field ")))
     elif aspect in WORDS:
         words = WORDS[aspect]
     else:
@@ -257,11 +260,14 @@ def first_words(text: str) -> str:
 def judge_reading(exchange: Exchange, path: Path, tool: str, name: str) -> str:
     """Judge what eigenshape reads of the file of a program."""
     found, messages, error = listen(lambda: read_here(path))
+    exchange.missed[path] = set()
     if error:
         return f"named: {first_words(error)}"
     results = []
     witnesses = exchange.readers(path, name)
-    for aspect, fact in exchange.differences(path, name, found).items():
+    differences = exchange.differences(path, name, found)
+    exchange.missed[path] = set(differences)
+    for aspect, fact in differences.items():
         if message := is_named(aspect, messages):
             results.append(f"named: {first_words(message)}")
             continue
@@ -404,15 +410,8 @@ def run(exchange: Exchange) -> list[dict[str, str]]:
     for source, each in again.items():
         tool, form, name = theirs[source]
         if each.path.suffix in exchange.about[tool]["reads"]:
-            # What the program, or nobody, finds in its own file is no loss of ours.
-            before = exchange.readers(source, name)
-            unknown = set(before.get(tool, {}))
-            unknown |= {
-                aspect
-                for differences in before.values()
-                for aspect in differences
-                if not finders(aspect, before)
-            }
+            # What the program does not find in its own file, or eigenshape in it, is judged by then.
+            unknown = set(exchange.readers(source, name).get(tool, {})) | exchange.missed[source]
             add(tool, form, "again", name, judge_writing(exchange, each, tool, unknown))
     return rows
 

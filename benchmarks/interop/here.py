@@ -13,7 +13,6 @@ from interop.exchange import as_list
 from scipy.sparse import eye_array
 
 import eigenshape as es
-from eigenshape.io.formats.registry import FIELD_FORMATS
 
 Shape = dict[str, Any]
 # VTK's files hold colors and texture coordinates as fields, and so they come.
@@ -59,7 +58,7 @@ def read_all(path: Path) -> Shape:
     if isinstance(shape, es.SimplicialMesh):
         kind = KINDS[shape.simplices.shape[1]]
         found[kind] = {"tetra": shape.simplices} if kind == "cells" else shape.simplices
-        if path.suffix in FIELD_FORMATS:
+        if path.suffix in (".vtu", ".vtk"):  # the formats of such shapes that hold fields
             fields = es.io.read_fields(path)
             found |= sorted_fields(fields, len(shape.points), len(shape.simplices))
     return found

@@ -67,6 +67,12 @@ def read(path: Path) -> Shape:
         found["texture"] = mesh.visual.uv
     found["point_fields"] = plain_fields(mesh.vertex_attributes)
     found["cell_fields"] = plain_fields(mesh.face_attributes)
+    # Columns of PLY that trimesh has no place for stand as they are in the metadata.
+    raw = next(iter(scene.geometry.values())).metadata.get("_ply_raw", {})
+    for key, element in (("point_fields", "vertex"), ("cell_fields", "face")):
+        table = raw.get(element, {}).get("data")
+        names = (table.dtype.names or ()) if hasattr(table, "dtype") else table or ()
+        found[key] |= plain_fields({name: np.asarray(table[name]).ravel() for name in names})
     return found
 
 

@@ -62,12 +62,14 @@ def test_a_skin_left_undone_is_not_named_by_what_is_only_kept(interop):
     assert not interop.is_named("coordinates", [kept])
     assert interop.is_named("coordinates", ["a.glb: its skin is not applied"])
     assert not interop.is_named("colors", ["keeps properties other than color and image"])
+    assert not interop.is_named("field part", ["a.ply does not keep: the field 'label'."])
     assert interop.is_named("field part", ["a.ply does not keep: the field 'part'."])
 
 
 def test_witnesses_decide_whose_difference_it_is(interop, shapes, tmp_path):
     exchange = object.__new__(interop.Exchange)
-    exchange.shapes, exchange.about, exchange.compared = shapes, {"trimesh": {}, "blender": {}}, {}
+    exchange.shapes, exchange.missed = shapes, {}
+    exchange.about, exchange.compared = {"trimesh": {}, "blender": {}}, {}
     path = tmp_path / "colors.ply"
     gray = {key: value for key, value in shapes["colors"].items() if key != "colors"}
     interop.write_here(shapes["colors"], path)

@@ -1,5 +1,6 @@
 """eigenshape collection: a folder of specimens, landmarks of some on all, and a report of one page."""
 
+import csv
 import json
 import re
 from dataclasses import replace
@@ -149,8 +150,10 @@ def test_landmarks_of_a_specimen_that_fails_or_in_another_order_are_named(scans,
     assert any("those of broken are not used: it failed" in text for text in facts["warnings"])
     assert any(text.startswith("landmarks: 4 of 4 of hand 2") for text in facts["warnings"])
     assert facts["doubtful"]["hand 2"] == NAMES
-    assert facts["given"]["hand 2"][NAMES[0]]["distance"] < 1e-6
-    assert facts["given"]["hand 2"][NAMES[0]]["disagreement"] > 0.1
+    rows = csv.DictReader((output / "landmarks.csv").read_text().splitlines())
+    (row,) = [row for row in rows if (row["specimen"], row["landmark"]) == ("hand 2", NAMES[0])]
+    assert float(row["distance"]) < 1e-6
+    assert float(row["disagreement"]) > 0.1
 
 
 def test_a_unit_that_the_file_names_is_converted(scans, output, tmp_path):
@@ -168,15 +171,16 @@ def test_a_unit_that_the_file_names_is_converted(scans, output, tmp_path):
 
 
 def test_landmarks_that_fit_no_specimen_are_refused(scans, tmp_path):
-    def refused(source):
+    def refused(source, code=2):
         options = ("-o", tmp_path / "out", "--landmarks", source)
-        return run("collection", scans, *options, code=2).stderr
+        return run("collection", scans, *options, code=code).stderr
 
     table = tmp_path / "table.csv"
     es.morphometrics.write_landmarks({"hnad 0": landmarks(0)}, table)
     assert "Landmarks must be of specimens" in refused(table)
     (tmp_path / "empty").mkdir()
-    assert "--landmarks takes a table, or a folder" in refused(tmp_path / "empty")
+    message = "A folder of landmarks must hold files that end in .mrk.json"
+    assert message in refused(tmp_path / "empty", code=1)
     (tmp_path / "twice").mkdir()
     for suffix in (".fcsv", ".mrk.json"):
         es.morphometrics.write_landmarks(landmarks(0), tmp_path / "twice" / f"hand 0{suffix}")

@@ -159,7 +159,7 @@ def test_words_for_handles(giraffe):
         (["--region", "head", "--move", "0,1,0"], "A region is one of these"),
         (
             ["--region", "head", "--move", "0,1,0", "-o", "a.txt"],
-            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtk, .npz, "
+            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtp, .vtk, .npz, "
             ".gii, .surf; a.txt",
         ),
         (

@@ -93,7 +93,7 @@ def test_without_repairs_it_converts(tmp_path):
         ),
         (
             ("--repair", "weld", "-o", "{folder}/b.dxf"),
-            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtk, .npz, "
+            "A mesh must be written to a file that ends in .off, .obj, .ply, .stl, .glb, .vtu, .vtp, .vtk, .npz, "
             ".gii, .surf; ",
         ),
         (

@@ -90,7 +90,8 @@ def test_what_cannot_be_compared_is_named(folder, tmp_path):
     assert "A vertex must be a whole number; line 2" in done.stderr
     wrong.write_text("0 1\n2 3\n")
     assert (
-        "number of one vertex; line 1" in run("stability", one, one, "--map", wrong, code=1).stderr
+        "A vertex must be a whole number; line 1"
+        in run("stability", one, one, "--map", wrong, code=1).stderr
     )
     wrong.write_text("0\n1\n")
     assert "there are 2 for 450" in run("stability", one, one, "--map", wrong, code=2).stderr

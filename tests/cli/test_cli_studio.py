@@ -71,6 +71,7 @@ def test_serve_passes_its_options_on_and_prints_the_address(monkeypatch):
         "write_token": None,
         "workers": es.retrieval.Workers(3, 7.0, 1.5e9),
         "show_sources": False,
+        "prefix": "",
         "browse": False,
     }
     names = ["--allow-host", "a.example", "--allow-host", "b.example:80"]

@@ -6,7 +6,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend, deform
 from eigenshape.deformation.handles import Rotation, Translation
-from eigenshape.deformation.patches import FREE_DEPTH
+from eigenshape.deformation.region_patches import FREE_DEPTH
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union

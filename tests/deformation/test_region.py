@@ -129,3 +129,8 @@ def test_a_kept_region_is_its_own():
     assert chosen(copy_region(index for index in (1, 2))) == [1, 2]
     box = BoxRegion([0, 0, 0], [1, 1, 1])
     assert copy_region(box) is box
+
+
+def test_a_boundary_needs_an_entry_for_each_vertex():
+    with pytest.raises(InvalidParameterError, match="A mask must have one entry per vertex"):
+        region_boundary(GRID, np.ones(1, dtype=bool))

@@ -304,6 +304,13 @@ def test_smooth_parts_stay_whole_and_keep_their_feature_points(human):
         assert (smooth.labels[around & (raw.labels == part)] == part).all()
 
 
+def test_adjacent_parts_need_a_label_for_each_face():
+    with pytest.raises(
+        InvalidParameterError, match=r"labels must hold one whole number per face, shape \(8,\)"
+    ):
+        adjacent_parts(grid(4, 1), np.array([0]))
+
+
 def test_adjacent_parts_of_a_strip():
     mesh = grid(7, 2)
     labels = np.minimum(

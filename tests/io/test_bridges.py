@@ -85,10 +85,15 @@ def test_what_does_not_fit_is_refused():
         InvalidShapeError, match="dataset must be a PolyData or an UnstructuredGrid; it is a list"
     ):
         from_pyvista([])
-    with pytest.raises(
-        InvalidShapeError, match=r"Cells must be simplices; 1 are of VTK's type 1[12]\. Triangulate"
-    ):
-        from_pyvista(pyvista.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid())
+    angles = np.arange(5) * 2 * np.pi / 5
+    ring = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    points = np.vstack([ring, ring])
+    points[5:, 2] = 1
+    prism = pyvista.UnstructuredGrid([10, *range(10)], [15], points)
+    with pytest.raises(InvalidShapeError, match=r"simplices, .*; it holds pentagonal prism"):
+        from_pyvista(prism)
+    surface = prism.extract_surface(algorithm="dataset_surface")
+    assert from_pyvista(surface).n_faces == 2 * 3 + 5 * 2  # the remedy
 
 
 def test_a_missing_package_is_named(monkeypatch):
@@ -107,6 +112,30 @@ def test_polylines_of_pyvista_become_segments():
     assert two.simplices.tolist() == [[2, 0], [0, 1], [1, 2]]
 
 
-def test_strips_of_pyvista_are_refused():
-    with pytest.raises(InvalidShapeError, match=r"are of VTK's type 6\. Triangulate them first"):
-        from_pyvista(pyvista.Sphere().strip())
+def test_strips_polygons_and_voxels_of_pyvista_are_split():
+    sphere = pyvista.Sphere()
+    strips = from_pyvista(sphere.strip())
+    assert isinstance(strips, TriangleMesh)
+    rows = [
+        np.sort(np.sort(faces, axis=1), axis=0)
+        for faces in (strips.faces, from_pyvista(sphere).faces)
+    ]
+    np.testing.assert_array_equal(*rows)
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 0.5, 0]])
+    assert from_pyvista(pyvista.PolyData(square, [5, *range(5)])).n_faces == 3
+    assert from_pyvista(pyvista.PolyData(square, [4, *range(4)])).faces.tolist() == [
+        [0, 1, 2],
+        [0, 2, 3],
+    ]
+    with pytest.warns(UserWarning, match="1 hexahedra were split into 6 tetrahedra"):
+        cube = from_pyvista(pyvista.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid())
+    assert cube.simplices.shape == (6, 4)
+    corners = cube.points[cube.simplices]
+    assert np.isclose(np.linalg.det(corners[:, 1:] - corners[:, :1]).sum() / 6, 1)
+
+
+def test_curved_cells_of_pyvista_are_read_by_their_corners():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0], [0.5, 0.5, 0], [0, 0.5, 0.0]])
+    grid = pyvista.UnstructuredGrid([6, *range(6)], [22], points)
+    with pytest.warns(UserWarning, match=r"by their corners \(1\), .* left out \(3\)"):
+        assert from_pyvista(grid).faces.tolist() == [[0, 1, 2]]

@@ -362,6 +362,17 @@ def test_scenes_are_chosen_by_name_or_number(tmp_path, scene, x):
     assert notes == ([listed] if scene is None else [])
 
 
+def test_a_mesh_that_another_scene_shows_stays_as_it_was_there(tmp_path):
+    gltf = Gltf()
+    two_scenes(gltf)
+    path = gltf.save(tmp_path)
+    mesh, attributes = es.read_mesh(path, attributes=True, scene=0)
+    bent = es.TriangleMesh(mesh.vertices * [1, 1, 2], mesh.faces)
+    assert not save_mesh(bent, tmp_path / "b.glb", attributes=attributes)
+    same_corners(es.read_mesh(tmp_path / "b.glb", scene=0), bent)
+    same_corners(es.read_mesh(tmp_path / "b.glb", scene=1), es.read_mesh(path, scene=1))
+
+
 @pytest.mark.parametrize(
     ("scene", "message"),
     [

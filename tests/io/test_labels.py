@@ -42,8 +42,8 @@ def test_labels_out_of_json(tmp_path):
             r"a\.seg: A label must be a whole number; line 2 has 'head' in 'head'",
         ),
         ("a.seg", "1\n\n2.5\n", r"a\.seg: A label must be a whole number; line 3 has '2\.5'"),
-        ("a.seg", "1 2\n3 4\n", r"a\.seg: A line must hold the label of one face; line 1 is '1 2'"),
-        ("a.seg", "1\n2 3\n", r"a\.seg: A line must hold the label of one face; line 2 is '2 3'"),
+        ("a.seg", "1 2\n3 4\n", r"a\.seg: A label must be a whole number; line 1 has '1 2'"),
+        ("a.seg", "1\n2 3\n", r"a\.seg: A label must be a whole number; line 2 has '2 3'"),
         (
             "a.seg",
             f"{2**63}\n",

@@ -28,6 +28,7 @@ from eigenshape.io import (
 )
 from eigenshape.io.formats.neuro import annotations, cifti, gifti, mni_obj, nifti, swc
 from eigenshape.io.formats.neuro import freesurfer as fs
+from eigenshape.io.opening import unpack_gzip
 
 CORTICES = Path(str(resources.files("neuromodes") / "data"))
 OF_NIBABEL = Path(nib.__file__).parent / "gifti" / "tests" / "data"
@@ -457,7 +458,7 @@ def test_volumes_of_nibabel(tmp_path):
         assert np.array_equal(found, np.asanyarray(image.dataobj))
         assert np.array_equal(place, image.affine)
     for name, fact in (
-        ("test.mgz", "3 x 4 x 5 x 2 were found"),
+        ("test.mgz", r"it has \[3, 4, 5, 2\]"),
         ("functional.nii", r"it has \[17, 21, 3, 20\]"),
         ("example_nifti2.nii.gz", "it has"),
     ):
@@ -502,14 +503,16 @@ def test_volumes_that_lie_are_refused(tmp_path):
     nib.Nifti1Image(np.ones((2, 3, 4), np.int16), np.eye(4)).to_filename(tmp_path / "a.nii")
     good = (tmp_path / "a.nii").read_bytes()
     volume_errors(b"abcdef", "b.nii", "must begin with its header", tmp_path)
-    volume_errors(good[:300], "b.nii", "has 300 bytes of one", tmp_path)
+    volume_errors(good[:300], "b.nii", "has 300 bytes", tmp_path)
     volume_errors(good[:-1], "b.nii", "must hold a volume; ", tmp_path)
     large = bytearray(good)
     large[42:48] = np.full(3, 30000, "<i2").tobytes()
     volume_errors(bytes(large), "b.nii", "54000000000000 bytes do not fit", tmp_path)
-    volume_errors(packed(good)[:50], "b.nii.gz", "A NIfTI file must", tmp_path)
-    volume_errors(b"\x1f\x8b" + good, "b.nii.gz", "A packed NIfTI file must be whole", tmp_path)
-    volume_errors(packed(bytes(large)), "b.nii.gz", "and 256 MiB; it declares", tmp_path)
+    volume_errors(packed(good)[:50], "b.nii.gz", "must be whole; it ends too early", tmp_path)
+    volume_errors(b"\x1f\x8b" + good, "b.nii.gz", "A packed file must be whole", tmp_path)
+    volume_errors(packed(bytes(large)), "b.nii.gz", "54000000000000 bytes do not fit", tmp_path)
+    bomb = packed(bytes(2**28 + 2**25))
+    volume_errors(bomb, "b.nii.gz", "and 256 MiB; it declares", tmp_path)
     color = np.zeros((2, 3, 4), np.dtype([("R", "u1"), ("G", "u1"), ("B", "u1")]))
     nib.Nifti1Image(color, np.eye(4)).to_filename(tmp_path / "c.nii")
     with pytest.raises(FileFormatError, match="one number for each voxel"):
@@ -537,6 +540,10 @@ CIFTI = cifti.format_maps(TETRAHEDRON, {"cortex_left:a": FOUR}, ".dscalar.nii")
 
 def parcels(parse):
     return lambda data: parse(data, TETRAHEDRON)
+
+
+def unpacked(parse):
+    return lambda data: parse(unpack_gzip(data))
 
 
 def words(start, *values):
@@ -617,13 +624,18 @@ def words(start, *values):
         (fs.parse, fs.format_binary(TETRAHEDRON)[:-2], "must hold what it declares"),
         (fs.parse_fields, CURVATURE + b"0", "more follows"),
         (fs.parse_fields, CURVATURE[:14] + b"\2" + CURVATURE[15:], "one number a vertex; it has 2"),
-        (fs.parse_fields, MGH[:11] + b"\2" + MGH[12:], "n x 1 x 1 x frames"),
+        (fs.parse_fields, MGH[:11] + b"\2" + MGH[12:], r"n x 1 x 1, .*it has \[4, 2, 1, 1\]"),
         (fs.parse_fields, MGH[:-1], "must hold what it declares"),
-        (fs.parse_fields, packed(MGH)[:-30], "must hold what it declares|must be whole"),
         (
             fs.parse_fields,
+            MGH[:3] + b"\2" + MGH[4:],
+            "version 1 and of numbers; it is of version 2",
+        ),
+        (unpacked(fs.parse_fields), packed(MGH)[:-30], "must be whole; it ends too early"),
+        (
+            unpacked(fs.parse_fields),
             packed(MGH[:7] + b"\x7f" + MGH[8:16] + b"\x7f" + MGH[17:]),
-            "must unpack to at most|n x 1 x 1|must be whole",
+            "declares; 270599716991 items at byte 284 do not fit into its 300 bytes",
         ),
         (
             parcels(annotations.parse_parcels),
@@ -792,16 +804,16 @@ FILES = {
     "freesurfer": (fs.parse, fs.format_binary(TETRAHEDRON)),
     "curvature": (fs.parse_fields, CURVATURE),
     "mgh": (fs.parse_fields, MGH),
-    "mgz": (fs.parse_fields, fs.format_maps(TETRAHEDRON, {"a": FOUR}, ".mgz")),
+    "mgz": (unpacked(fs.parse_fields), fs.format_maps(TETRAHEDRON, {"a": FOUR}, ".mgz")),
     "annotation": (parcels(annotations.parse_parcels), ANNOTATION),
     "label": (parcels(annotations.parse_parcels), b"#!ascii label\n2\n0 0 0 0 0\n3 0 0 1 0\n"),
     "cifti": (cifti.parse_fields, CIFTI),
     "cifti labels": (lambda data: cifti.parse_parcels(data, ON_THE_LEFT), CIFTI_LABELS),
     "skeleton": (swc.parse, SKELETON),
     "volume": (fs.parse_volume, VOLUMES[0]),
-    "packed volume": (fs.parse_volume, packed(VOLUMES[0])),
+    "packed volume": (unpacked(fs.parse_volume), packed(VOLUMES[0])),
     "nifti": (nifti.parse_volume, VOLUMES[1]),
-    "packed nifti": (nifti.parse_volume, packed(VOLUMES[1])),
+    "packed nifti": (unpacked(nifti.parse_volume), packed(VOLUMES[1])),
     "quadrangles": (fs.parse, QUADRANGLES),
     "surface in text": (
         fs.parse,

@@ -416,7 +416,8 @@ def test_points_are_written_exactly(tmp_path):
         write_points(cloud, tmp_path / name)
         np.testing.assert_array_equal(read_points(tmp_path / name).points, cloud.points)
     with pytest.raises(
-        FileFormatError, match=r"a\.csv must end in \.ply, \.xyz, \.pts to hold points"
+        FileFormatError,
+        match=r"a\.csv must be of a known format, \.ply, \.xyz, \.pts; it is '\.csv'",
     ):
         write_points(cloud, tmp_path / "a.csv")
     with pytest.raises(

@@ -37,6 +37,7 @@ def files(tmp_path_factory):
     return folder, contents
 
 
+@pytest.mark.filterwarnings("ignore::UserWarning")  # what is not kept is named
 @settings(
     max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )

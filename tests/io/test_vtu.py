@@ -38,7 +38,7 @@ def binaries(tmp_path_factory):
     [
         (
             ("<VTKFile", "<!DOCTYPE a [<!ENTITY b 'c'>]><VTKFile"),
-            "must be plain XML; it has a DOCTYPE",
+            "must be plain XML; it declares entities",
         ),
         (("</VTKFile>", ""), "must be whole XML; no element found"),
         (("VTKFile", "VTKfile"), "A VTK file in XML must be a VTKFile; it is a VTKfile"),
@@ -61,7 +61,7 @@ def binaries(tmp_path_factory):
         ),
         (
             ('NumberOfComponents="3"', 'NumberOfComponents="4"'),
-            "must have 1 to 3 coordinates each; they have '4'",
+            "must have three coordinates each; they have '4'",
         ),
         (("<Points>", "<Pointy>"), "must be whole XML"),
         (("Points>", "Pointy>"), "A VTK file must have points; a piece has none"),

@@ -12,7 +12,8 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import is_dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, is_dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType, SimpleNamespace, UnionType
@@ -31,24 +32,63 @@ from eigenshape.plot import render
 FOLDER = Path(tempfile.mkdtemp())
 
 
+@dataclass
+class Form:
+    """The unit of length, a surface that stands for the body in that unit, and how many modes it has."""
+
+    unit: float = 1.0
+    surface: es.TriangleMesh | None = None
+    n_modes: int = 40
+
+
+FORM = Form()
+
+
+@contextmanager
+def given_as(
+    surface: es.TriangleMesh | None = None, *, unit: float = 1.0, n_modes: int = 40
+) -> Iterator[None]:
+    """Let all values be those of another body, or of the same in another unit."""
+    start_afresh(Form(unit, surface, n_modes))
+    try:
+        yield
+    finally:
+        start_afresh(Form())
+
+
+def start_afresh(form: Form) -> None:
+    """Clear what is kept of the form before, and leave its files behind."""
+    global FORM, FOLDER  # the values read them
+    FORM, FOLDER = form, Path(tempfile.mkdtemp())
+    for value in globals().values():
+        if hasattr(value, "cache_clear"):
+            value.cache_clear()
+
+
 @cache
 def body() -> es.TriangleMesh:
     """A closed surface without symmetry."""
-    ball = es.icosphere(2)
-    x, y, z = ball.vertices.T
-    radius = 1 + 0.3 * x * y + 0.2 * z**3 + 0.1 * np.sin(3 * x + y)
-    return es.TriangleMesh(ball.vertices * [1.0, 1.3, 0.8] * radius[:, None], ball.faces)
+    surface = FORM.surface
+    if surface is None:
+        ball = es.icosphere(2)
+        x, y, z = ball.vertices.T
+        radius = 1 + 0.3 * x * y + 0.2 * z**3 + 0.1 * np.sin(3 * x + y)
+        surface = es.TriangleMesh(ball.vertices * [1.0, 1.3, 0.8] * radius[:, None], ball.faces)
+    return es.TriangleMesh(FORM.unit * surface.vertices, surface.faces)
 
 
 @cache
 def bent() -> es.TriangleMesh:
     mesh = body()
-    return es.TriangleMesh(mesh.vertices + 0.01 * np.sin(mesh.vertices[:, ::-1]), mesh.faces)
+    waves = np.sin(mesh.vertices[:, ::-1] / FORM.unit)
+    return es.TriangleMesh(mesh.vertices + 0.01 * FORM.unit * waves, mesh.faces)
 
 
 @cache
 def spectrum() -> es.Spectrum:
-    return es.solve_spectrum(es.cotangent_laplacian(body()), 40)
+    return es.solve_spectrum(
+        es.cotangent_laplacian(body()), min(FORM.n_modes, body().n_vertices - 1)
+    )
 
 
 @cache
@@ -71,13 +111,18 @@ def collection() -> es.collections.Collection:
     return es.collections.build_collection({"one": body(), "two": body()}, FOLDER / "bones")
 
 
-HEAD = es.deformation.BoxRegion([-9.0, 0.8, -9.0], [9.0, 9.0, 9.0])
-TURN = es.Rotation([0, 0.5, 0], [1, 0, 0], 0.2)
+def head() -> es.deformation.BoxRegion:
+    u = FORM.unit
+    return es.deformation.BoxRegion([-99 * u, 0.8 * u, -99 * u], [99 * u, 99 * u, 99 * u])
+
+
+def turn() -> es.Rotation:
+    return es.Rotation([0, 0.5 * FORM.unit, 0], [1, 0, 0], 0.2)
 
 
 @cache
 def binding() -> es.deformation.Binding:
-    return es.deformation.bind(rig(), [HEAD])
+    return es.deformation.bind(rig(), [head()])
 
 
 @cache
@@ -130,7 +175,7 @@ def latent() -> es.spectral.LatentBasis:
 
 
 def plan() -> es.stability.StabilityPlan:
-    return es.stability.StabilityPlan(k=5, n_samples=100, times=(0.1,))
+    return es.stability.StabilityPlan(k=5, n_samples=100, times=(0.1 * FORM.unit**2,))
 
 
 @cache
@@ -140,7 +185,7 @@ def report() -> es.stability.StabilityReport:
 
 def written_edits() -> Path:
     es.io.write_edits(
-        [es.deformation.Edit((es.deformation.Move(HEAD, TURN),))], body(), FOLDER / "edits.json"
+        [es.deformation.Edit((es.deformation.Move(head(), turn()),))], body(), FOLDER / "edits.json"
     )
     return FOLDER / "edits.json"
 
@@ -158,8 +203,8 @@ def with_boundary() -> es.TriangleMesh:
 
 
 def face_vectors() -> np.ndarray:
-    """A tangent vector of each face: its first side."""
-    starts, ends, _ = body().vertices[body().faces].transpose(1, 0, 2)
+    """A tangent vector of each face: the side between the first two of its vertices."""
+    starts, ends, _ = body().vertices[np.sort(body().faces)].transpose(1, 0, 2)
     return ends - starts
 
 
@@ -177,7 +222,7 @@ def written_attributes() -> es.io.MeshAttributes:
 
 def skulls() -> np.ndarray:
     """Landmarks of four specimens."""
-    return np.random.default_rng(0).standard_normal((4, 6, 3))
+    return np.random.default_rng(0).standard_normal((4, 6, 3)) * FORM.unit
 
 
 def written_parcels() -> Path:
@@ -214,13 +259,15 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.features.PersistenceDiagram: lambda: es.features.persistence_diagram(body(), height()),
     es.deformation.EigenRig: rig,
     es.deformation.Binding: binding,
-    es.Rotation: lambda: TURN,
-    es.deformation.Move: lambda: es.deformation.Move(HEAD, TURN),
-    es.deformation.Edit: lambda: es.deformation.Edit((es.deformation.Move(HEAD, TURN),)),
-    es.deformation.BoxRegion: lambda: HEAD,
+    es.Rotation: turn,
+    es.deformation.Move: lambda: es.deformation.Move(head(), turn()),
+    es.deformation.Edit: lambda: es.deformation.Edit((es.deformation.Move(head(), turn()),)),
+    es.deformation.BoxRegion: head,
     es.deformation.SkeletonResponse: lambda: es.deformation.skeleton_response(binding()),
     es.deformation.DetailedSkeleton: lambda: es.deformation.detailed_skeleton(binding()),
-    es.morphometrics.Landmarks: lambda: es.morphometrics.Landmarks(["nose"], [[0.0, 1.0, 2.0]]),
+    es.morphometrics.Landmarks: lambda: es.morphometrics.Landmarks(
+        ["nose"], [[0.0, FORM.unit, 0.0]]
+    ),
     es.spectral.FunctionalMap: mapping,
     es.spectral.LatentBasis: latent,
     es.matching.MatchTarget: target,
@@ -230,7 +277,9 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.collections.CarriedLandmarks: lambda: es.collections.carry_landmarks(
         collection(), {"one": es.morphometrics.Landmarks(["tip"], body().vertices[:1])}
     ),
-    es.collections.Similarity: lambda: es.collections.Similarity(2.0, np.eye(3), np.ones(3)),
+    es.collections.Similarity: lambda: es.collections.Similarity(
+        2.0, np.eye(3), np.full(3, FORM.unit)
+    ),
     es.matching.FusedScan: lambda: es.matching.fuse_scans([body()]),
     "fuse_scans.scans": lambda: [body()],
     es.stability.Perturbation: lambda: es.stability.measure_perturbation(body(), bent()),
@@ -270,7 +319,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "shapes": skulls,
     "train_codebook.shapes": lambda: [VALUES[es.retrieval.Patches]()],
     "compare_groups.groups": lambda: [0, 0, 1, 1],
-    "fit_allometry.sizes": lambda: [1.0, 2.0, 3.0, 5.0],
+    "fit_allometry.sizes": lambda: [FORM.unit, 2 * FORM.unit, 3 * FORM.unit, 5 * FORM.unit],
     "symmetric_components.pairs": lambda: [[0, 1]],
     "warp_mesh.starts": lambda: body().vertices[:9],
     "warp_mesh.ends": lambda: bent().vertices[:9],
@@ -287,7 +336,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "set_threads.n": lambda: None,
     "match_shapes.scale": lambda: "known",
     "average_onto_points.values": face_vectors,
-    "bind.regions": lambda: [HEAD],
+    "bind.regions": lambda: [head()],
     "boundary_load.mesh": with_boundary,
     "boundary_surface.mesh": lambda: es.shapes.box(2, 2, 2),
     "build": lambda: es.cotangent_laplacian,
@@ -301,9 +350,9 @@ NAMED: dict[str, Callable[[], Any]] = {
     "coefficients": lambda: spectrum().eigenvectors[:5, 0],
     "compare_shapes.plan": plan,
     "count": lambda: 4,
-    "curves": lambda: [body().faces[0, :2]],
+    "curves": lambda: [np.sort(body().faces[0])[:2]],
     "decompose_one_form.values": lambda: np.ones(len(es.calculus.one_form_edges(body()))),
-    "delta": lambda: 0.3,
+    "delta": lambda: 0.3 * FORM.unit,
     "eigenspace_errors.eigenvalues": lambda: spectrum().eigenvalues[:8],
     "eigenspace_errors.functions": lambda: spectrum().eigenvectors[:, :6],
     "difference_regions.difference": lambda: np.eye(5),
@@ -330,17 +379,19 @@ NAMED: dict[str, Callable[[], Any]] = {
     "LatentBasis.map_between.source": lambda: 0,
     "LatentBasis.map_between.target": lambda: 1,
     "latent_basis.maps": lambda: {(0, 1): mapping()},
-    "level": lambda: 0.1,
+    "level": lambda: 0.1 * FORM.unit,
     "logarithmic_map.source": lambda: 0,
     "make_creature.kind": lambda: "fish",
     "map_from_points.points": lambda: np.arange(body().n_vertices),
-    "mask": lambda: es.deformation.region_mask(body(), HEAD),
+    "mask": lambda: es.deformation.region_mask(body(), head()),
     "move_skeleton.response": lambda: es.deformation.skeleton_response(binding()),
     "compare_modes.one": lambda: [height(), 2 * height()],
-    "compare_modes.two": lambda: [1 - height(), height()],
+    "compare_modes.two": lambda: [FORM.unit - height(), height()],
     "drive": lambda: np.ones((5, 4)),
     "dt": lambda: 0.1,
     "geometric_connectome.n_modes": lambda: 10,
+    "geometric_connectome.length_scale": lambda: 0.5 * FORM.unit,
+    "wave_response.length_scale": lambda: 0.5 * FORM.unit,
     "rotation_nulls.n_nulls": lambda: 5,
     "weights": lambda: np.ones(body().n_vertices),
     "n": lambda: 50,
@@ -357,11 +408,11 @@ NAMED: dict[str, Callable[[], Any]] = {
     "normalized_cut.labels": lambda: np.arange(body().n_vertices) % 3,
     "order": lambda: 2,
     "path": lambda: FOLDER / "written.ply",
-    "planes": lambda: [[0.0, 1.0, 0.0, 0.5]],
+    "planes": lambda: [[0.0, 1.0, 0.0, 0.5 * FORM.unit]],
     "point_map.mapping": mapping,
     "positions": lambda: bent().vertices,
     "poses": lambda: {"rest": body()},
-    "radius": lambda: 0.4,
+    "radius": lambda: 0.4 * FORM.unit,
     "read": lambda: es.read_mesh,
     "query_indexes.folders": lambda: [shelf().folder],
     "mask_surface.mask": lambda: height() > 0,
@@ -370,10 +421,10 @@ NAMED: dict[str, Callable[[], Any]] = {
     "read_volume.path": written_volume,
     "structure_surfaces.labels": lambda: np.full((3, 3, 3), 11),
     "structure_surfaces.structures": lambda: {"caudate": 11},
-    "to_space": lambda: np.diag([2.0, 2.0, 2.0, 1.0]),
+    "to_space": lambda: np.diag([FORM.unit, FORM.unit, FORM.unit, 1.0]),
     "voxel_surface.inside": lambda: np.ones((3, 3, 3)),
-    "recover_geometry.eigenvalues": lambda: es.shapes.sphere_eigenvalues(60),
-    "region": lambda: HEAD,
+    "recover_geometry.eigenvalues": lambda: es.shapes.sphere_eigenvalues(60) / FORM.unit**2,
+    "region": head,
     "response": lambda: np.ones_like,
     "rho": lambda: 3.0,
     "save_figure.path": lambda: FOLDER / "written.png",
@@ -389,16 +440,16 @@ NAMED: dict[str, Callable[[], Any]] = {
     "sources": lambda: [0, 5],
     "sphere_harmonics.points": lambda: es.icosphere(1).vertices,
     "spectra": lambda: {"one": spectrum(), "two": spectrum()},
-    "squared_wavenumber": lambda: 1.0,
-    "t": lambda: 0.05,
+    "squared_wavenumber": lambda: FORM.unit**-2,
+    "t": lambda: 0.05 * FORM.unit**2,
     "tensors": lambda: es.operators.curvature_tensors(body(), 1.0),
-    "times": lambda: [0.1, 0.2],
+    "times": lambda: [0.1 * FORM.unit**2, 0.2 * FORM.unit**2],
     "trace_geodesic.start": lambda: 0,
     "transfer_function.values": height,
     "transport_vectors.vectors": lambda: np.eye(2),
     "up": lambda: "y",
     "values": height,
-    "vector": lambda: [0.1, 0.0],
+    "vector": lambda: [0.1 * FORM.unit, 0.0],
     "vectors": face_vectors,
     "vertices": lambda: np.arange(3),
     "view": lambda: [0.0, 0.0, 1.0],

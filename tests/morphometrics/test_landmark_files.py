@@ -169,9 +169,9 @@ WRONG = {
     "i.csv": ("specimen,landmark,x,y,z\na,n,1,2,3\na,n,1,2,3\n", "Names of landmarks must differ; 'n'"),
     "j.csv": ("specimen,landmark,x,y,z,spread\na,n,1,2,3,-1\n", "each at least 0"),
     "k.csv": ("specimen,landmark,x,y,z\na,n,1,2,3\nb,n,1,2,3\nb,m,1,2,3\n", "'b' has '2 landmarks'"),
-    "a.tps": ("LM=1\n1 2 3\n", "must have two numbers; a line is '1 2 3'"),
+    "a.tps": ("LM=1\n1 2 3\n", "must have 2 numbers; a line is '1 2 3'"),
     "b.tps": ("LM3=2\n1 2 3\n", "'1' has LM3=2, and there are 1"),
-    "c.tps": ("LM3=1\n1 2\n", "must have three numbers; a line is '1 2'"),
+    "c.tps": ("LM3=1\n1 2\n", "must have 3 numbers; a line is '1 2'"),
     "d.tps": ("1 2 3\n", "must begin with LM3="),
     "e.tps": ("LM3=1\n1 2 3\nID=a\nLM3=1\n1 2 3\nSCALE=2\n", "must have SCALE=; '2' differs from 'a'. Write SCALE=1"),
     "f.tps": ("LM3=1\n1 2 3\nID=a\nLM3=1\n1 2 3\nID=a\n", "must have different names; two are 'a'"),
@@ -182,7 +182,7 @@ WRONG = {
     "a.nts": ("1 2B 6 0 DIM=3\n", "must begin as '1 4L 30L 0 DIM=3'.*it begins with '1 2B 6"),
     "b.nts": ("1 2 6 0 DIM=3\n1 2 3\n", "must be 2 times 6 numbers, and 3 for each point; there are 3"),
     "c.nts": ("1 1 4 0 DIM=3\n1 2 3 4\n", "must be 1 times 4 numbers, and 3"),
-    "a.pp": ("<PickedPoints>", "must be XML; they are not"),
+    "a.pp": ("<PickedPoints>", "must hold landmarks: no element found"),
     "b.pp": ("<PickedPoints><point x='1' y='2'/></PickedPoints>", "structure differs, KeyError"),
     "a.pts": ("1 2 3\n", "must begin with 'Version 1.0'.*read by read_shape"),
     "b.pts": ("Version 1.0\n2\nS0 1 2 3\n", "second line says; it says '2', and there are 1"),
@@ -196,7 +196,7 @@ WRONG = {
     "b.fcsv": ("# CoordinateSystem = IJK\nF,1,2,3,0,0,0,1,1,1,0,n,,\n", "LPS or RAS; it is 'IJK'"),
     "a.mrk.json": ("{", "must hold landmarks"),
     "b.mrk.json": ("[" * 100_000, "structure differs, RecursionError"),
-    "c.mrk.json": ('{"markups": [{"controlPoints": [{"position": [1, 2]}]}]}', "three numbers; '1' is .1, 2"),
+    "c.mrk.json": ('{"markups": [{"controlPoints": [{"position": [1, 2]}]}]}', "3 numbers; '1' is .1, 2"),
     "d.mrk.json": ('{"markups": [{"controlPoints": [{"label": "a\\nb", "position": [1, 2, 3]}]}]}', "must be a text"),
     "e.mrk.json": ('{"markups": []}', "at least one specimen"),
 }  # fmt: skip
@@ -256,21 +256,6 @@ def test_labels_that_occur_again_get_numbers(tmp_path):
         assert read("a.fcsv", f"1{row}2{row}", tmp_path)["a"].names == ("nose", "nose (2)")
 
 
-def test_semilandmarks_of_slicermorph_are_named(tmp_path):
-    points = [
-        {"label": str(row), "position": [row, 0, 0], "description": kind}
-        for row, kind in enumerate(["Fixed", "Semi", "Semi"])
-    ]
-    with pytest.warns(
-        UserWarning, match=r"\(description Semi, 2 points\) are read like all others"
-    ):
-        found = read("a.mrk.json", slicer(controlPoints=points), tmp_path)["a"]
-    assert found.names == ("0", "1", "2")
-    row = "1,4,5,6,0,0,0,1,1,1,0,nose,Semi,\n"
-    with pytest.warns(UserWarning, match="1 points"):
-        read("a.fcsv", row, tmp_path)
-
-
 def test_curves_of_a_tps_file_follow_its_landmarks(tmp_path):
     text = "LM3=1\n1 2 3\nCURVES=1\nPOINTS=2\n1 1 1\n2 2 2\nSCALE=2\nID=a\n"
     found = read("a.tps", text, tmp_path)["a"]
@@ -278,7 +263,7 @@ def test_curves_of_a_tps_file_follow_its_landmarks(tmp_path):
     assert found.curves == ((1, 2),)
     # There may be no landmark where there are curves alone, and outlines have no points that correspond.
     text = "LM3=0\nCURVES=2\nPOINTS=2\n1 1 0\n2 2 0\nPOINTS=1\n3 3 0\nOUTLINES=1\nPOINTS=1\n9 9 0\n"
-    with pytest.warns(UserWarning, match="OUTLINES and POINTS are not read"):
+    with pytest.warns(UserWarning, match="OUTLINES are not read"):
         found = read("b.tps", text, tmp_path)["1"]
     assert found.points.tolist() == [[1, 1, 0], [2, 2, 0], [3, 3, 0]]
     assert found.curves == ((0, 1), (2,))
@@ -335,7 +320,8 @@ def test_files_of_programs_that_place_landmarks_are_read(tmp_path):
     found = read("a.pts", EDITOR, tmp_path)["a"]
     assert found.names == ("S000", "C000 001", "S001")
     np.testing.assert_array_equal(found.points, [[1, 2, 3], [4, 5, 6], [np.nan] * 3])
-    found = read("a.landmarkAscii", AMIRA, tmp_path)["a"]
+    (tmp_path / "a.landmarkAscii").write_bytes(AMIRA.replace("\n", "\r\n").encode())
+    found = es.morphometrics.read_landmarks(tmp_path / "a.landmarkAscii")
     assert found.points.tolist() == [[1, 2, 3], [4, 5, 6]]
     two = (
         AMIRA.replace("@1\n#", "@1\nMarkers { float[3] Coordinates2 } @2\n#") + "@2\n7 8 9\n1 1 1\n"

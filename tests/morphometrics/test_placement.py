@@ -56,20 +56,11 @@ def test_another_unit_is_named_and_the_remedy_works(factor, unit):
     assert require_on_surfaces([("a", body(), landmarks(points))])
 
 
-@pytest.mark.parametrize(
-    ("change", "axes"),
-    [
-        (lambda points: points * LPS, "as -x, -y, z they would lie on it; change them so."),
-        (lambda points: points[:, [1, 0, 2]], "as y, x, z they"),
-        (lambda points: points[:, [0, 2, 1]] * [1, -1, 1], "as x, z, -y they"),
-        (
-            lambda points: points * [-0.001, 0.001, 0.001],
-            "1000 times as large and as -x, y, z they",
-        ),
-    ],
-)
-def test_other_axes_are_named(change, axes):
-    assert axes in message(a=change)
+def test_the_other_system_of_slicer_is_named():
+    text = message(a=lambda points: points * LPS)
+    assert "as -x, -y, z they would lie on it; change them so." in text
+    text = message(a=lambda points: points[:, [1, 2, 0]])
+    assert "in another frame or of another specimen; save them as they lie on this mesh." in text
 
 
 def test_one_landmark_far_off_and_another_frame_are_named():

@@ -92,7 +92,7 @@ def collection(
             callback=batch_reporter(progress, "failed"),
         )
     known = {name: points for name, points in labelled.items() if name in built.names}
-    written = [output / "mean.ply", output / "specimens.csv"]
+    written = ["mean.ply", "specimens.csv", "report.html"]
     carried = None
     warnings = [
         f"landmarks: those of {name} are not used: it failed"
@@ -104,11 +104,10 @@ def collection(
         carried = es.collections.carry_landmarks(built, known)
         warnings += [f"landmarks: {text}" for text in steps.mostly_doubtful(carried)]
         carried.save(output / "landmarks.csv")
-        written.append(output / "landmarks.csv")
+        written.insert(2, "landmarks.csv")
     with progress_bar("report") as progress:
         title = folder.absolute().name
         steps.write_collection_report(built, carried, output / "report.html", title, progress)
-    written.append(output / "report.html")
 
     doubtful = {} if carried is None else steps.doubtful_landmarks(carried)
     if as_json:
@@ -121,7 +120,6 @@ def collection(
                 "methods": dict(zip(built.names, built.methods, strict=True)),
                 "labelled": list(known),
                 "doubtful": doubtful,
-                "given": {} if carried is None else steps.given_landmarks(carried),
                 "notes": {name: notes for name, notes in built.notes.items() if notes},
                 "warnings": warnings,
                 "failures": built.failures,
@@ -137,14 +135,12 @@ def collection(
         # On a terminal each specimen was named when it failed.
         for name, reason in () if out.is_terminal and err.is_terminal else built.failures.items():
             out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
-        counts = f"{len(built.names)} specimens, {len(built.failures)} failed"
-        if carried is None:
-            out.print(f"{counts}; no landmarks were given.")
-        else:
-            counts += f", {len(known)} labelled"
-            out.print(f"{counts}; all have {len(carried.names)} landmarks now.")
-        for path in written:
-            print_written(path)
+        rest = "; no landmarks were given."
+        if carried is not None:
+            rest = f", {len(known)} labelled; all have {len(carried.names)} landmarks now."
+        out.print(f"{len(built.names)} specimens, {len(built.failures)} failed{rest}")
+        for name in written:
+            print_written(output / name)
     for warning in warnings:
         err.print(f"[yellow]{escape_text(warning)}[/]")
     if built.failures:

@@ -32,8 +32,7 @@ NO_PLACE = 0.02
 # Median distances between a given landmark and those of other specimens, on the mean, from which a
 # person should look. The median counts as at most `ERROR_OF_ONE`, since many wrong ones raise it.
 WRONG_LABEL = 5.0
-COLUMNS = ["specimen", "landmark", "x", "y", "z", "spread", "doubtful"]
-EVIDENCE = ["given", "distance", "disagreement", "confidence"]
+COLUMNS = ["spread", "doubtful", "given", "distance", "disagreement", "confidence"]
 
 
 @record
@@ -117,18 +116,13 @@ class CarriedLandmarks(ReadOnly):
         OSError
             If the system cannot write there.
         """
-        rows: list[list[object]] = [[*COLUMNS, *EVIDENCE]]
+        rows: list[list[object]] = [["specimen", "landmark", "x", "y", "z", *COLUMNS]]
         for i, specimen in enumerate(self.specimens):
             for j, name in enumerate(self.names):
-                numbers = [*self.points[i, j].tolist(), float(self.spread[i, j])]
-                apart = float(self.disagreement[i, j])
-                evidence = [
-                    int(self.given[i, j]),
-                    float(self.distance[i, j]),
-                    "NA" if np.isnan(apart) else apart,
-                    float(self.confidence[i, j]),
-                ]
-                rows.append([specimen, name, *numbers, int(self.doubtful[i, j]), *evidence])
+                # Whether something is so is written as 0 or 1.
+                values = [+getattr(self, column)[i, j].item() for column in COLUMNS]
+                cells = ["NA" if np.isnan(value) else value for value in values]
+                rows.append([specimen, name, *self.points[i, j].tolist(), *cells])
         replace_file(as_path(path), csv_text(rows).encode())
 
 
@@ -184,19 +178,17 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     rows = [collection.number(name) for name in labelled]
     placements = require_on_surfaces(
         (name, collection.read_specimen(name), labelled[name]) for name in labelled
-    )
+    ).values()
+    far = np.array([each.distances for each in placements])
+    beside = np.array([each.is_beside for each in placements])
     radii = np.array([mean_radius(own) for own in collection.points])
     all_known = np.isfinite(given).all(axis=2)
-    sound = all_known.copy()
-    on_mean = np.full_like(given, np.nan)
-    for number, (row, (far, is_beside)) in enumerate(zip(rows, placements.values(), strict=True)):
-        known = all_known[number]
-        own = TriangleMesh(collection.points[row], faces)
-        there = closest_points(own, given[number, known])
+    off_map, on_mean = np.full_like(far, np.nan), np.full_like(given, np.nan)
+    for number, (row, known) in enumerate(zip(rows, all_known, strict=True)):
+        there = closest_points(TriangleMesh(collection.points[row], faces), given[number, known])
         on_mean[number, known] = place_points(mean, there.simplices, there.weights).points
-        off_map = np.linalg.norm(there.points - given[number, known], axis=1)
-        sound[number, known] = np.maximum(off_map, far[known]) <= FAR * radii[row]
-        sound[number] &= not is_beside
+        off_map[number, known] = np.linalg.norm(there.points - given[number, known], axis=1)
+    sound = (np.maximum(far, off_map) <= FAR * radii[rows, None]) & ~beside[:, None]
     apart = _disagreements(on_mean) / mean_radius(mean.vertices)
     if np.isfinite(apart).any():
         sound &= ~(apart > WRONG_LABEL * min(float(np.nanmedian(apart)), ERROR_OF_ONE))
@@ -231,14 +223,14 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     doubtful = (gaps > FAR * radii[:, None]) | (sure < NO_PLACE) | ~sound.any(axis=0)
     is_given, distance = np.zeros_like(doubtful), gaps.copy()
     disagreement = np.full_like(gaps, np.nan)
-    for number, (row, (far, _)) in enumerate(zip(rows, placements.values(), strict=True)):
-        known = all_known[number]
-        is_given[row] = known
-        doubtful[row, known] = ~sound[number, known]
-        points[row, known] = given[number, known]
-        spread[row, known] = 0
-        distance[row, known] = far[known]
-        disagreement[row, known] = apart[number, known] * radii[row]
+    own = np.nonzero(all_known)
+    at = np.array(rows)[own[0]], own[1]
+    is_given[at] = True
+    points[at] = given[own]
+    spread[at] = 0
+    doubtful[at] = ~sound[own]
+    distance[at] = far[own]
+    disagreement[at] = apart[own] * radii[at[0]]
     return CarriedLandmarks(
         collection.names, names, points, spread, doubtful, is_given, distance, disagreement, sure
     )
@@ -251,11 +243,11 @@ def _disagreements(on_mean: Float[np.ndarray, "m k 3"]) -> Float[np.ndarray, "m 
     """
     found = np.full(on_mean.shape[:2], np.nan)
     for j, places in enumerate(on_mean.transpose(1, 0, 2)):
-        known = np.flatnonzero(np.isfinite(places).all(axis=1))
-        if len(known) > 1:
-            apart = np.linalg.norm(places[known, None] - places[known], axis=2)
-            # The first of each row is the distance of a place from itself.
-            found[known, j] = np.sort(apart, axis=1)[:, len(known) // 2]
+        n_known = np.isfinite(places[:, 0]).sum()
+        if n_known > 1:
+            apart = np.linalg.norm(places[:, None] - places, axis=2)
+            # The first of each row is the distance of a place from itself; NaN are the last.
+            found[:, j] = np.sort(apart, axis=1)[:, n_known // 2]
     return found
 
 

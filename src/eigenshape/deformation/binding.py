@@ -13,8 +13,8 @@ from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import Integer
-from eigenshape.deformation.patches import Patch, split_region
 from eigenshape.deformation.region import Region, region_mask, require_boundary
+from eigenshape.deformation.region_patches import Patch, split_region
 from eigenshape.deformation.rig import EigenRig
 from eigenshape.deformation.rigidity import (
     FreePart,

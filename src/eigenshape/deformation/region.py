@@ -202,6 +202,11 @@ def region_boundary(mesh: MeshLike, mask: Bool[np.ndarray, " n"]) -> Int[np.ndar
     (b,) int
         Indices of the boundary vertices, ascending.
 
+    Raises
+    ------
+    InvalidParameterError
+        If the mask does not have length n.
+
     Examples
     --------
     >>> import eigenshape as es
@@ -209,7 +214,8 @@ def region_boundary(mesh: MeshLike, mask: Bool[np.ndarray, " n"]) -> Int[np.ndar
     >>> es.deformation.region_boundary(mesh, mesh.vertices[:, 0] < 0.3)
     array([2, 3])
     """
-    faces = as_mesh(mesh).faces
+    mesh = as_mesh(mesh)
+    mask, faces = region_mask(mesh, mask), mesh.faces
     # All corners of a face are neighbors. A table of the edges would take 20 times as long.
     inside = mask[faces]
     outside = ~inside.all(axis=1)

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record, whole_number
+from eigenshape._arrays import ReadOnly, face_labels, record, whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -176,6 +176,11 @@ def adjacent_parts(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> Int[np.ndar
     (p, 2) int
         Pairs of labels without duplicates, the lower label first, in ascending order.
 
+    Raises
+    ------
+    InvalidParameterError
+        If `labels` does not hold one whole number per face.
+
     Examples
     --------
     >>> import numpy as np
@@ -185,8 +190,9 @@ def adjacent_parts(mesh: MeshLike, labels: Int[np.ndarray, " f"]) -> Int[np.ndar
            [1, 2]])
     """
     mesh = as_mesh(mesh)
+    parts = face_labels(labels, "labels", mesh.n_faces)
     faces, _ = face_pairs(edge_table(mesh))
-    pairs = np.sort(labels[faces], axis=1)
+    pairs = np.sort(parts[faces], axis=1)
     return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
 
 

@@ -5,6 +5,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.face_turns import turn_faces
 from eigenshape.geometry.measure import enclosed_volume, mean_normals, scale_to_unit, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
@@ -55,7 +56,7 @@ def orient_outward(mesh: MeshLike) -> TriangleMesh:
     """
     mesh = as_mesh(mesh)
     require_oriented(mesh)
-    return mesh if outward_vote(mesh) >= 0 else TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    return turn_faces(mesh, np.full(mesh.n_faces, outward_vote(mesh) < 0))
 
 
 def outward_vote(mesh: TriangleMesh) -> float:
@@ -78,6 +79,5 @@ def orient_closed_outward(mesh: TriangleMesh) -> TriangleMesh:
 
     Raise InvalidShapeError if two neighboring faces of a closed mesh are turned against each other.
     """
-    if not is_closed(mesh) or enclosed_volume(mesh) >= 0:
-        return mesh
-    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+    inward = is_closed(mesh) and enclosed_volume(mesh) < 0
+    return turn_faces(mesh, np.full(mesh.n_faces, inward))

@@ -1,5 +1,7 @@
 """Compiled loops of `triangulate_polygons`. Points in the plane are complex numbers of size 1."""
 
+import numpy as np
+
 from eigenshape._compile import njit
 
 # Points nearer than this to a line lie on it, up to rounding of their coordinates.
@@ -11,13 +13,16 @@ STEPS = (
 
 
 @njit
-def clip_ears(points, before, after, shapes, triangles):
-    """Cut a polygon into triangles; return whether that is possible.
+def clip_ears(points):
+    """Cut a polygon into triangles; return them, and whether it does not cross itself.
 
     Corners are cut off one by one (ear clipping, Meisters 1975): always that of the best-shaped
-    triangle, and one on a line with its neighbors only where there is no other. `before` and
-    `after` hold the neighbors of each corner. `shapes`, filled with -1, holds those of triangles.
+    triangle, and one on a line with its neighbors only where there is no other.
     """
+    triangles = np.empty((len(points) - 2, 3), np.int64)
+    ring = np.arange(len(points))
+    before, after = np.roll(ring, 1), np.roll(ring, -1)  # neighbors of each corner
+    shapes = np.full(len(points), -1.0)  # of the triangles at corners
     for place in range(len(triangles)):
         best = shapes.argmax()
         if shapes[best] <= 0.0:
@@ -27,13 +32,13 @@ def clip_ears(points, before, after, shapes, triangles):
                     shapes[corner] = _shape(points, before, after, corner)
             best = shapes.argmax()
         if shapes[best] < 0.0:
-            return False
+            return triangles, False
         start, end = before[best], after[best]
         triangles[place, 0], triangles[place, 1], triangles[place, 2] = start, best, end
         after[start], before[end], shapes[best] = end, start, GONE
         shapes[start] = _shape(points, before, after, start)
         shapes[end] = _shape(points, before, after, end)
-    return True
+    return triangles, not _crosses_itself(points)
 
 
 @njit
@@ -66,7 +71,7 @@ def _turn(a, b, c):
 
 
 @njit
-def crosses_itself(points):
+def _crosses_itself(points):
     """Return whether two sides of a polygon cross."""
     for i in range(len(points)):
         for j in range(i):

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.polygon_loops import ROUNDING, clip_ears, crosses_itself
+from eigenshape.geometry.polygon_loops import ROUNDING, clip_ears
 
 # A fan is taken if each of its triangles has more than this share of its longest side squared as
 # area. Corners on a line have 1e-7 in single precision, a regular polygon of 1,000 corners 8e-4.
@@ -27,6 +27,8 @@ def triangulate_polygons(
     Polygons on a line, those with a corner that is not finite or not a point, and those in other
     dimensions than 2 and 3 become fans.
 
+    Raise InvalidShapeError if a polygon crosses itself, or folds back so that it has no area.
+
     Parameters
     ----------
     points : (n, d) float
@@ -42,11 +44,6 @@ def triangulate_polygons(
         Indices of points, polygon by polygon.
     owners : (t,) int
         The polygon of each triangle.
-
-    Raises
-    ------
-    InvalidShapeError
-        If a polygon crosses itself, or folds back so that it has no area.
     """
     triangles, owners, crossed = cut_polygons(points, starts, corners)
     if crossed.size:
@@ -81,31 +78,27 @@ def cut_polygons(
         space[2, :n] = 0.0
         space[:dim, :n] = points.T
     indices = np.where((corners >= 0) & (corners < n), corners, n)
-    crossed = [np.empty(0, dtype=np.int64)]
+    crossed = np.zeros(len(lengths), dtype=bool)
     for length in np.unique(lengths[lengths > 3]).tolist():
         alike = np.flatnonzero(lengths == length)
         for numbers in np.array_split(alike, 1 + alike.size * length // BLOCK):
             rows = starts[numbers] + np.arange(length)[:, None]
             with np.errstate(all="ignore"):
-                spokes = _spokes(np.take(space, indices[rows], axis=1))
+                outlines = np.take(space, indices[rows], axis=1)
+                spokes = outlines - outlines[:, :1]
+                # A power of two changes no digits, so that corners on a line stay there.
+                spokes *= np.ldexp(1.0, -np.frexp(np.abs(spokes).max(axis=(0, 1)))[1])
                 flat = _flatten(spokes)
                 is_left = ~_are_covered(flat) & np.isfinite(flat).all(axis=0)
             for place in np.flatnonzero(is_left).tolist():
-                cut = _cut_outline(flat[:, place].copy())
+                cut, is_simple = clip_ears(flat[:, place].copy())
                 number = numbers[place]
-                if cut is not None:
+                if is_simple:
                     places[first_triangles[number] :][: length - 2] = starts[number] + cut
                 # A polygon on a line, or nearly so, stays a fan.
-                elif np.linalg.matrix_rank(spokes[:, :, place], THINNEST) > 1:
-                    crossed.append(numbers[place : place + 1])
-    return corners[places], owners, np.sort(np.concatenate(crossed))
-
-
-def _spokes(outlines: Float[np.ndarray, "3 c p"]) -> Float[np.ndarray, "3 c p"]:
-    """Return the corners of polygons as seen from the first, of size 1."""
-    spokes = outlines - outlines[:, :1]
-    # A power of two changes no digits, so that corners on a line stay there.
-    return spokes * np.ldexp(1.0, -np.frexp(np.abs(spokes).max(axis=(0, 1)))[1])
+                else:
+                    crossed[number] = np.linalg.matrix_rank(spokes[:, :, place], THINNEST) > 1
+    return corners[places], owners, np.flatnonzero(crossed)
 
 
 def _flatten(spokes: Float[np.ndarray, "3 c p"]) -> Complex[np.ndarray, "c p"]:
@@ -130,12 +123,3 @@ def _are_covered(flat: Complex[np.ndarray, "c p"]) -> Bool[np.ndarray, " p"]:
     sides = np.abs(np.stack([spokes[:-1], spokes[1:], spokes[1:] - spokes[:-1]]))
     are_good = (turns.imag > THINNEST * sides.max(axis=0) ** 2) | (sides.min(axis=0) == 0)
     return are_good.all(axis=0) & (np.angle(turns).sum(axis=0) <= FULL_TURN)
-
-
-def _cut_outline(points: Complex[np.ndarray, " c"]) -> Int[np.ndarray, "t 3"] | None:
-    """Cut a polygon of size 1 in the plane; None if it crosses itself."""
-    ring = np.arange(len(points))
-    triangles = np.empty((len(points) - 2, 3), dtype=np.int64)
-    shapes = np.full(len(points), -1.0)
-    is_cut = clip_ears(points, np.roll(ring, 1), np.roll(ring, -1), shapes, triangles)
-    return triangles if is_cut and not crosses_itself(points) else None

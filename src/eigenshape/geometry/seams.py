@@ -10,7 +10,7 @@ from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.simplices import side_lengths, size_one
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.geometry.topology import number_places, sorted_rows, unreferenced_vertices
+from eigenshape.geometry.topology import number_places, sorted_rows
 
 # How far both sides of a seam are apart when each was computed for itself, in roundings of the size
 # of the mesh: the cosine and sine of 0 and 2π differ by 3.
@@ -54,11 +54,8 @@ def _round_places(mesh: Mesh, used: Int[np.ndarray, " k"]) -> Int[np.ndarray, " 
     if not len(used):
         return place
     points, scale = size_one(mesh.points)
-    tolerance = (
-        _stored_precision(np.delete(mesh.points, unreferenced_vertices(mesh), axis=0)) / scale
-    )
-    _, first = np.unique(place, return_index=True)
-    spots = points[used[first]]
+    tolerance = _stored_precision(mesh.points[np.unique(mesh.simplices)]) / scale
+    spots = points[used[np.unique(place, return_index=True)[1]]]
     lengths = side_lengths(points[mesh.simplices])
     shortest = lengths.min(initial=np.inf, where=lengths > 0)
     tolerance = np.minimum(tolerance, shortest / SIDES_PER_GAP)

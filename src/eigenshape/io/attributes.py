@@ -10,8 +10,9 @@ from scipy.sparse import csr_array, eye_array
 
 from eigenshape._arrays import ReadOnly, record
 from eigenshape._text import html_repr
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.topology import number_places
 from eigenshape.io.opening import SourceFile
 
 SAME_NORMAL = 1000  # steps from 0 to 1; normals that agree to a step are one
@@ -162,11 +163,12 @@ def label_attributes(
     materials = []
     for number, label in enumerate(distinct.tolist()):
         # Vertices at the border of a part may have the color of its neighbor.
-        red, green, blue = np.median(tints[numbers == number].reshape(-1, 3), axis=0) / 255
-        materials.append(Material(f"part_{label}", (float(red), float(green), float(blue), 1.0)))
+        middle = np.median(tints[numbers == number].reshape(-1, 3), axis=0) / 255
+        red, green, blue = middle.tolist()
+        materials.append(Material(f"part_{label}", (red, green, blue, 1.0)))
     return replace(
         attributes,
-        face_materials=numbers.ravel(),
+        face_materials=numbers,
         materials=tuple(materials),
         colors=None,
         source=None,
@@ -183,22 +185,14 @@ def corner_normals(
     """
     if attributes.normals is None:
         return None
-    _, places = np.unique(attributes.mesh.vertices, axis=0, return_inverse=True)
-    steps = np.rint(attributes.normals.reshape(-1, 3) * SAME_NORMAL)
-    keys = np.column_stack([places.ravel()[attributes.mesh.faces.ravel()], steps])
-    _, groups = np.unique(keys, axis=0, return_inverse=True)
-    vectors = np.repeat(area_vectors(mesh.vertices[mesh.faces]), 3, axis=0)
-    sums = [np.bincount(groups.ravel(), weights=column) for column in vectors.T]
-    normals = unit_rows(np.column_stack(sums)[groups.ravel()])
-    # A corner of faces without area keeps its old normal.
     old = attributes.normals.reshape(-1, 3)
+    places = number_places(attributes.mesh.vertices)[attributes.mesh.faces.ravel()]
+    groups = number_places(np.column_stack([places, np.rint(old * SAME_NORMAL)]))
+    vectors = np.repeat(area_vectors(mesh.vertices[mesh.faces]), 3, axis=0)
+    sums = np.column_stack([np.bincount(groups, weights=column) for column in vectors.T])
+    normals = unit_vectors(sums[groups])
+    # A corner of faces without area keeps its old normal.
     return np.where(normals.any(axis=1, keepdims=True), normals, old).reshape(-1, 3, 3)
-
-
-def unit_rows(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """Give vectors the length 1, and leave those of length 0."""
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(lengths > 0, lengths, 1.0)
 
 
 def linear_colors(colors: Float[np.ndarray, "*rows"]) -> Float[np.ndarray, "*rows"]:

@@ -1,24 +1,21 @@
 """Conversion from and to trimesh and PyVista."""
 
+import warnings
 from typing import Any
 
 import numpy as np
 
-from eigenshape._errors import InvalidShapeError
+from eigenshape._errors import FileFormatError, InvalidShapeError
 from eigenshape._extras import import_extra
 from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.io.formats.cells import CellLists
+from eigenshape.io.formats.cells import CellLists, select_cells, split_sentence
+from eigenshape.io.formats.vtk_cells import SIMPLEX_TYPES, sort_cells
 
 EXTRA = "'eigenshape[bridges]'"
-VTK_CELLS = {1: 3, 2: 5, 3: 10}  # VTK's numbers for segment, triangle and tetrahedron
-POINTS, LINES = (
-    (1, 2),
-    (3, 4),
-)  # VTK's numbers of cells for one or several points, and for a segment or polyline
 
 
 def from_trimesh(mesh: Any, *, dim: Integer = 2) -> TriangleMesh | PointCloud:
@@ -106,8 +103,8 @@ def to_trimesh(shape: ShapeLike) -> Any:
 def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
     """Convert a PolyData or UnstructuredGrid of PyVista.
 
-    The simplices of the highest dimension are taken, or the points if there are none. Polylines
-    become segments.
+    The cells of the highest dimension are taken, or the points if there are none. Polylines become
+    segments; polygons and strips become triangles, hexahedra, wedges and pyramids tetrahedra.
 
     Parameters
     ----------
@@ -122,15 +119,20 @@ def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
     Raises
     ------
     InvalidShapeError
-        If the object is neither of these, or has cells that are not simplices.
+        If the object is neither of these, has polyhedra, or a cell cannot be split.
     MissingExtraError
         If PyVista is not installed.
+
+    Warns
+    -----
+    UserWarning
+        If solids were split, or cells with curved sides were read by their corners.
 
     Examples
     --------
     >>> import eigenshape as es
     >>> import pyvista
-    >>> es.io.from_pyvista(pyvista.Plane(i_resolution=2, j_resolution=1).triangulate())
+    >>> es.io.from_pyvista(pyvista.Plane(i_resolution=2, j_resolution=1))
     TriangleMesh(6 vertices, 4 faces)
     """
     pyvista = import_extra("pyvista", EXTRA)
@@ -140,24 +142,19 @@ def from_pyvista(dataset: Any, *, dim: Integer = 2) -> Shape:
         )
     grid = dataset.cast_to_unstructured_grid()
     points = np.asarray(grid.points, dtype=np.float64)
-    kinds = np.asarray(grid.celltypes)
+    kinds = np.asarray(grid.celltypes, dtype=np.int64)
     starts = np.asarray(pyvista.convert_array(grid.GetCells().GetOffsetsArray()), dtype=np.int64)
     lists = CellLists(starts, np.asarray(grid.cell_connectivity, dtype=np.int64))
-    others = np.setdiff1d(kinds, [*POINTS, *LINES, *VTK_CELLS.values()])
-    if others.size:
-        count = np.count_nonzero(kinds == others[0])
-        raise InvalidShapeError(
-            f"Cells must be simplices; {count} are of VTK's type {others[0]}. Triangulate them first."
-        )
-    for dim_of_cells in (3, 2):
-        at = np.flatnonzero(kinds == VTK_CELLS[dim_of_cells])
-        if at.size:
-            cells = lists.rows(at, dim_of_cells + 1)
-            return (
-                TriangleMesh(points, cells) if dim_of_cells == 2 else SimplicialMesh(points, cells)
-            )
-    segments = lists.take(np.flatnonzero(np.isin(kinds, LINES))).pairs()
-    return SimplicialMesh(points, segments) if segments.size else PointCloud(points, dim)
+    try:
+        found = sort_cells(points, lists, kinds)
+    except FileFormatError as err:
+        raise InvalidShapeError(str(err)) from err
+    simplices = select_cells(found.points, found.cells, None)
+    for note in filter(None, [*found.notes, split_sentence(found.cells)]):
+        warnings.warn(note, stacklevel=2)
+    if not len(simplices):
+        return PointCloud(found.points, dim)
+    return (TriangleMesh if simplices.shape[1] == 3 else SimplicialMesh)(found.points, simplices)
 
 
 def to_pyvista(shape: ShapeLike) -> Any:
@@ -201,4 +198,4 @@ def to_pyvista(shape: ShapeLike) -> Any:
         return pyvista.PolyData(points)
     if shape.dim == 2:
         return pyvista.PolyData.from_regular_faces(points, shape.simplices)
-    return pyvista.UnstructuredGrid({VTK_CELLS[shape.dim]: shape.simplices}, points)
+    return pyvista.UnstructuredGrid({SIMPLEX_TYPES[shape.dim + 1]: shape.simplices}, points)

@@ -4,16 +4,17 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.sparse import csr_array
 
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.distances.closest_loops import nearest_around
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
-from eigenshape.io.attributes import MeshAttributes, unit_rows
+from eigenshape.geometry.topology import disjoint_union, number_places, sorted_rows
+from eigenshape.io.attributes import MeshAttributes
 
 # Faces are searched this many times as far from the middle of a new face as its corners are.
 REACH = 1.5
@@ -62,36 +63,32 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
     old = attributes.mesh
     if np.array_equal(old.faces, mesh.faces) and np.array_equal(old.vertices, mesh.vertices):
         return attributes
-    # The numbers of the places where the corners of all faces lie, the old faces first. Adding 0.0
-    # makes -0.0 equal to 0.0.
-    both = np.concatenate([old.vertices, mesh.vertices]) + 0.0
-    numbers = np.unique(both, axis=0, return_inverse=True)[1].ravel()
-    places = numbers[np.concatenate([old.faces, mesh.faces + old.n_vertices])]
-    starts, is_old = _nearest_faces(old, mesh, places)
+    # The numbers of the places where the corners of all faces lie, the old faces first
+    both = disjoint_union(old, mesh)
+    places = number_places(both.vertices)[both.faces]
+    starts, left = _nearest_faces(old, mesh, places)
     # A face at the places of an old one has its very values; corners of others lie on old faces.
     faces, weights = np.column_stack([starts] * 3), np.zeros((mesh.n_faces, 3, 3))
     old_order = np.argsort(places[: old.n_faces][starts], axis=1, kind="stable")
     order = np.argsort(places[old.n_faces :], axis=1, kind="stable")
     weights[np.arange(mesh.n_faces)[:, None], order, old_order] = 1.0
-    left = np.flatnonzero(~is_old)
     if left.size:
         new_corners = mesh.vertices[mesh.faces[left]]
         neighbors = _neighbors(attributes, places[: old.n_faces])
         faces[left], weights[left] = _corner_places(old, new_corners, starts[left], neighbors)
     columns = (3 * faces[:, :, None] + np.arange(3)).ravel()
     rows = np.repeat(np.arange(3 * mesh.n_faces), 3)
-    shape = (3 * mesh.n_faces, 3 * old.n_faces)
-    matrix = csr_array((weights.ravel(), (rows, columns)), shape=shape)
+    entries = (weights.ravel(), (rows, columns))
+    matrix = csr_array(entries, shape=(3 * mesh.n_faces, 3 * old.n_faces))
     matrix.eliminate_zeros()
-    carried: dict[str, Any] = {
-        name: interpolate(matrix, values.reshape(-1, values.shape[2])).reshape(
-            -1, 3, values.shape[2]
-        )
-        for name in ("texture_coordinates", "normals", "colors")
-        if (values := getattr(attributes, name)) is not None
-    }
-    if "normals" in carried and matrix.nnz > len(rows) // 3:
-        carried["normals"] = unit_rows(carried["normals"].reshape(-1, 3)).reshape(-1, 3, 3)
+    carried: dict[str, Any] = {}
+    for name in ("texture_coordinates", "normals", "colors"):
+        values = getattr(attributes, name)
+        if values is not None:
+            table = interpolate(matrix, values.reshape(-1, values.shape[2]))
+            if name == "normals" and matrix.nnz > len(table):  # some are means
+                table = unit_vectors(table)
+            carried[name] = table.reshape(-1, 3, values.shape[2])
     fields = {}
     for name, values in attributes.fields.items():
         if len(values) != old.n_vertices:
@@ -118,17 +115,16 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
 def interpolate(corners: csr_array, values: np.ndarray, *, blend: bool = True) -> np.ndarray:
     """Return values at new corners in the type of the old; without blending, those of most weight."""
     if not blend:
-        ends = corners.indptr[1:]
-        order = np.lexsort([corners.data, np.repeat(np.arange(len(ends)), np.diff(corners.indptr))])
-        return values[corners.indices[order[ends - 1]]]
+        order = np.lexsort([corners.data, corners.tocoo().row])
+        return values[corners.indices[order[corners.indptr[1:] - 1]]]
     found = corners @ values.astype(np.float64)
     return (np.rint(found) if values.dtype.kind in "iu" else found).astype(values.dtype)
 
 
 def _nearest_faces(
     old: TriangleMesh, new: TriangleMesh, places: Int[np.ndarray, "g 3"]
-) -> tuple[Int[np.ndarray, " f"], Bool[np.ndarray, " f"]]:
-    """Return the old face at the places of each new one, or the nearest, and whether it is there.
+) -> tuple[Int[np.ndarray, " f"], Int[np.ndarray, " k"]]:
+    """Return the old face at the places of each new one, and the new ones that have only the nearest.
 
     On a sheet of two sides it is the right side.
     """
@@ -138,29 +134,23 @@ def _nearest_faces(
     turned = np.argsort(places, axis=1, kind="stable")
     sides = 2 * keys + np.isin(turned @ [9, 3, 1], [5, 15, 19])  # 012, 120 and 201 in base 3
     # Of several faces at one place, such as a label on a wall, the first new one is the first old one.
+    old_sides, new_sides = sides[:n_old], sides[n_old:]
     olds = np.full((sides.max() + 2, MOST_COPIES), -1)
-    old_ranks, ranks = _ranks(sides[:n_old]), _ranks(sides[n_old:])
-    olds[sides[:n_old][::-1], old_ranks[::-1]] = np.arange(n_old)[::-1]
+    olds[old_sides[::-1], _ranks(old_sides)[::-1]] = np.arange(n_old)[::-1]
     first = olds[:, 0]
-    same, other = first[sides[n_old:]], first[sides[n_old:] ^ 1]
-    found = np.where(same >= 0, same, other)
-    copies = olds[sides[n_old:], ranks]
-    found = np.where(copies >= 0, copies, found)
-    is_old = found >= 0
-    left = np.flatnonzero(~is_old)
+    found = first[new_sides ^ 1]
+    for same in (first[new_sides], olds[new_sides, _ranks(new_sides)]):
+        found = np.where(same >= 0, same, found)
+    left = np.flatnonzero(found < 0)
     if left.size:
-        middles = new.vertices[new.faces[left]].mean(axis=1)
-        nearest = closest_points(old, middles).simplices
-        twins = first[sides[nearest] ^ 1]
-        normals, old_normals = (
-            area_vectors(points)
-            for points in (new.vertices[new.faces[left]], old.vertices[old.faces[nearest]])
-        )
-        away = (np.einsum("fi,fi->f", unit_rows(normals), unit_rows(old_normals)) < 0) & (
-            twins >= 0
-        )
-        found[left] = np.where(away, twins, nearest)
-    return found, is_old
+        corners = new.vertices[new.faces[left]]
+        nearest = closest_points(old, corners.mean(axis=1)).simplices
+        twins = first[old_sides[nearest] ^ 1]
+        normals = unit_vectors(area_vectors(corners))
+        old_normals = unit_vectors(area_vectors(old.vertices[old.faces[nearest]]))
+        looks_away = np.einsum("fi,fi->f", normals, old_normals) < 0
+        found[left] = np.where(looks_away & (twins >= 0), twins, nearest)
+    return found, left
 
 
 def _ranks(sides: Int[np.ndarray, " g"]) -> Int[np.ndarray, " g"]:
@@ -181,11 +171,11 @@ def _corner_places(
     middle = old.vertices.mean(axis=0)
     corners, scale = size_one(old.vertices[old.faces] - middle)
     wanted = (new_corners - middle) / scale
-    middles = wanted.mean(axis=1)
-    radii = np.linalg.norm(wanted - middles[:, None], axis=2).max(axis=1)
-    gaps = np.linalg.norm(corners[starts].mean(axis=1) - middles, axis=1)
+    middles = wanted.mean(axis=1, keepdims=True)
+    radii = np.linalg.norm(wanted - middles, axis=2).max(axis=1)
+    gaps = np.linalg.norm(corners[starts].mean(axis=1) - middles[:, 0], axis=1)
     found: tuple[np.ndarray, np.ndarray] = nearest_around(
-        wanted, middles, starts, (REACH * np.maximum(radii, gaps)) ** 2, corners, neighbors
+        wanted, middles[:, 0], starts, (REACH * np.maximum(radii, gaps)) ** 2, corners, neighbors
     )
     return found
 
@@ -201,15 +191,15 @@ def _neighbors(
     ends = np.sort(np.column_stack([at, at[ahead]]), axis=1)
     kinds = [attributes.face_parts, attributes.face_materials, attributes.face_groups]
     keys = np.column_stack([*(np.repeat(kind, 3) for kind in kinds), ends])
-    order = np.lexsort(keys.T)
-    begins = np.flatnonzero(np.r_[True, (np.diff(keys[order], axis=0) != 0).any(axis=1)])
+    order, _, repeats = sorted_rows(keys)
+    begins = np.flatnonzero(~repeats)
     following = np.arange(1, count + 1)
     following[np.r_[begins[1:], count] - 1] = begins  # the last face at an edge meets the first
     across = np.empty(count, dtype=np.int64)
     across[order] = order[following]
     turned = at[across] != at[here]
     one, two = np.where(turned, ahead[across], across), np.where(turned, across, ahead[across])
-    is_smooth: Bool[np.ndarray, " e"] = np.ones(count, dtype=bool)
+    is_smooth = np.ones(count, dtype=bool)
     for name, step in SEAMS.items():
         values = getattr(attributes, name)
         if values is not None:

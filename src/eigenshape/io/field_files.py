@@ -133,13 +133,13 @@ def format_fields(
     named = {"structure": structure} if suffix.endswith(".gii") else {}
     if "fields" in known.traits:
         data: bytes = known.load().format_fields(mesh, of_vertices, of_faces, **named)
-        return data
-    if of_faces:
+    elif of_faces:
         raise FileFormatError(
             f"Files in {suffix} hold functions on vertices; {next(iter(of_faces))!r} is on faces."
         )
-    maps: bytes = known.load().format_maps(mesh, of_vertices, suffix, **named)
-    return maps
+    else:
+        data = known.load().format_maps(mesh, of_vertices, suffix, **named)
+    return data
 
 
 def read_fields(path: str | Path) -> Fields:

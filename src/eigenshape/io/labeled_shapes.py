@@ -9,16 +9,15 @@ from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import as_path, read_regular, replace_file
-from eigenshape.io.formats.numbers import INT64, Line, lines_of, quote_line, whole, whole_table
+from eigenshape.io.formats.numbers import INT64, lines_of, whole, whole_table
 from eigenshape.io.formats.ply import parse_labels
 from eigenshape.io.formats.registry import MESH_FORMATS
 from eigenshape.io.mesh_files import read_mesh
+from eigenshape.io.opening import naming
 from eigenshape.retrieval.labels.labeled_shape import LabeledShape
 
 LABEL_SUFFIXES = (".seg", ".txt", ".json")  # of files of labels, in the order of search
 KEY = "face_labels"
-LABEL = ("A label", "the label of one face")
-VERTEX = ("A vertex", "the number of one vertex")
 NAMES_FILE = "names.txt"  # in a folder of labeled shapes: the name of label k in line k + 1
 
 
@@ -27,15 +26,15 @@ def find_labels(path: Path) -> Path:
 
     Raise FileFormatError if there is no such file.
     """
-    for suffix in LABEL_SUFFIXES:
-        beside = path.with_suffix(suffix)
+    files = [path.with_suffix(suffix) for suffix in LABEL_SUFFIXES]
+    for beside in files:
         if beside.exists():
             return beside
     if path.suffix.lower() == ".ply":
         return path
-    beside_names = ", ".join(path.with_suffix(suffix).name for suffix in LABEL_SUFFIXES)
+    names = ", ".join(beside.name for beside in files)
     raise FileFormatError(
-        f"{path} must have labels beside it, in one of the files {beside_names}; there is none. "
+        f"{path} must have labels beside it, in one of the files {names}; there is none. "
         "Write one label a line, as `eigenshape segment -o` does."
     )
 
@@ -179,14 +178,11 @@ def read_labels(path: Path) -> Int[np.ndarray, " f"]:
     Raise FileFormatError if a line or an entry is not a whole number, or if there is no such list,
     and OSError if the system cannot open the file.
     """
-    data = read_regular(path, "labels")
-    try:
-        suffix = path.suffix.lower()
+    data, suffix = read_regular(path, "labels"), path.suffix.lower()
+    with naming(path):
         if suffix == ".ply":
             return parse_labels(data)
-        return _from_json(data) if suffix == ".json" else _from_lines(lines_of(data), LABEL)
-    except FileFormatError as err:
-        raise type(err)(f"{path}: {err}") from err
+        return _from_json(data) if suffix == ".json" else _from_lines(data, "A label")
 
 
 def read_map(path: Path) -> Int[np.ndarray, " n"]:
@@ -196,10 +192,8 @@ def read_map(path: Path) -> Int[np.ndarray, " n"]:
     file.
     """
     data = read_regular(path, "vertices that correspond")
-    try:
-        return _from_lines(lines_of(data), VERTEX)
-    except FileFormatError as err:
-        raise type(err)(f"{path}: {err}") from err
+    with naming(path):
+        return _from_lines(data, "A vertex")
 
 
 def write_labels(labels: Int[np.ndarray, " f"], path: Path) -> None:
@@ -207,16 +201,12 @@ def write_labels(labels: Int[np.ndarray, " f"], path: Path) -> None:
     replace_file(path, "".join(f"{label}\n" for label in labels.tolist()).encode())
 
 
-def _from_lines(lines: list[Line], words: tuple[str, str]) -> Int[np.ndarray, " f"]:
+def _from_lines(data: bytes, what: str) -> Int[np.ndarray, " f"]:
+    lines = lines_of(data)
     table = whole_table(lines)
     if table is not None and table.shape[1] == 1:
         return table[:, 0]
-    several = next((line for line in lines if len(line[1].split()) > 1), None)
-    if several:
-        raise FileFormatError(
-            f"A line must hold {words[1]}; line {several[0]} is {quote_line(several)}."
-        )
-    return np.array([whole(line[1], line, words[0]) for line in lines], dtype=np.int64)
+    return np.array([whole(line[1], line, what) for line in lines], dtype=np.int64)
 
 
 def _from_json(data: bytes) -> Int[np.ndarray, " f"]:

@@ -37,6 +37,10 @@ from eigenshape.io.formats.rounding import loss_in_single
 from eigenshape.io.opening import SourceFile, naming, open_file
 
 KINDS = {2: SEGMENTS, 3: "triangles"}  # of cells, by their number of corners
+REPLACED = {
+    "vertex colors": "vertex colors, since each part has a color of its own",
+    "materials": "materials and images, since each part has a material of its own",
+}
 
 
 @overload
@@ -138,13 +142,11 @@ def read_mesh(
     with naming(source.path):
         points, simplices = parse_file(source, cells)
         require_surface(points, simplices)
-        kept, faces, _, left_out = require_finite(points, simplices, drop_missing=drop_missing)
+        kept, faces, *_ = require_finite(points, simplices, drop_missing=drop_missing)
         mesh = TriangleMesh(kept, faces)
         if not attributes:
             return mesh
         try:
-            if not left_out:
-                return mesh, _read_attributes(source, mesh)
             # Attributes are listed by the faces of the file, so they are read with all of them.
             whole = TriangleMesh(np.where(np.isfinite(points), points, 0.0), simplices)
             return mesh, carry_attributes(_read_attributes(source, whole), mesh)
@@ -205,7 +207,7 @@ def require_finite(
     face is without one.
     """
     is_surface = len(simplices) > 0 and simplices.shape[1] == points.shape[1] == 3
-    noun = "vertex" if is_surface else "point"
+    noun, cell = ("vertex", "face") if is_surface else ("point", "cell")
     missing = np.flatnonzero(~np.isfinite(points).all(axis=1))
     stays = ~np.isin(simplices, missing).any(axis=1)
     nothing_stays = len(simplices) > 0 and not stays.any()
@@ -221,14 +223,13 @@ def require_finite(
             f"{PLURALS.get(noun, 'points')} must be finite; {noun} {first} is {points[first].tolist()} "
             f"({missing.size} such). {remedy}"
         )
-    kept = np.delete(np.arange(len(points)), missing)
     if not missing.size:
-        return points, simplices, kept, ()
+        return points, simplices, np.arange(len(points)), ()
+    kept = np.delete(np.arange(len(points)), missing)
     # An index is lower by the number of missing points before it.
     renumbered = simplices[stays] - np.searchsorted(missing, simplices[stays])
     sentence = f"drop_missing left out {count_nouns(missing.size, noun)} without finite coordinates"
     if len(simplices):
-        cell = "face" if is_surface else "cell"
         sentence += f" and {count_nouns(int((~stays).sum()), cell)} at them"
     return points[kept], renumbered, kept, (sentence,)
 
@@ -252,7 +253,7 @@ def require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
         )
     n_corners, dim = simplices.shape[1], points.shape[1]
     if (n_corners, dim) != (3, 3):
-        what = {2: "segments", 3: "triangles", 4: "tetrahedra"}[n_corners]
+        what = KINDS.get(n_corners, "tetrahedra")
         remedies = {
             4: ' cells="triangles" reads the triangles beside them, if there are any.',
             3: " es.io.read_surface, or eigenshape repair, takes them at z = 0.",
@@ -364,17 +365,16 @@ def save_mesh(
             f"binary={binary} is for {', '.join(kinds)}; the suffix is {suffix}."
         )
     if colors is not None:
-        _require_colors(colors, mesh, suffix)
+        _require_array(colors, "colors", f"({mesh.n_vertices}, 3) uint8", suffix)
     if face_labels is not None:
         _require_labels(face_labels, mesh, suffix)
     lost: list[str] = []
-    has_part_materials = face_labels is not None and "labels" not in known.traits
-    if has_part_materials or (face_labels is not None and colors is not None):
-        lost += _replaced_by_parts(held, has_part_materials)
-    if face_labels is not None and has_part_materials:
+    if face_labels is not None and "labels" not in known.traits:
+        lost += _replaced_by_parts(held, "vertex colors", "materials")
         gray = np.full((mesh.n_vertices, 3), 200, np.uint8)
         held = label_attributes(held, face_labels, gray if colors is None else colors)
     elif colors is not None:
+        lost += [] if face_labels is None else _replaced_by_parts(held, "vertex colors")
         opaque = np.column_stack([colors, np.full(len(colors), 255, np.uint8)])
         held = replace(held, colors=opaque[mesh.faces], source=None)
     job = WriteJob(mesh, path, suffix, is_binary, held, face_labels, lost)
@@ -388,44 +388,31 @@ def save_mesh(
             job.lose(held.contents)
             module = known.load()
             files = {path: (module.format_binary if is_binary else module.format_text)(mesh)}
+        lost += loss_in_single(mesh) if is_binary and "single" in known.traits else []
     except FileFormatError as err:
         raise FileFormatError(f"{path} cannot hold the mesh. {err}") from err
-    lost += loss_in_single(mesh) if is_binary and "single" in known.traits else []
     for place, data in files.items():
         replace_file(place, data)
     return f"{path.name} does not keep: {', '.join(dict.fromkeys(lost))}." if lost else ""
 
 
-def _replaced_by_parts(held: MeshAttributes, has_part_materials: bool) -> list[str]:
+def _replaced_by_parts(held: MeshAttributes, *kinds: str) -> list[str]:
     """Name the looks of a file that those of parts take the place of."""
-    replaced = []
-    if held.contents["vertex colors"]:
-        replaced.append("vertex colors, since each part has a color of its own")
-    if has_part_materials and held.contents["materials"]:
-        replaced.append("materials and images, since each part has a material of its own")
-    return replaced
+    return [REPLACED[kind] for kind in kinds if held.contents[kind]]
 
 
-def _require_colors(colors: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
-    require_type(colors, np.ndarray, "colors")
-    if (
-        suffix not in WITH_COLORS
-        or colors.dtype != np.uint8
-        or colors.shape != (mesh.n_vertices, 3)
-    ):
+def _require_array(values: np.ndarray, name: str, wanted: str, suffix: str) -> None:
+    """Raise an error if values are not of the wanted shape and type, or the format does not take them."""
+    require_type(values, np.ndarray, name)
+    found = f"{values.shape} {values.dtype}"
+    if suffix not in WITH_COLORS or not found.startswith(wanted):
         raise InvalidParameterError(
-            f"colors must be ({mesh.n_vertices}, 3) uint8 and go to {', '.join(WITH_COLORS)}; they are {colors.shape} "
-            f"{colors.dtype} and go to {suffix}."
+            f"{name} must be {wanted} and go to {', '.join(WITH_COLORS)}; they are {found} and go to {suffix}."
         )
 
 
 def _require_labels(labels: np.ndarray, mesh: TriangleMesh, suffix: str) -> None:
-    require_type(labels, np.ndarray, "face_labels")
-    if suffix not in WITH_COLORS or labels.shape != (mesh.n_faces,):
-        raise InvalidParameterError(
-            f"face_labels must be ({mesh.n_faces},) and go to {', '.join(WITH_COLORS)}; they are {labels.shape} and "
-            f"go to {suffix}."
-        )
+    _require_array(labels, "face_labels", f"({mesh.n_faces},)", suffix)
     beyond = np.flatnonzero(labels != labels.astype(np.int32))
     if beyond.size:
         raise InvalidParameterError(

@@ -15,7 +15,13 @@ from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidSh
 from eigenshape._files import as_path, read_regular
 from eigenshape._typing import BinaryFile, FileLike
 from eigenshape.io.formats.first_bytes import recognize, require_content
-from eigenshape.io.formats.numbers import ALWAYS, MOST_TIMES, quote_line, require_reasonable
+from eigenshape.io.formats.numbers import (
+    ALWAYS,
+    MOST_TIMES,
+    VOLUME_SIZE,
+    quote_line,
+    require_reasonable,
+)
 from eigenshape.io.formats.registry import format_of, suffix_in, suffix_of
 
 NOWHERE = Path(os.devnull, "nowhere")  # a folder that cannot exist
@@ -63,7 +69,7 @@ def open_file(
     """
     if isinstance(path, bytes | BinaryFile):
         name, data = _read_open(path)
-        data = unpack_gzip(data) if data.startswith(GZIP) else data
+        data = unpack_gzip(data)
         place, folder = Path(name or "the bytes"), NOWHERE
         if file_format is None and not suffix_in(name):
             file_format = _format_of_bytes(data)
@@ -74,9 +80,8 @@ def open_file(
         suffix = suffix_of(place, file_format, known)
         data = read_regular(place)
     with naming(place):
-        # Volumes are unpacked by their readers, which know how large they are.
-        if data.startswith(GZIP) and "volume" not in format_of(suffix).traits:
-            data = unpack_gzip(data)
+        is_volume = "volume" in format_of(suffix).traits
+        data = unpack_gzip(data, VOLUME_SIZE if is_volume else ALWAYS)
         # MNI objects have the suffix of Wavefront files.
         found = recognize(data)
         if suffix == ".obj" and found and found.suffix == ".mniobj":
@@ -96,25 +101,27 @@ def _format_of_bytes(data: bytes) -> str:
     return found.suffix
 
 
-def unpack_gzip(data: bytes) -> bytes:
-    """Unpack what gzip packed, in one or several members.
+def unpack_gzip(data: bytes, always: int = ALWAYS) -> bytes:
+    """Unpack what gzip packed, in one or several members; other data stay as they are.
 
     Raise FileFormatError if the data are damaged, or no real file unpacks to so much.
     """
-    most = ALWAYS + MOST_TIMES * len(data)
-    pieces: list[bytes] = []
+    if not data.startswith(GZIP):
+        return data
+    most = always + MOST_TIMES * len(data)
+    unpacked = bytearray()
     left = data
     try:
         while left:
             unpacker = zlib.decompressobj(wbits=31)
-            pieces.append(unpacker.decompress(left, most + 1 - sum(map(len, pieces))))
-            require_reasonable(sum(map(len, pieces)), len(data))
+            unpacked += unpacker.decompress(left, most + 1 - len(unpacked))
+            require_reasonable(len(unpacked), len(data), always)
             if not unpacker.eof:
                 raise FileFormatError("A packed file must be whole; it ends too early.")
             left = unpacker.unused_data.lstrip(b"\0")
     except zlib.error as err:
         raise FileFormatError(f"A packed file must be whole; it is damaged: {err}.") from err
-    return b"".join(pieces)
+    return bytes(unpacked)
 
 
 def _read_open(file: bytes | BinaryFile) -> tuple[str, bytes]:

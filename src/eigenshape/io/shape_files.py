@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from eigenshape._arguments import require_type
-from eigenshape._errors import FileFormatError, InvalidShapeError
+from eigenshape._errors import InvalidShapeError
 from eigenshape._files import as_path, replace_file
 from eigenshape._typing import FileLike, Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
@@ -13,7 +13,13 @@ from eigenshape.geometry.repairs.repair import repair
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.io.formats.cells import require_kind
-from eigenshape.io.formats.registry import SHAPE_FORMATS, WRITTEN_CLOUDS, CellKind, format_of
+from eigenshape.io.formats.registry import (
+    SHAPE_FORMATS,
+    WRITTEN_CLOUDS,
+    CellKind,
+    format_of,
+    written_suffix,
+)
 from eigenshape.io.mesh_files import parse_file, require_finite
 from eigenshape.io.opening import naming, open_file
 
@@ -210,11 +216,7 @@ def write_points(cloud: PointCloud, path: str | Path) -> None:
     """
     require_type(cloud, PointCloud, "cloud")
     path = as_path(path)
-    suffix = path.suffix.lower()
-    if suffix not in WRITTEN_CLOUDS:
-        raise FileFormatError(
-            f"{path} must end in {', '.join(WRITTEN_CLOUDS)} to hold points; it ends in {path.suffix!r}."
-        )
+    suffix = written_suffix(path, WRITTEN_CLOUDS)
     if cloud.points.shape[1] != 3:
         raise InvalidShapeError(
             f"Files of points hold three coordinates; these points have {cloud.points.shape[1]}."

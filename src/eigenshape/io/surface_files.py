@@ -96,8 +96,11 @@ def read_surface(
 
 def _surface_of(source: SourceFile) -> RepairedMesh[TriangleMesh]:
     points, simplices = parse_file(source, None)
+    n_rows = pcd.n_rows(source.data) if source.suffix == ".pcd" else 1
+    if n_rows > 1:
+        return triangulate_frame(points.reshape(n_rows, -1, 3))
+    points, simplices, kept, report = require_finite(points, simplices, drop_missing=True)
     if len(simplices):
-        points, simplices, kept, report = require_finite(points, simplices, drop_missing=True)
         if simplices.shape[1] == 4:
             solid = SimplicialMesh(points, simplices)
             surface = boundary_surface(solid)
@@ -108,17 +111,11 @@ def _surface_of(source: SourceFile) -> RepairedMesh[TriangleMesh]:
             return RepairedMesh(surface, (*report, taken), kept[boundary_vertices(solid)])
         if simplices.shape[1] == 3 and points.shape[1] == 2:
             points = np.column_stack([points, np.zeros(len(points))])
-            report = (*report, "a mesh in the plane was taken at z = 0")
+            report += ("a mesh in the plane was taken at z = 0",)
         require_surface(points, simplices)
         return RepairedMesh(TriangleMesh(points, simplices), report, kept)
-    n_rows = pcd.n_rows(source.data) if source.suffix == ".pcd" else 1
-    if n_rows > 1:
-        return triangulate_frame(points.reshape(n_rows, -1, 3))
-    points, _, finite, lost = require_finite(
-        points, np.empty((0, 3), dtype=np.int64), drop_missing=True
-    )
     cloud = PointCloud(points)
     different = apply_repairs(cloud, suggest_repairs(cloud))
     made = reconstruct_surface(different.cloud)
-    sources = finite[different.source_points[made.source_vertices]]
-    return RepairedMesh(made.mesh, (*lost, *different.report, *made.report), sources)
+    sources = kept[different.source_points[made.source_vertices]]
+    return RepairedMesh(made.mesh, (*report, *different.report, *made.report), sources)

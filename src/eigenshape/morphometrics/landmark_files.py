@@ -3,8 +3,9 @@
 import csv
 import io
 import json
+import re
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +15,18 @@ from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import as_path, read_regular, replace_file
 from eigenshape.morphometrics.landmark_parsers import (
-    PLANAR,
     Parsed,
     Table,
     as_number,
-    by_name,
     filled_lines,
-    is_semilandmark,
-    numbered,
     one_specimen,
     parse_amira,
     parse_landmark_editor,
     parse_nts,
     parse_picked_points,
     points_of,
+    sections_of,
+    unlabeled,
 )
 from eigenshape.morphometrics.landmarks import Landmarks, require_name, require_same_names
 from eigenshape.morphometrics.tps_files import parse_tps
@@ -140,9 +139,8 @@ def read_specimens(path: str | Path, *, unit: str = UNIT) -> dict[str, Landmarks
     Warns
     -----
     UserWarning
-        If points were converted to another unit or read with z = 0, labels got numbers, points are
-        semilandmarks by their description, outlines or radii are not read, or the last line has no
-        end.
+        If points were converted to another unit or read with z = 0, labels got numbers, outlines or
+        radii are not read, or the last line has no end.
 
     Raises
     ------
@@ -185,23 +183,24 @@ def read_folder(folder: Path, unit: str = UNIT, without: Path | None = None) -> 
     """
     found: Table = {}
     for path in sorted(folder.rglob("*")):
-        suffix = next((each for each in IN_FOLDERS if path.name.lower().endswith(each.lower())), "")
-        is_output = without is not None and without.absolute() in path.absolute().parents
+        is_output = without and without.absolute() in path.absolute().parents
+        if is_output or not path.name.lower().endswith(IN_FOLDERS) or not path.is_file():
+            continue
+        suffix = _suffix(path, PARSERS)
         # The same suffix is that of point clouds.
-        is_cloud = suffix == ".pts" and path.read_bytes()[:7] != b"Version"
-        if not suffix or is_output or is_cloud or not path.is_file():
+        if suffix == ".pts" and not path.read_bytes().startswith(b"Version"):
             continue
         specimens = _read_file(path, unit, stacklevel=4)
         if len(specimens) == 1:
             name = path.relative_to(folder).as_posix()[: -len(suffix)]
             specimens = {name: next(iter(specimens.values()))}
-        for name, landmarks in specimens.items():
-            if name in found:
-                raise InvalidParameterError(
-                    f"A specimen must have one file of landmarks; {name!r} has two in {folder}. "
-                    "Move one of them elsewhere."
-                )
-            found[name] = landmarks
+        twice = found.keys() & specimens.keys()
+        if twice:
+            raise InvalidParameterError(
+                f"A specimen must have one file of landmarks; {min(twice)!r} has two in {folder}. "
+                "Move one of them elsewhere."
+            )
+        found |= specimens
     if found:
         require_same_names(found)
     return found
@@ -214,27 +213,26 @@ def _read_file(path: Path, unit: str, stacklevel: int) -> Table:
     data = read_regular(path, "landmarks")
     try:
         text = data.decode("utf-8-sig")
-        specimens, notes, named = PARSERS[suffix](text, path.name[: -len(suffix)])
+        specimens, notes, units = PARSERS[suffix](text, path.name[: -len(suffix)])
         require_same_names(specimens)
-        own = wanted if named is None else nanometers(named)
-    except (ValueError, csv.Error) as err:
+        named = next(iter(units), unit)
+        ratio = nanometers(named) / wanted
+    except (ValueError, csv.Error, SyntaxError) as err:  # the last one of XML
         raise FileFormatError(f"{path} must hold landmarks: {err}") from err
     # JSON, or sections of Morphologika, of another structure fail in any of these ways.
     except (LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as err:
         raise FileFormatError(
             f"{path} must hold landmarks: its structure differs, {err!r}"
         ) from err
-    if own != wanted:
+    notes = list(notes)
+    if ratio != 1:
         specimens = {
-            name: Landmarks(each.names, each.points * (own / wanted), curves=each.curves)
+            name: Landmarks(each.names, each.points * ratio, curves=each.curves)
             for name, each in specimens.items()
         }
-        notes = (*notes, f"its points are in {named} and were converted to {unit}")
-    if suffix in OPEN_ENDED and not text.endswith("\n"):
-        notes = (
-            *notes,
-            "its last line has no line break; if the file was cut off, that line is short",
-        )
+        notes.append(f"its points are in {named} and were converted to {unit}")
+    if suffix not in ENDED and not text.endswith("\n"):
+        notes.append("its last line has no line break; if the file was cut off, that line is short")
     for note in notes:
         warnings.warn(f"{path}: {note}", stacklevel=stacklevel)
     return specimens
@@ -311,20 +309,19 @@ def write_landmarks(landmarks: Landmarks | Mapping[str, Landmarks], path: str | 
 
 def _suffix(path: Path, formats: Mapping[str, object]) -> str:
     """Return the end of a name that is a format; raise an error if none is."""
-    suffix = next((each for each in formats if path.name.lower().endswith(each.lower())), None)
-    if suffix is None:
-        verb = "written" if formats is WRITERS else "read"
-        raise FileFormatError(
-            f"Files of landmarks that are {verb} end in {', '.join(formats)}; it is {path}."
-        )
-    return suffix
+    for suffix in formats:
+        if path.name.lower().endswith(suffix):
+            return suffix
+    verb = "written" if formats is WRITERS else "read"
+    raise FileFormatError(
+        f"Files of landmarks that are {verb} end in {', '.join(formats)}; it is {path}."
+    )
 
 
-def _texts(landmarks: Landmarks) -> list[list[str]]:
-    """Return the three numbers of each point, with all their digits."""
+def _texts(numbers: np.ndarray) -> list[list[str]]:
+    """Return rows of numbers with all their digits."""
     return [
-        ["NA" if np.isnan(number) else repr(number) for number in point]
-        for point in landmarks.points.tolist()
+        ["NA" if np.isnan(number) else repr(number) for number in row] for row in numbers.tolist()
     ]
 
 
@@ -333,8 +330,7 @@ def _parse_markups(text: str, stem: str) -> Parsed:
     labels: list[str] = []
     places: list[tuple[float, ...]] = []
     curves = []
-    units: set[str] = set()
-    n_semilandmarks = 0
+    units = set()
     for markup in json.loads(text)["markups"]:
         is_curve = markup.get("type") in ("Curve", "ClosedCurve")
         signs = _signs(markup.get("coordinateSystem", "LPS"))
@@ -346,7 +342,7 @@ def _parse_markups(text: str, stem: str) -> Parsed:
             if point.get("positionStatus", "defined") == "defined":
                 if len(point["position"]) != 3:
                     raise FileFormatError(
-                        f"a point must have three numbers; {label!r} is {point['position']}."
+                        f"a point must have 3 numbers; {label!r} is {point['position']}."
                     )
                 pairs = zip(signs, point["position"], strict=True)
                 place = tuple(sign * float(x) for sign, x in pairs)
@@ -355,7 +351,6 @@ def _parse_markups(text: str, stem: str) -> Parsed:
                 rows[label, place] = len(labels)
                 labels.append(label)
                 places.append(place)
-                n_semilandmarks += not is_curve and is_semilandmark(point.get("description", ""))
             members.append(rows[label, place])
         if is_curve:
             curves.append(members + members[:1] * (markup["type"] == "ClosedCurve"))
@@ -364,8 +359,7 @@ def _parse_markups(text: str, stem: str) -> Parsed:
             f"all lists must be in one unit; they are in {' and '.join(sorted(units))}. Write one file "
             "for each."
         )
-    points = np.reshape(places, (-1, 3))
-    return one_specimen(stem, labels, points, curves, n_semilandmarks, *units)
+    return one_specimen(stem, labels, np.reshape(places, (-1, 3)), curves, units)
 
 
 def _unit_of(entry: Any) -> str:
@@ -377,12 +371,12 @@ def _unit_of(entry: Any) -> str:
 
 def _format_markups(specimens: Table) -> str:
     (landmarks,) = specimens.values()
-    points = []
-    for name, place in zip(landmarks.names, landmarks.points.tolist(), strict=True):
-        is_missing = place[0] != place[0]  # NaN
-        status = "undefined" if is_missing else "defined"
-        position = [0.0] * 3 if is_missing else place
-        points.append({"label": name, "position": position, "positionStatus": status})
+    places = np.nan_to_num(landmarks.points).tolist()
+    statuses = np.where(np.isnan(landmarks.points[:, 0]), "undefined", "defined").tolist()
+    points = [
+        {"label": name, "position": places[row], "positionStatus": statuses[row]}
+        for row, name in enumerate(landmarks.names)
+    ]
     lists = [("Fiducial", points)]
     for curve in landmarks.curves:
         is_closed = len(curve) > 2 and curve[0] == curve[-1]
@@ -403,35 +397,29 @@ def _signs(system: str) -> tuple[float, float, float]:
 
 
 def _parse_fcsv(text: str, stem: str) -> Parsed:
-    system, columns = "RAS", FCSV_COLUMNS.split(",")  # of files that do not name theirs
+    head = dict(re.findall(r"^#\s*(\w+)\s*=\s*(.*?)\s*$", text, flags=re.MULTILINE))
+    columns = head.get("columns", FCSV_COLUMNS).split(",")
+    lines = [line for line in filled_lines(text) if not line.startswith("#")]
     names, places = [], []
-    n_semilandmarks = 0
-    for line in text.splitlines():
-        key, _, value = line.partition("=")
-        if key.split() == ["#", "CoordinateSystem"]:
-            system = value.strip()
-        elif key.split() == ["#", "columns"]:
-            columns = value.strip().split(",")
-        elif line.strip() and not line.startswith("#"):
-            cells = next(csv.reader([line]))
-            row = dict(zip(columns, cells, strict=False))
-            if len(row) < len(columns):
-                raise FileFormatError(f"a line must have {len(columns)} cells; one is {line!r}.")
-            is_placed = (cells[STATUS_COLUMN:] or [PLACED])[0] not in NOT_PLACED
-            places.append([as_number(row[axis]) if is_placed else np.nan for axis in "xyz"])
-            names.append(row["label"].strip() or str(len(places)))
-            n_semilandmarks += is_semilandmark(row.get("desc", ""))
-    points = np.reshape(places, (-1, 3)) * _signs(system)
-    return one_specimen(stem, names, points, semilandmarks=n_semilandmarks)
+    for cells in csv.reader(lines, strict=True):
+        row = dict(zip(columns, cells, strict=False))
+        if len(row) < len(columns):
+            raise FileFormatError(f"a line must have {len(columns)} cells; one is {cells}.")
+        is_placed = (cells[STATUS_COLUMN:] or [PLACED])[0] not in NOT_PLACED
+        places.append([as_number(row[axis]) if is_placed else np.nan for axis in "xyz"])
+        names.append(row["label"].strip() or str(len(places)))
+    signs = _signs(head.get("CoordinateSystem", "RAS"))  # RAS in files that do not name theirs
+    return one_specimen(stem, names, np.reshape(places, (-1, 3)) * signs)
 
 
 def _format_fcsv(specimens: Table) -> str:
     (landmarks,) = specimens.values()
-    rows = []
-    for number, (name, place) in enumerate(zip(landmarks.names, _texts(landmarks), strict=True)):
-        status = NOT_PLACED[1] if "NA" in place else PLACED
-        place = [text.replace("NA", "0.0") for text in place]  # noqa: PLW2901
-        rows.append([number + 1, *place, 0, 0, 0, 1, 1, 1, 0, name, "", "", status, 0])
+    places = _texts(np.nan_to_num(landmarks.points))
+    statuses = np.where(np.isnan(landmarks.points[:, 0]), NOT_PLACED[1], PLACED)
+    rows = [
+        [row + 1, *places[row], 0, 0, 0, 1, 1, 1, 0, name, "", "", statuses[row], 0]
+        for row, name in enumerate(landmarks.names)
+    ]
     head = "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"
     return f"{head}# columns = {FCSV_COLUMNS},positionStatus,autoCreated\n{csv_text(rows)}"
 
@@ -446,31 +434,25 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 def _format_tps(specimens: Table) -> str:
     lines = []
     for name, landmarks in specimens.items():
-        rows = [" ".join(row) for row in _texts(landmarks)]
+        rows = [" ".join(row) for row in _texts(landmarks.points)]
         lines += [f"LM3={len(rows)}", *rows, f"ID={name}"]
     return "\n".join(lines) + "\n"
 
 
 def _parse_morphologika(text: str, _: str) -> Parsed:
-    sections: dict[str, list[str]] = {}
-    section = sections.setdefault("", [])
-    for line in filled_lines(text):
-        if line.startswith("["):
-            section = sections.setdefault(line.strip("[]").strip().lower(), [])
-        else:
-            section.append(line)
-    n, k = int(sections["individuals"][0]), int(sections["landmarks"][0])
+    _, sections = sections_of(text, r"^\s*\[(.*)\]\s*$")
+    keys = ("individuals", "landmarks", "dimensions")
+    n, k, n_axes = [int(sections[key][0]) for key in keys]
     # Each specimen has a line before its points: an apostrophe and its number or name.
     lines = [line for line in sections["rawpoints"] if not line.startswith("'")]
     names = sections.get("names") or [str(number + 1) for number in range(n)]
-    n_axes = int(sections["dimensions"][0])
-    if len(lines) != n * k or len(names) != n or n_axes not in (2, 3):
+    if len(lines) != n * k or len(names) != n:
         raise FileFormatError(
-            f"there must be {n} names and {n} times {k} points in 2 or 3 dimensions; there are "
-            f"{len(names)} names and {len(lines)} points in {n_axes}."
+            f"there must be {n} names and {n} times {k} points; there are {len(names)} names and "
+            f"{len(lines)} points."
         )
-    points = points_of(lines, n_axes).reshape(n, k, 3)
-    return Parsed(by_name(names, map(numbered, points)), (PLANAR,) * (n_axes == 2))
+    points = points_of(lines, n_axes).reshape(n, k, n_axes)
+    return unlabeled(zip(names, points, strict=True))
 
 
 def _format_morphologika(specimens: Table) -> str:
@@ -478,7 +460,7 @@ def _format_morphologika(specimens: Table) -> str:
     lines = ["[individuals]", str(len(specimens)), "[landmarks]", str(k), "[dimensions]", "3"]
     lines += ["[names]", *specimens, "[rawpoints]"]
     for number, landmarks in enumerate(specimens.values()):
-        lines += [f"'#{number + 1}", *(" ".join(row) for row in _texts(landmarks))]
+        lines += [f"'#{number + 1}", *(" ".join(row) for row in _texts(landmarks.points))]
     return "\n".join(lines) + "\n"
 
 
@@ -499,27 +481,24 @@ def _parse_csv(text: str, _: str) -> Parsed:
         found.setdefault(specimen, []).append(cells)
     specimens = {}
     for specimen, lines in found.items():
-        numbers = np.array([[as_number(cell) for cell in cells[1:]] for cells in lines])
-        points, spread = numbers[:, :3], numbers[:, 3]
-        names = [cells[0] for cells in lines]
-        specimens[specimen] = Landmarks(names, points, None if np.isnan(spread).all() else spread)
+        names, *columns = zip(*lines, strict=True)
+        *points, spread = [list(map(as_number, column)) for column in columns]
+        widths = None if np.isnan(spread).all() else spread
+        specimens[specimen] = Landmarks(names, np.transpose(points), widths)
     return Parsed(specimens)
 
 
 def _format_csv(specimens: Table) -> str:
-    rows: list[list[object]] = [list(CSV_COLUMNS)]
+    rows = [CSV_COLUMNS]
     for specimen, landmarks in specimens.items():
-        widths = (
-            np.full(len(landmarks.names), np.nan) if landmarks.spread is None else landmarks.spread
-        )
-        for name, place, width in zip(
-            landmarks.names, _texts(landmarks), widths.tolist(), strict=True
-        ):
-            rows.append([specimen, name, *place, "NA" if np.isnan(width) else width])
+        widths = np.nan if landmarks.spread is None else landmarks.spread
+        numbers = np.insert(landmarks.points, 3, widths, axis=1)
+        for name, row in zip(landmarks.names, _texts(numbers), strict=True):
+            rows.append([specimen, name, *row])
     return csv_text(rows)
 
 
-PARSERS: dict[str, Callable[[str, str], Parsed]] = {
+PARSERS = {
     ".mrk.json": _parse_markups,
     ".json": _parse_markups,
     ".fcsv": _parse_fcsv,
@@ -530,9 +509,9 @@ PARSERS: dict[str, Callable[[str, str], Parsed]] = {
     ".dta": parse_nts,
     ".pts": parse_landmark_editor,
     ".pp": parse_picked_points,
-    ".landmarkAscii": parse_amira,
+    ".landmarkascii": parse_amira,
 }
-WRITERS: dict[str, Callable[[Table], str]] = {
+WRITERS = {
     ".mrk.json": _format_markups,
     ".fcsv": _format_fcsv,
     ".tps": _format_tps,
@@ -541,13 +520,5 @@ WRITERS: dict[str, Callable[[Table], str]] = {
 }
 OF_ONE = (".mrk.json", ".fcsv")
 # Files that a folder of landmarks may hold; other things end in .txt, .csv, .json and .dta, too.
-IN_FOLDERS = (*OF_ONE, ".tps", ".nts", ".pts", ".pp", ".landmarkAscii")
-OPEN_ENDED = (
-    ".tps",
-    ".txt",
-    ".csv",
-    ".nts",
-    ".dta",
-    ".pts",
-    ".landmarkAscii",
-)  # without an end mark
+IN_FOLDERS = (*OF_ONE, ".tps", ".nts", ".pts", ".pp", ".landmarkascii")
+ENDED = (*OF_ONE, ".json", ".pp")  # by a mark, or in lines of many cells

@@ -69,12 +69,11 @@ class Landmarks(ReadOnly):
         first: dict[str, int] = {}
         for row, name in enumerate(names):
             require_name(name, f"names[{row}]")
-            if name in first:
+            if first.setdefault(name, row) != row:
                 raise InvalidParameterError(
                     f"Names of landmarks must differ; {name!r} is that of rows {first[name]} and "
                     f"{row}."
                 )
-            first[name] = row
         missing = np.isnan(places)
         bad = np.isinf(places).any(axis=1) | (missing.any(axis=1) & ~missing.all(axis=1))
         if bad.any():

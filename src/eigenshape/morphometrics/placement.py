@@ -1,7 +1,6 @@
 """Whether landmarks lie on the surfaces of their specimens, and what would bring them there."""
 
 from collections.abc import Iterable
-from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -23,17 +22,12 @@ OUTSIDE = 0.1
 # 0.0043, or with edges of 0.2 radii 0.010; of the landmarks of other skulls 0.010 to 0.032.
 BESIDE, FACETS = 0.01, 0.5
 SPOT = 0.1  # radius of landmarks, as a share of the surface's, below which their size tells nothing
-FACTORS = (1.0, 1000.0, 0.001, 10.0, 0.1, 100.0, 0.01, 25.4, 1 / 25.4)  # between units of length
-# All turns and reflections that exchange axes; first none, then those that turn about an axis, as
-# between the systems LPS and RAS
-AXES = sorted(
-    (
-        np.eye(3)[list(order)] * signs
-        for order in permutations(range(3))
-        for signs in product((1, -1), repeat=3)
-    ),
-    key=lambda axes: (-np.trace(np.abs(axes)), -np.linalg.det(axes), -np.trace(axes)),
-)
+# Between units of length
+FACTORS = (1000.0, 0.001, 10.0, 0.1, 100.0, 0.01, 25.4, 1 / 25.4)
+# What may bring landmarks to their surface: other units of length, or the other system of Slicer
+CHANGES = {f"{size:.4g} times as large": [size] * 3 for size in FACTORS} | {
+    "as -x, -y, z": [-1, -1, 1]
+}
 
 
 class Placement(NamedTuple):
@@ -56,8 +50,7 @@ def require_on_surfaces(
         farthest = max(OUTSIDE * radius, edge)
         known = np.isfinite(landmarks.points).all(axis=1)
         distances = np.full(len(known), np.nan)
-        if known.any():
-            distances[known] = _distances(mesh, landmarks.points[known])
+        distances[known] = _distances(mesh, landmarks.points[known])
         near = BESIDE * radius + FACETS * edge**2 / radius
         found[name] = Placement(distances, bool(known.any() and np.median(distances[known]) > near))
         if (outside := distances > farthest).any():
@@ -81,26 +74,18 @@ def _distances(mesh: TriangleMesh, points: Float[np.ndarray, "k 3"]) -> Float[np
 def _remedy(
     mesh: TriangleMesh, points: Float[np.ndarray, "k 3"], farthest: float, outside: np.ndarray
 ) -> str:
-    """Say which unit or which axes would bring points to the surface."""
-    changes = [(factor, axes) for axes in AXES for factor in FACTORS]
-    moved = np.array([factor * points @ axes.T for factor, axes in changes])
-    away = cKDTree(mesh.vertices).query(moved.reshape(-1, 3))[0].reshape(len(changes), -1)
+    """Say what would bring points to the surface."""
+    moved = [points * change for change in CHANGES.values()]
+    away = cKDTree(mesh.vertices).query(moved)[0].mean(axis=1)
     # Points that shrink into one spot may lie on any surface.
-    extents = np.array([mean_radius(each) for each in moved])
-    is_spot = extents < SPOT * mean_radius(mesh.vertices)
-    best = int(np.argmin(np.where(is_spot, np.inf, away.mean(axis=1))))
-    if (_distances(mesh, moved[best]) > farthest).any():
-        if 2 * outside.sum() < len(outside):
-            return "place them anew, or leave them out as missing (NA)"
+    is_spot = np.array(list(map(mean_radius, moved))) < SPOT * mean_radius(mesh.vertices)
+    best = int(np.argmin(np.where(is_spot, np.inf, away)))
+    if (_distances(mesh, moved[best]) <= farthest).all():
+        unit = "; if their file names a unit, name that of the mesh (unit=, --unit)"
         return (
-            "they are in another frame or of another specimen; save them as they lie on this mesh"
+            f"{list(CHANGES)[best]} they would lie on it; change them so"
+            f"{unit if best < len(FACTORS) else ''}"
         )
-    factor, axes = changes[best]
-    turned = " ".join(
-        ("-" if row.sum() < 0 else "") + "xyz"[int(np.abs(row).argmax())] for row in axes
-    )
-    size = f"{factor:.4g} times as large" if factor != 1 else ""
-    axes_of = f"as {turned.replace(' ', ', ')}" if turned != "x y z" else ""
-    where = " and ".join(filter(None, (size, axes_of)))
-    unit = "; if their file names a unit, name that of the mesh (unit=, --unit)" if size else ""
-    return f"{where} they would lie on it; change them so{unit}"
+    if 2 * outside.sum() < len(outside):
+        return "place them anew, or leave them out as missing (NA)"
+    return "they are in another frame or of another specimen; save them as they lie on this mesh"

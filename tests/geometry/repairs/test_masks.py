@@ -55,8 +55,9 @@ def test_what_a_mask_breaks_is_told():
 @pytest.mark.parametrize(
     ("mask", "message"),
     [
-        (np.ones(14), r"one value per vertex, shape \(15,\); the shape is \(14,\)"),
-        (np.full(15, np.nan), "True or False, or 1 or 0, for each vertex; that of vertex 0 is nan"),
+        (np.ones(14), r"one number per vertex, shape \(15,\); the shape is \(14,\)"),
+        (np.full(15, np.nan), "mask must be finite; entry 0 is nan"),
+        (np.full(15, 0.5), "True or False, or 1 or 0, for each vertex; that of vertex 0 is 0.5"),
         (np.arange(15), "that of vertex 2 is 2"),
         (np.zeros(15), "keep at least one face; it keeps 0 of 15"),
         (np.arange(15) < 1, "keep at least one face; it keeps 1 of 15"),

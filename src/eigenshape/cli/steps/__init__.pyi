@@ -1,6 +1,5 @@
 from .collecting import doubtful_landmarks as doubtful_landmarks
 from .collecting import find_landmarks as find_landmarks
-from .collecting import given_landmarks as given_landmarks
 from .collecting import mostly_doubtful as mostly_doubtful
 from .collecting import unsure_sides as unsure_sides
 from .collection_report import write_collection_report as write_collection_report

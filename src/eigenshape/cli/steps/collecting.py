@@ -25,22 +25,18 @@ def find_landmarks(
     Raise InvalidParameterError if one is of no specimen of the folder, since its name may be
     misspelled, or does not lie on its surface.
     """
-    source = landmarks or folder
-    if source == folder or source.is_dir():
-        found = read_folder(source, unit, output)
-    else:
-        found = read_specimens(source, unit=unit)
+    found = (
+        read_folder(folder, unit, output)
+        if landmarks is None
+        else read_specimens(landmarks, unit=unit)
+    )
     paths = {item.name: item.path for item in find_items(folder)}
     unknown = sorted(found.keys() - paths.keys())
     if unknown:
         raise InvalidParameterError(
-            f"Landmarks must be of specimens in {folder}; {unknown[0]!r} of {source} is none. The "
-            f"specimens are {', '.join(sorted(paths)[:5])}{', ...' if len(paths) > 5 else ''}"
-        )
-    if landmarks is not None and not found:
-        raise InvalidParameterError(
-            f"--landmarks takes a table, or a folder of files such as NAME.mrk.json; {source} holds "
-            "none."
+            f"Landmarks must be of specimens in {folder}; {unknown[0]!r} of {landmarks or folder} is "
+            f"none. The specimens are {', '.join(sorted(paths)[:MOST_NAMED])}"
+            f"{', ...' if len(paths) > MOST_NAMED else ''}"
         )
     require_on_surfaces(_readable(found, paths))
     return found
@@ -58,32 +54,19 @@ def _readable(
         yield name, mesh, own
 
 
-def given_landmarks(carried: CarriedLandmarks) -> dict[str, dict[str, dict[str, float | None]]]:
-    """Return the distance and the disagreement of each given landmark, by specimen and name."""
-    found: dict[str, dict[str, dict[str, float | None]]] = {}
-    for i, j in np.argwhere(carried.given):
-        apart = float(carried.disagreement[i, j])
-        found.setdefault(carried.specimens[i], {})[carried.names[j]] = {
-            "distance": float(carried.distance[i, j]),
-            "disagreement": None if np.isnan(apart) else apart,
-        }
-    return found
-
-
 def mostly_doubtful(carried: CarriedLandmarks) -> list[str]:
     """Name the specimens whose given landmarks are doubtful for the most part, with what is known."""
     found = []
     for row, name in enumerate(carried.specimens):
         given = carried.given[row]
-        n_given, n_doubtful = int(given.sum()), int(carried.doubtful[row, given].sum())
+        n_given, n_doubtful = given.sum(), carried.doubtful[row, given].sum()
         if 2 * n_doubtful > n_given:
-            apart = carried.disagreement[row, given]
+            away, apart = carried.distance[row, given], carried.disagreement[row, given]
             others = f" and {np.nanmedian(apart):.3g} from where others put them"
             found.append(
-                f"{n_doubtful} of {n_given} of {name} are doubtful: they lie "
-                f"{np.median(carried.distance[row, given]):.3g} from its surface"
-                f"{others if np.isfinite(apart).any() else ''} (medians). They may be of another "
-                "specimen, moved, turned or mirrored."
+                f"{n_doubtful} of {n_given} of {name} are doubtful: they lie {np.median(away):.3g} from "
+                f"its surface{others if np.isfinite(apart).any() else ''} (medians). They may be of "
+                "another specimen, moved, turned or mirrored."
             )
     return found
 
@@ -108,8 +91,6 @@ def unsure_sides(collection: Collection) -> list[str]:
 
 def doubtful_landmarks(carried: CarriedLandmarks) -> dict[str, list[str]]:
     """Return the names of the doubtful landmarks of each specimen that has some."""
-    return {
-        specimen: [name for name, is_one in zip(carried.names, row, strict=True) if is_one]
-        for specimen, row in zip(carried.specimens, carried.doubtful, strict=True)
-        if row.any()
-    }
+    names = np.array(carried.names)
+    pairs = zip(carried.specimens, carried.doubtful, strict=True)
+    return {specimen: names[row].tolist() for specimen, row in pairs if row.any()}

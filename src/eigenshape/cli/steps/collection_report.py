@@ -18,6 +18,7 @@ from eigenshape.collections.alignment import best_similarity
 from eigenshape.collections.carrying import CarriedLandmarks
 from eigenshape.collections.collection import Collection, unreflect
 from eigenshape.geometry.distances.closest import closest_points
+from eigenshape.geometry.measure import mean_radius
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import place_points
 from eigenshape.morphometrics.procrustes import fit_procrustes
@@ -111,36 +112,22 @@ def _landmarks(
     for points, own, spread in zip(carried.points, collection.points, carried.spread, strict=True):
         found = closest_points(TriangleMesh(own, mean.faces), points)
         places.append(place_points(mean, found.simplices, found.weights).points)
-        spreads.append(spread * (_size(mean.vertices) / _size(own)))
+        spreads.append(spread * (mean_radius(mean.vertices) / mean_radius(own)))
     on_mean = closest_points(mean, np.median(places, axis=0))
     # Given landmarks have no spread of their own.
     widths = np.array(spreads)
     typical = np.nan_to_num(np.nanmedian(np.where(widths > 0, widths, np.nan), axis=0))
+    specimens = np.array(carried.specimens)
     return [
         {
             "name": name,
-            "corners": mean.faces[face].tolist(),
-            "weights": weights.tolist(),
-            "spread": float(width),
-            "doubtful": [
-                specimen
-                for specimen, is_one in zip(carried.specimens, doubtful, strict=True)
-                if is_one
-            ],
+            "corners": mean.faces[on_mean.simplices[row]].tolist(),
+            "weights": on_mean.weights[row].tolist(),
+            "spread": float(typical[row]),
+            "doubtful": specimens[carried.doubtful[:, row]].tolist(),
         }
-        for name, face, weights, width, doubtful in zip(
-            carried.names,
-            on_mean.simplices,
-            on_mean.weights,
-            typical,
-            carried.doubtful.T,
-            strict=True,
-        )
+        for row, name in enumerate(carried.names)
     ]
-
-
-def _size(points: Float[np.ndarray, "n 3"]) -> float:
-    return float(np.linalg.norm(points - points.mean(axis=0)))
 
 
 def _numbers(values: np.ndarray) -> dict[str, Any]:
@@ -150,5 +137,4 @@ def _numbers(values: np.ndarray) -> dict[str, Any]:
 
 
 def _text(values: np.ndarray, step: float | None) -> dict[str, Any]:
-    kind = "int16" if step is not None else "uint32"
-    return {"kind": kind, "step": step, "text": b64encode(values.tobytes()).decode()}
+    return {"kind": values.dtype.name, "step": step, "text": b64encode(values.tobytes()).decode()}

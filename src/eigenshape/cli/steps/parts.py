@@ -9,7 +9,7 @@ from jaxtyping import Int
 
 from eigenshape._progress import Progress
 from eigenshape.cli.console import print_table
-from eigenshape.deformation.patches import regions_of_patches
+from eigenshape.deformation.region_patches import regions_of_patches
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.contrast import PART_CONTRAST
 from eigenshape.features.parts import find_parts, smooth_cut

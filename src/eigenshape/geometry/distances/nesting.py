@@ -60,12 +60,11 @@ def find_pieces(mesh: TriangleMesh, turns: FaceTurns) -> Pieces:
     sides, depths = np.zeros((2, len(closed)), dtype=np.int64)
     rows = np.argsort(of_faces, kind="stable")
     ordered = scaled_corners(mesh)[0][rows]
-    faces = np.split(ordered, np.flatnonzero(np.diff(of_faces[rows])) + 1)
+    starts = np.searchsorted(of_faces[rows], np.arange(len(closed)))
+    faces = np.split(ordered, starts[1:])
     whole = np.flatnonzero(closed)
-    low, high = (
-        np.array([end(faces[i], axis=(0, 1)) for i in whole]).reshape(-1, 3)
-        for end in (np.min, np.max)
-    )
+    low = np.minimum.reduceat(ordered.min(axis=1), starts)[whole]
+    high = np.maximum.reduceat(ordered.max(axis=1), starts)[whole]
     sizes = (high - low).max(axis=1, keepdims=True)
     # A piece that touches another one from inside may stick out by rounding.
     low_around, high_around = low - TOUCHING * sizes, high + TOUCHING * sizes

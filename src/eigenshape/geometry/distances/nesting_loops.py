@@ -62,7 +62,7 @@ def _side(points, s, t, p):
     """
     side = side_of_line(points, 0, 1, s, t, p)
     if side == 0:
-        side = (points[s, 1] > points[t, 1]) - (points[s, 1] < points[t, 1])
+        side = np.sign(points[s, 1] - points[t, 1])
     if side == 0:
-        side = (points[t, 0] > points[s, 0]) - (points[t, 0] < points[s, 0])
+        side = np.sign(points[t, 0] - points[s, 0])
     return side

@@ -13,8 +13,8 @@ FLAT = 1e-7
 
 
 @njit
-def triangulate(points, taken, triangles):
-    """Fill the cheapest triangulation of the polygon 0..n-1; return whether there is one.
+def triangulate(points, taken):
+    """Return the cheapest triangulation of the polygon 0..n-1; it is empty if there is none.
 
     This is dynamic programming over the chains i..j (Barequet and Sharir 1995). No side is drawn
     that is marked in `taken`.
@@ -35,7 +35,8 @@ def triangulate(points, taken, triangles):
                     if total < costs[i, j]:
                         costs[i, j], middles[i, j] = total, m
     if not np.isfinite(costs[0, n - 1]):
-        return False
+        return np.empty((0, 3), np.int64)
+    triangles = np.empty((n - 2, 3), np.int64)
     waiting = [(0, n - 1)]
     for place in range(n - 2):
         i, j = waiting.pop()
@@ -45,7 +46,7 @@ def triangulate(points, taken, triangles):
             waiting.append((i, m))
         if j - m > 1:
             waiting.append((m, j))
-    return True
+    return triangles
 
 
 @njit

@@ -45,19 +45,17 @@ def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[Tr
             n_long += 1
         else:
             points, _ = size_one(mesh.vertices[loop] - mesh.vertices[loop[0]])
-            triangles = np.empty((len(loop) - 2, 3), dtype=np.int64)
             # An edge of the mesh, or of faces that were added, must not become one of another face.
             taken = np.array(graph[loop][:, loop].toarray(), dtype=bool)
             if added:
                 faces = np.concatenate(added)
-                place_of = {vertex: place for place, vertex in enumerate(loop.tolist())}
                 drawn = np.concatenate([faces[:, :2], faces[:, 1:], faces[:, ::2]])
-                for one, other in drawn[np.isin(drawn, loop).all(axis=1)].tolist():
-                    here, there = place_of[one], place_of[other]
-                    taken[here, there] = taken[there, here] = True
-            good = triangulate(points, taken, triangles)
-            added += [loop[triangles]] if good else []
-            n_open += not good
+                drawn = drawn[np.isin(drawn, loop).all(axis=1)]
+                here, there = (drawn[:, :, None] == loop).argmax(axis=2).T
+                taken[here, there] = taken[there, here] = True
+            triangles = triangulate(points, taken)
+            added += [loop[triangles]] if len(triangles) else []
+            n_open += not len(triangles)
     sealed = TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *added]))
     n_faces = sealed.n_faces - mesh.n_faces
     report = (

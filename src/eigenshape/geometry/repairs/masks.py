@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import real_numbers, whole_number, whole_numbers
+from eigenshape._arrays import real_numbers, vertex_values, whole_number, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -63,17 +63,12 @@ def mask_surface(mesh: MeshLike, mask: ArrayLike) -> RepairedMesh[TriangleMesh]:
     ('mask_surface left out 89 vertices of 162',)
     """
     mesh = as_mesh(mesh)
-    given = real_numbers(mask, "mask")
-    if given.shape != (mesh.n_vertices,):
-        raise InvalidParameterError(
-            f"mask must hold one value per vertex, shape ({mesh.n_vertices},); the shape is "
-            f"{given.shape}."
-        )
+    given = vertex_values(mask, "mask", mesh.n_vertices)
     odd = np.flatnonzero((given != 0) & (given != 1))
     if odd.size:
         raise InvalidParameterError(
             f"mask must be True or False, or 1 or 0, for each vertex; that of vertex {odd[0]} is "
-            f"{given[odd[0]]}."
+            f"{given[odd[0]]:g}."
         )
     keeps = given.astype(bool)
     faces = keeps[mesh.faces].all(axis=1)
@@ -91,8 +86,7 @@ def mask_surface(mesh: MeshLike, mask: ArrayLike) -> RepairedMesh[TriangleMesh]:
     if n_lonely:
         report.append(f"{count_nouns(n_lonely, 'vertex')} of the mask had no face there")
     n_pieces, labels = vertex_components(part)
-    n_before = vertex_components(mesh)[0] if n_pieces > 1 else 1
-    if n_pieces > n_before:
+    if n_pieces > vertex_components(mesh)[0]:
         sizes = np.sort(np.bincount(labels))[::-1]
         cut = f"the mask cuts the surface into {n_pieces} pieces, of {sizes[:5].tolist()} vertices"
         report.append(cut)

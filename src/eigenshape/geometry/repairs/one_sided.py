@@ -67,14 +67,12 @@ def cut_edges(
     first = len(vertices) + 2 * len(cut)
     rows = np.concatenate([ends[kept].ravel(), corners])
     columns = np.concatenate([nodes[kept].ravel(), first + vertices[corners]])
-    size = first + n
-    group = label_components(size, rows, columns)[1][: len(vertices)]
+    group = label_components(first + n, rows, columns)[1][: len(vertices)]
     _, first_corner, group = np.unique(group, return_index=True, return_inverse=True)
     # Groups are numbered by their first corner; all but the first of a vertex become new ones.
     owner = vertices[first_corner]
     number = owner.copy()
-    order = np.lexsort((first_corner, owner))
-    further = np.sort(order[1:][owner[order][1:] == owner[order][:-1]])
+    further = np.delete(np.arange(len(owner)), np.unique(owner, return_index=True)[1])
     number[further] = n + np.arange(len(further))
     source = np.concatenate([np.arange(n), owner[further]])
     opened = TriangleMesh(mesh.vertices[source], number[group].reshape(-1, 3))

@@ -66,8 +66,9 @@ def _start_report(mesh: MeshT) -> RepairedMesh[MeshT]:
     return RepairedMesh(mesh, (), np.arange(mesh.n_points))
 
 
+Step = Callable[[Any], RepairedMesh[Any]]
 # The function of each name in `MESH_REPAIRS`. Readers drop missing points: a mesh cannot hold them.
-REPAIRS: dict[str, Callable[[Any], RepairedMesh[Any]]] = {
+REPAIRS: dict[str, Step] = {
     "auto": repair_as_needed,
     "drop_missing": _start_report,
     "weld": weld,
@@ -183,7 +184,7 @@ def repair(
             source = done.source_points[step.source_points]
             done = RepairedCloud(step.cloud, done.report + step.report, source)
         return done
-    steps: dict[str, Callable[[Any], RepairedMesh[Any]]] = {
+    steps: dict[str, Step] = {
         **REPAIRS,
         "weld": partial(weld, tolerance=tolerance),
         "fill_holes": partial(fill_holes, most_edges=most_edges),
@@ -253,8 +254,8 @@ def _until_sound(mesh: MeshT, names: Sequence[str]) -> tuple[RepairedMesh[MeshT]
                 continue
             step = REPAIRS[name](done.mesh)
             before, after = done.mesh, step.mesh
-            same_points = before.n_points == after.n_points
-            if not (same_points and np.array_equal(before.simplices, after.simplices)):
+            dropped = after.n_points < before.n_points
+            if dropped or not np.array_equal(before.simplices, after.simplices):
                 done = _combine(done, step)
                 applied.append(name)
     return done, tuple(applied)
@@ -270,8 +271,8 @@ def has_specks(mesh: TriangleMesh) -> bool:
     """Tell whether all components but the largest have little area, each and together."""
     _, labels = vertex_components(mesh)
     areas = triangle_areas(scaled_corners(mesh)[0])
-    shares = np.sort(np.bincount(labels[mesh.faces[:, 0]], weights=areas / areas.sum()))
-    return bool(shares[:-1].max(initial=0.0) <= LARGEST_SPECK and shares[:-1].sum() <= ALL_SPECKS)
+    others = np.sort(np.bincount(labels[mesh.faces[:, 0]], weights=areas / areas.sum()))[:-1]
+    return bool(others.max(initial=0.0) <= LARGEST_SPECK and others.sum() <= ALL_SPECKS)
 
 
 def has_small_holes(mesh: TriangleMesh) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from eigenshape._errors import InvalidParameterError
 
+SURFACE_REPAIRS = ("orient", "largest_component", "fill_holes", "cut_one_sided")  # of surfaces only
 # Of meshes of any dimension and of surfaces, in the order in which messages and help list them.
 MESH_REPAIRS = (
     "auto",
@@ -14,12 +15,8 @@ MESH_REPAIRS = (
     "drop_degenerate",
     "drop_duplicate_faces",
     "drop_unreferenced",
-    "orient",
-    "largest_component",
-    "fill_holes",
-    "cut_one_sided",
+    *SURFACE_REPAIRS,
 )
-SURFACE_REPAIRS = ("orient", "largest_component", "fill_holes", "cut_one_sided")  # of surfaces only
 CLOUD_REPAIRS = ("auto", "drop_missing", "drop_duplicate_points")
 
 

@@ -88,15 +88,11 @@ def weld_seams(mesh: MeshT) -> RepairedMesh[MeshT]:
 
 def _merge_vertices(mesh: MeshT, group: Int[np.ndarray, " n"], report: str) -> RepairedMesh[MeshT]:
     """Replace each group of vertices by its first vertex; these keep their order."""
-    _, first, renumbered = np.unique(group, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.argsort(order)
-    joined = type(mesh)(mesh.points[first[order]], rank[renumbered[mesh.simplices]])
-    return RepairedMesh(
-        joined,
-        (report.format(count_nouns(mesh.n_points - joined.n_points, "vertex")),),
-        first[order],
-    )
+    _, first, number = np.unique(group, return_index=True, return_inverse=True)
+    kept, renumbered = np.unique(first[number], return_inverse=True)
+    joined = type(mesh)(mesh.points[kept], renumbered[mesh.simplices])
+    n_joined = count_nouns(mesh.n_points - joined.n_points, "vertex")
+    return RepairedMesh(joined, (report.format(n_joined),), kept)
 
 
 def drop_degenerate(mesh: Mesh) -> RepairedMesh[Any]:
@@ -109,13 +105,11 @@ def drop_degenerate(mesh: Mesh) -> RepairedMesh[Any]:
     n_split = 0
     if n_flat and isinstance(mesh, TriangleMesh):
         mesh, n_split = flip_flat_faces(mesh)
-    keep = np.ones(len(mesh.simplices), dtype=bool)
-    keep[degenerate_simplices(mesh)] = False
     measure = MEASURES.get(mesh.dim, MEASURES[3])[2]
     report = f"drop_degenerate removed {count_nouns(n_flat, simplex_noun(mesh))} without {measure}"
     if n_split:
         report += f", and split {count_nouns(n_split, 'neighbor')} at their vertices"
-    return _keep_simplices(mesh, keep, report)
+    return _drop_simplices(mesh, degenerate_simplices(mesh), report)
 
 
 def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
@@ -137,28 +131,25 @@ def flip_flat_faces(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     n_flips = 0
     while True:
         table = edge_table(mesh)
-        is_flat = np.zeros(mesh.n_faces, dtype=bool)
-        is_flat[degenerate_simplices(mesh)] = True
-        flat = np.flatnonzero(is_flat)
+        flat = degenerate_simplices(mesh)
         points, _ = size_one(mesh.vertices)
         sides = np.stack([np.roll(mesh.faces[flat], -turn, axis=1) for turn in (1, 2)], axis=2)
         lengths = np.linalg.norm(points[sides[..., 0]] - points[sides[..., 1]], axis=2)
         corner = lengths.argmax(axis=1)  # opposite to the longest side
         (a, b), m = sides[np.arange(len(flat)), corner].T, mesh.faces[flat, corner]
         edge = table.face_edges[flat, corner]
-        # The other face at the edge, or the flat one itself if it is alone
-        order = np.argsort(table.face_edges.ravel(), kind="stable")
-        ordered = table.face_edges.ravel()[order]
-        first = order[np.searchsorted(ordered, edge)] // 3
-        last = order[np.searchsorted(ordered, edge, side="right") - 1] // 3
-        neighbor = np.where(first == flat, last, first)
+        # Of two faces at an edge, one is the sum of their numbers less the other.
+        has_two = table.n_faces[edge] == 2
+        owners = np.repeat(np.arange(mesh.n_faces), 3)
+        sums = np.bincount(table.face_edges.ravel(), weights=owners).astype(np.int64)
+        neighbor = np.where(has_two, sums[edge] - flat, flat)
         between = mesh.faces[neighbor]
         d = between.sum(axis=1) - a - b
         one = np.where(between == b[:, None], m[:, None], between)
         two = np.where(between == a[:, None], m[:, None], between)
         keys = np.minimum(m, d) * mesh.n_vertices + np.maximum(m, d)
         known = table.edges[:, 0] * mesh.n_vertices + table.edges[:, 1]
-        good = (table.n_faces[edge] == 2) & ~is_flat[neighbor] & ~np.isin(keys, known)
+        good = has_two & ~np.isin(neighbor, flat) & ~np.isin(keys, known)
         for halves in (one, two):
             if len(halves):
                 good[degenerate_simplices(TriangleMesh(mesh.vertices, halves))] = False
@@ -187,9 +178,9 @@ def collapse_needles(mesh: MeshT) -> RepairedMesh[MeshT]:
     # Sides of length 0 belong to faces without area, which `drop_degenerate` removes.
     least = np.maximum(NEEDLE * lengths.max(axis=1, keepdims=True), TINY_SIDE * lengths.max())
     short = (lengths > 0) & (lengths < least)
-    in_simplex, side = np.nonzero(short)
     if short.any(axis=1).all():
-        in_simplex, side = in_simplex[:0], side[:0]
+        short[:] = False
+    in_simplex, side = np.nonzero(short)
     one, two = np.triu_indices(mesh.dim + 1, 1)
     starts, ends = mesh.simplices[in_simplex, one[side]], mesh.simplices[in_simplex, two[side]]
     _, group = label_components(mesh.n_points, starts, ends)
@@ -199,21 +190,22 @@ def collapse_needles(mesh: MeshT) -> RepairedMesh[MeshT]:
     report = (
         f"{joined.report[0]}, and removed {count_nouns(int(collapsed.sum()), simplex_noun(mesh))}"
     )
-    kept = _keep_simplices(joined.mesh, ~collapsed, report)
+    kept = _drop_simplices(joined.mesh, np.flatnonzero(collapsed), report)
     return RepairedMesh(kept.mesh, kept.report, joined.source_vertices)
 
 
 def drop_duplicate_faces(mesh: MeshT) -> RepairedMesh[MeshT]:
     """Keep the first of all faces or simplices with the same corners, in any order."""
-    keep = np.ones(len(mesh.simplices), dtype=bool)
-    keep[repeated_simplices(mesh)[:, 1]] = False
-    report = f"drop_duplicate_faces removed {count_nouns(int((~keep).sum()), simplex_noun(mesh))}"
+    repeated = repeated_simplices(mesh)[:, 1]
+    report = f"drop_duplicate_faces removed {count_nouns(len(repeated), simplex_noun(mesh))}"
     report += " with the corners of an earlier one"
-    return _keep_simplices(mesh, keep, report)
+    return _drop_simplices(mesh, repeated, report)
 
 
-def _keep_simplices(mesh: MeshT, keep: Bool[np.ndarray, " s"], report: str) -> RepairedMesh[MeshT]:
-    kept = type(mesh)(mesh.points, mesh.simplices[keep])
+def _drop_simplices(
+    mesh: MeshT, dropped: Int[np.ndarray, " k"], report: str
+) -> RepairedMesh[MeshT]:
+    kept = type(mesh)(mesh.points, np.delete(mesh.simplices, dropped, axis=0))
     return RepairedMesh(kept, (report,), np.arange(mesh.n_points))
 
 
@@ -235,10 +227,8 @@ def largest_component(mesh: TriangleMesh) -> RepairedMesh[TriangleMesh]:
     count, _ = vertex_components(mesh)
     keep = faces_of_largest(mesh)
     kept, source = submesh(mesh, keep)
-    removed = (
-        f"{count_nouns(count - 1, 'component')} with {count_nouns(int((~keep).sum()), 'face')}"
-    )
-    report = f"largest_component removed {removed}"
+    report = f"largest_component removed {count_nouns(count - 1, 'component')}"
+    report += f" with {count_nouns(int((~keep).sum()), 'face')}"
     return RepairedMesh(kept, (report,), source)
 
 
@@ -252,8 +242,7 @@ def faces_of_largest(mesh: TriangleMesh) -> Bool[np.ndarray, " f"]:
 
 def drop_duplicate_points(cloud: PointCloud) -> RepairedCloud:
     """Keep the first of all points of a cloud at the same place."""
-    _, source = np.unique(number_places(cloud.points), return_index=True)
-    source = np.sort(source)
+    source = np.sort(np.unique(number_places(cloud.points), return_index=True)[1])
     removed = count_nouns(cloud.n_points - len(source), "point")
     report = f"drop_duplicate_points removed {removed} at the places of others"
     return RepairedCloud(PointCloud(cloud.points[source], cloud.dim), (report,), source)

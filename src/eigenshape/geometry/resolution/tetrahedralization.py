@@ -111,18 +111,20 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
         # Older versions of Netgen have room for the nodes of elements of higher order behind.
         corners = solid.Elements3D().NumPy()["nodes"][:, :4].astype(np.int64) - 1
     points = np.concatenate([surface.vertices, (inside + center) * scale])
-    found = SimplicialMesh(points, corners) if len(corners) else None
-    filled = 0.0 if found is None else float(simplex_volumes(found).sum())
-    volume = enclosed_volume(surface)
-    # Where the triangles between an odd number of tetrahedra are those of the surface, the
-    # tetrahedra cover each point of the solid an odd number of times, and each point of a cavity
-    # and outside an even number of times. With the volume of the solid that is once and never.
-    if found is None or not _is_bounded_by(found, surface) or abs(filled - volume) > 1e-6 * volume:
-        raise InvalidShapeError(
-            f"Tetrahedra must fill what the surface encloses, {volume:g}, and nothing else; "
-            f"Netgen filled {filled:g}. No repair here moves vertices; smooth or remesh it where it was made."
-        )
-    return found
+    volume, filled = enclosed_volume(surface), 0.0
+    if len(corners):
+        found = SimplicialMesh(points, corners)
+        filled = float(simplex_volumes(found).sum())
+        # Where the triangles at an odd number of tetrahedra are those of the surface, the
+        # tetrahedra cover each point of the solid an odd number of times, and each point of a
+        # cavity and outside an even number of times. With the volume of the solid that is once
+        # and never.
+        if _is_bounded_by(found, surface) and abs(filled - volume) <= 1e-6 * volume:
+            return found
+    raise InvalidShapeError(
+        f"Tetrahedra must fill what the surface encloses, {volume:g}, and nothing else; "
+        f"Netgen filled {filled:g}. No repair here moves vertices; smooth or remesh it where it was made."
+    )
 
 
 def _require_closed(mesh: TriangleMesh, pieces: Pieces) -> None:
@@ -146,11 +148,10 @@ def _require_closed(mesh: TriangleMesh, pieces: Pieces) -> None:
 
 def _require_apart(mesh: TriangleMesh) -> None:
     """Raise an error if two vertices are at one place: there Netgen may end the process."""
-    place = number_places(mesh.vertices)
-    _, first = np.unique(place, return_index=True)
-    if len(first) < mesh.n_vertices:
-        doubles = np.delete(np.arange(mesh.n_vertices), first)
-        one, two = first[place[doubles[0]]], doubles[0]
+    places = number_places(mesh.vertices)
+    doubles = np.delete(np.arange(mesh.n_vertices), np.unique(places, return_index=True)[1])
+    if doubles.size:
+        one, two = np.flatnonzero(places == places[doubles[0]])[:2]
         raise InvalidShapeError(
             f"Vertices of a surface to be filled must differ; {one} and {two} are both at "
             f"{mesh.vertices[two].tolist()} ({len(doubles)} such). "

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any, Literal, cast, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -22,7 +22,12 @@ SOLIDS = ("hexahedra", "wedges", "pyramids")
 NO_TRIANGLES = np.empty((0, 3), dtype=np.int64)
 # Corners by CellKind or another kind of cell: arrays of rows, and CellLists of "polygons"
 Cells = dict[str, Any]
-SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))  # of a polygon of four corners
+# Points, cells and notes; functions on points, functions on cells, and notes
+ParsedShape = tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...]]
+ParsedFields = tuple[dict[str, np.ndarray], dict[str, np.ndarray], *tuple[str, ...]]
+# Of four corners, the sides of a polygon and the faces of a tetrahedron
+SIDES = [[0, 1], [1, 2], [2, 3], [3, 0]]
+FACES = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
 # Largest volume of a flat cell, as a share of its size cubed; single precision gives 1e-7.
 FLAT = 1e-6
 
@@ -38,10 +43,6 @@ class CellLists:
     def lengths(self) -> Int[np.ndarray, " c"]:
         """Number of points of each list."""
         return np.diff(self.starts)
-
-    def rows(self, chosen: Int[np.ndarray, " s"], length: int) -> Int[np.ndarray, "s length"]:
-        """Return lists of equal length as rows."""
-        return self.corners[self.starts[chosen][:, None] + np.arange(length)]
 
     def take(self, chosen: Int[np.ndarray, " s"]) -> "CellLists":
         """Return the chosen lists."""
@@ -64,13 +65,12 @@ class CellLists:
         return CellLists(np.cumsum(np.concatenate(lengths)), np.concatenate(corners))
 
 
-def require_kind(cells: str | None) -> CellKind | None:
-    """Return the kind of cells; raise an error if there is no such kind."""
+def require_kind(cells: str | None) -> None:
+    """Raise an error if there is no such kind of cells."""
     if cells is not None and cells not in get_args(CellKind):
         raise InvalidParameterError(
             f"cells must be {', '.join(get_args(CellKind))} or None; it is {cells!r}."
         )
-    return cast(CellKind | None, cells)
 
 
 def require_splittable(others: Sequence[str]) -> None:
@@ -121,15 +121,15 @@ def select_cells(
     if cells in (None, "quads") and "quads" in blocks:
         quads = polygon_triangles(points, blocks["quads"])
     surface = np.concatenate([triangles, quads])
-    found = {"tetrahedra": tetrahedra, "quads": surface, "triangles": triangles}
-    if cells is not None:
-        if not len(found[cells]):
-            held = ", ".join(name for name, block in blocks.items() if len(block)) or "points alone"
-            raise FileFormatError(
-                f"A file that is read with cells={cells!r} must hold {cells}; it holds {held}."
-            )
-        return found[cells]
-    return surface if len(surface) else blocks.get(SEGMENTS, surface)
+    if cells is None:
+        return surface if len(surface) else blocks.get(SEGMENTS, surface)
+    found = {"tetrahedra": tetrahedra, "quads": surface, "triangles": triangles}[cells]
+    if not len(found):
+        held = ", ".join(name for name, block in blocks.items() if len(block)) or "points alone"
+        raise FileFormatError(
+            f"A file that is read with cells={cells!r} must hold {cells}; it holds {held}."
+        )
+    return found
 
 
 def split_sentence(blocks: Cells) -> str:
@@ -158,14 +158,9 @@ def four_cornered(
     unit = edges / np.where(size > 0, size, 1.0)[:, None, None]
     if points.shape[1] < 3 or (np.abs(np.linalg.det(unit)) <= FLAT).all():
         return "quads"
-    distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)[1]
-    cells = cells[np.sort(distinct)]
-    triples = np.sort(
-        np.stack([np.delete(cells, corner, axis=1) for corner in range(4)], axis=1), axis=2
-    )
-    sides = np.sort(np.stack([cells[:, side] for side in SIDES], axis=1), axis=2)
-    shares_triple = (_multiplicities(triples) > 1).any(axis=1).mean()
-    of_sides = _multiplicities(sides)
+    cells = cells[np.unique(np.sort(cells, axis=1), axis=0, return_index=True)[1]]
+    shares_triple = (_multiplicities(cells[:, FACES]) > 1).any(axis=1).mean()
+    of_sides = _multiplicities(cells[:, SIDES])
     if of_sides.max() > 2:
         return "tetrahedra" if shares_triple > 0.5 else None
     shares_side = (of_sides == 2).any(axis=1).mean()
@@ -173,8 +168,8 @@ def four_cornered(
 
 
 def _multiplicities(rows: Int[np.ndarray, "c p corners"]) -> Int[np.ndarray, "c p"]:
-    """Return, for each row of corners, how often it occurs."""
-    flat = rows.reshape(-1, rows.shape[2])
+    """Return, for each row of corners, how often it occurs in any order."""
+    flat = np.sort(rows.reshape(-1, rows.shape[2]), axis=1)
     _, inverse, counts = np.unique(flat, axis=0, return_inverse=True, return_counts=True)
     return counts[inverse.ravel()].reshape(rows.shape[:2])
 

@@ -4,7 +4,7 @@ import re
 from typing import NamedTuple
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.registry import FORMATS, format_of
+from eigenshape.io.formats.registry import format_of
 
 LOOKED_AT = 4096  # bytes; what comes before the first element of XML or JSON fits into them
 
@@ -83,10 +83,9 @@ def require_content(data: bytes, suffix: str) -> None:
     found = recognize(data)
     if found is None or (suffix == ".npz" and data.startswith(b"PK")):
         return
-    known = [known.suffix for known in FORMATS]
-    if found.suffix in known and format_of(found.suffix).module == format_of(suffix).module:
-        return
     remedy = found.remedy
-    if found.suffix in known:
+    if found.suffix:
+        if format_of(found.suffix).module == format_of(suffix).module:
+            return
         remedy = f"Let its name end in {found.suffix}, or pass file_format={found.suffix!r}."
     raise FileFormatError(f"A file in {suffix} must hold that format; it is {found.noun}. {remedy}")

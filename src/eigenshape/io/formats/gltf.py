@@ -15,15 +15,15 @@ Refused: meshes that Draco or meshopt has packed, and other extensions that a fi
 
 import base64
 import json
+import struct
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import unquote
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
 from eigenshape._errors import FileFormatError
@@ -31,6 +31,8 @@ from eigenshape._files import read_regular
 from eigenshape.io.formats.cells import NO_TRIANGLES
 from eigenshape.io.formats.numbers import quote_line
 
+Entry = dict[str, Any]  # an object of the JSON tree
+Column = tuple[np.ndarray, bool]  # numbers, and whether whole ones mean shares of one
 JSON_CHUNK = b"JSON"
 BINARY_CHUNK = b"BIN\0"
 COPIES = 2**22  # most vertices and faces from copies in a small file; they take 200 MB
@@ -55,10 +57,10 @@ COMPRESSIONS = (DRACO, "EXT_meshopt_compression", "KHR_meshopt_compression")
 PLACES = {"TRANSLATION": [0.0] * 3, "ROTATION": [0.0, 0.0, 0.0, 1.0], "SCALE": [1.0] * 3}
 # Beginnings of the names of extensions that are applied, or leave all geometry in its place.
 HARMLESS = (
-    INSTANCES, LEVELS, "KHR_mesh_quantization", "KHR_node_", "KHR_animation_", "KHR_audio", "KHR_lights_",
+    INSTANCES, "KHR_mesh_quantization", "KHR_node_", "KHR_animation_", "KHR_audio", "KHR_lights_",
     "KHR_materials_", "KHR_texture_", "KHR_xmp", "EXT_instance_features", "EXT_lights_", "EXT_materials_",
-    "EXT_mesh_features", "EXT_mesh_manifold", "EXT_structural_metadata", "EXT_texture_", "MSFT_packing_",
-    "MSFT_texture_", "FB_ngon_encoding", "CESIUM_primitive_outline", "GODOT_single_root", "VRM",
+    "EXT_mesh_features", "EXT_mesh_manifold", "EXT_structural_metadata", "EXT_texture_", "MSFT_",
+    "FB_ngon_encoding", "CESIUM_primitive_outline", "GODOT_single_root", "VRM",
 )  # fmt: skip
 
 
@@ -69,6 +71,9 @@ class Piece(NamedTuple):
     faces: np.ndarray  # (f, 3)
     rows: np.ndarray  # (n,) the row of each vertex in the accessors of its primitive
     primitives: np.ndarray  # (f,) the number of each face's primitive in its mesh
+
+
+NOTHING = Piece(np.empty((0, 3)), NO_TRIANGLES, *np.empty((2, 0), dtype=np.int64))
 
 
 class Placement(NamedTuple):
@@ -99,12 +104,12 @@ class Gltf:
     the file holds and the shape does not, as they are found.
     """
 
-    tree: dict[str, Any]
+    tree: Entry
     buffers: Sequence[bytes]
     most: int
     notes: list[str] = field(default_factory=list)
 
-    def entry(self, kind: str, index: Any) -> dict[str, Any]:
+    def entry(self, kind: str, index: Any) -> Entry:
         """Return one entry of a list in the tree."""
         entries = _list(self.tree, kind)
         known = type(index) is int and 0 <= index < len(entries)
@@ -114,7 +119,7 @@ class Gltf:
             )
         return entries[index]
 
-    def entries(self, kind: str) -> list[dict[str, Any]]:
+    def entries(self, kind: str) -> list[Entry]:
         """Return all entries of a list in the tree."""
         return [self.entry(kind, index) for index in range(len(_list(self.tree, kind)))]
 
@@ -134,50 +139,16 @@ def parse(
     The buffers of a .gltf file lie in its folder, if that is given, or in data URIs.
     """
     gltf = read_gltf(data, folder)
-    piece = read_scene(gltf, scene).piece
+    piece = place_triangles(gltf, scene).piece
     return piece.vertices, piece.faces, *gltf.notes
 
 
 def read_gltf(data: bytes, folder: Path | None = None) -> Gltf:
     """Read the tree and the buffers of a file; see `parse`."""
     is_text = data[:4] != b"glTF" and (folder is not None or data.lstrip().startswith(b"{"))
-    if not is_text:
-        version, length = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8))
-        if data[:4] != b"glTF" or version != 2 or length != len(data):
-            raise FileFormatError(
-                f"A GLB file must begin with glTF, version 2 and its length; it begins with "
-                f"{quote_line((1, data[:4]))}, {version} and {length}, and has {len(data)} bytes."
-            )
-        chunks: dict[bytes, bytes] = {}
-        start = 12
-        while start < length:
-            end = start + 8 + int.from_bytes(data[start : start + 4], "little")
-            if start + 8 > length or end > length:
-                raise FileFormatError(
-                    f"A chunk of a GLB file must end within it; one ends at {end} of {length} bytes."
-                )
-            chunks.setdefault(data[start + 4 : start + 8], data[start + 8 : end])
-            start = end
-        tree = _tree(chunks.get(JSON_CHUNK, b""))
-        buffers = decode_buffers(tree, chunks.get(BINARY_CHUNK, b""))
-    else:
-        tree = _tree(data)
-        buffers = decode_buffers(tree, b"", folder)
-    return Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES))
-
-
-def read_scene(gltf: Gltf, name: str | int | None = None) -> Scene:
-    """Read the triangles of a scene; there must be some."""
-    scene = place_triangles(gltf, name)
-    if not len(scene.piece.faces):
-        reasons = "".join(f"; {note}" for note in gltf.notes)
-        raise FileFormatError(f"A glTF file must hold triangles; it holds none{reasons}.")
-    return scene
-
-
-def _tree(text: bytes) -> dict[str, Any]:
+    chunks = {JSON_CHUNK: data} if is_text else _chunks(data)
     try:
-        tree: Any = json.loads(text)
+        tree: Any = json.loads(chunks.get(JSON_CHUNK, b""))
     except (ValueError, RecursionError) as err:
         raise FileFormatError(
             f"The first chunk of a GLB file, and a .gltf file, must be JSON; {err}."
@@ -186,34 +157,51 @@ def _tree(text: bytes) -> dict[str, Any]:
         raise FileFormatError(
             f"The JSON of a glTF file must be an object; it is a {type(tree).__name__}."
         )
-    return tree
-
-
-def pack(tree: dict[str, Any], binary: bytes) -> bytes:
-    """Write a tree and its buffer as one binary file."""
-    text = json.dumps(tree, separators=(",", ":")).encode()
-    body = _chunk(JSON_CHUNK, text + b" " * (-len(text) % 4))
-    if binary:
-        body += _chunk(BINARY_CHUNK, binary + b"\0" * (-len(binary) % 4))
-    return b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(4, "little") + body
-
-
-def _chunk(kind: bytes, content: bytes) -> bytes:
-    return len(content).to_bytes(4, "little") + kind + content
-
-
-def decode_buffers(tree: dict[str, Any], binary: bytes, folder: Path | None = None) -> list[bytes]:
-    """Return the buffers: the binary chunk, data URIs and, if a folder is given, files in it.
-
-    Raise FileFormatError if a buffer is outside the file or the folder; such a file is not opened.
-    """
-    return [
-        _decode_buffer(index, entry, binary, folder)
+    buffers = [
+        decode_buffer(index, entry, chunks.get(BINARY_CHUNK, b""), folder if is_text else None)
         for index, entry in enumerate(_list(tree, "buffers"))
     ]
+    return Gltf(tree, buffers, most=max(sum(map(len, buffers)), COPIES))
 
 
-def _decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -> bytes:
+def _chunks(data: bytes) -> dict[bytes, bytes]:
+    """Return the chunks of a GLB file by their kinds; of one kind the first."""
+    version, length = (int.from_bytes(data[at : at + 4], "little") for at in (4, 8))
+    if data[:4] != b"glTF" or version != 2 or length != len(data):
+        raise FileFormatError(
+            f"A GLB file must begin with glTF, version 2 and its length; it begins with "
+            f"{quote_line((1, data[:4]))}, {version} and {length}, and has {len(data)} bytes."
+        )
+    chunks: dict[bytes, bytes] = {}
+    start = 12
+    while start < length:
+        end = start + 8 + int.from_bytes(data[start : start + 4], "little")
+        if start + 8 > length or end > length:
+            raise FileFormatError(
+                f"A chunk of a GLB file must end within it; one ends at {end} of {length} bytes."
+            )
+        chunks.setdefault(data[start + 4 : start + 8], data[start + 8 : end])
+        start = end
+    return chunks
+
+
+def pack(tree: Entry, binary: bytes) -> bytes:
+    """Write a tree and its buffer as one binary file."""
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    body = _chunk(JSON_CHUNK, text, b" ") + _chunk(BINARY_CHUNK, binary, b"\0")
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def _chunk(kind: bytes, content: bytes, filler: bytes) -> bytes:
+    content += filler * (-len(content) % 4)
+    return struct.pack("<I4s", len(content), kind) + content
+
+
+def decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -> bytes:
+    """Return a buffer: the binary chunk, a data URI or, if a folder is given, a file in it.
+
+    Raise FileFormatError if it is outside the file or the folder; such a file is not opened.
+    """
     uri = entry.get("uri") if isinstance(entry, dict) else None
     if uri is None:
         return binary if index == 0 else b""
@@ -230,14 +218,7 @@ def _decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -
             f"A GLB file must hold all its data; buffers[{index}] points outside, to {str(uri)[:80]!r}."
         )
     size = _whole(entry, "byteLength")
-    path = file_beside(index, str(uri), folder)
-    # A service must not tell where its folder is, as an error of the system would.
-    if not path.exists():
-        raise FileFormatError(
-            f"Buffers of a .gltf file must lie in its folder; buffers[{index}], {str(uri)[:80]!r}, is not there. "
-            "Give the file with its folder, or save it as .glb, which holds all."
-        )
-    data = read_regular(path, "numbers")
+    data = read_beside(index, str(uri), folder)
     if len(data) < size:
         raise FileFormatError(
             f"buffers[{index}] must have {size} bytes; the file {str(uri)[:80]!r} has {len(data)}."
@@ -245,25 +226,27 @@ def _decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) -
     return data[:size]
 
 
-def file_beside(index: int, uri: str, folder: Path) -> Path:
-    """Return the file of a relative URI; links resolved, it must be in or below the folder."""
+def read_beside(index: int, uri: str, folder: Path) -> bytes:
+    """Read the file of a relative URI; links resolved, it must be in or below the folder."""
     try:
         root = folder.resolve()
         path = (root / unquote(uri, errors="strict")).resolve()
     except (ValueError, OSError, RuntimeError):  # undecodable text, a zero byte, a loop of links
         path = root.parent
-    if ":" in uri or not path.is_relative_to(root):
+    # A service must not tell where its folder is, as an error of the system would.
+    if ":" in uri or not path.is_relative_to(root) or not path.exists():
         raise FileFormatError(
-            f"Buffers of a .gltf file must lie in its folder; buffers[{index}] points to {uri[:80]!r}."
+            f"Buffers of a .gltf file must lie in its folder; buffers[{index}], {uri[:80]!r}, is not there. "
+            "Give the file with its folder, or save it as .glb, which holds all."
         )
-    return path
+    return read_regular(path, "numbers")
 
 
 def place_triangles(gltf: Gltf, name: str | int | None = None) -> Scene:
-    """Gather the triangles of all nodes of a scene, in world coordinates."""
+    """Gather the triangles of all nodes of a scene, in world coordinates; there must be some."""
     _check_extensions(gltf)
     scene = _choose_scene(gltf, name)
-    placements = _placements(gltf, _roots(gltf, scene))
+    placements = _placements(gltf, scene)
     shapes: dict[Any, Piece] = {}
     placed = []
     total = 0
@@ -280,9 +263,12 @@ def place_triangles(gltf: Gltf, name: str | int | None = None) -> Scene:
     parts = [part for n in shown for part in _list(gltf.entry("meshes", n), "primitives")]
     if n_others := sum(part.get("mode", TRIANGLES) not in SURFACES for part in parts):
         gltf.notes.append(f"{n_others} primitives of points or lines are left out")
-    n_faces = [len(piece.faces) for piece in placed]
-    nodes = np.repeat(np.array(list(placements), dtype=np.int64), n_faces)
-    return Scene(scene, _merge_pieces(placed), nodes, placements)
+    whole = _merge_pieces(placed)
+    if not len(whole.faces):
+        reasons = "".join(f"; {note}" for note in gltf.notes)
+        raise FileFormatError(f"A glTF file must hold triangles; it holds none{reasons}.")
+    nodes = np.repeat(list(placements), [len(piece.faces) for piece in placed])
+    return Scene(scene, whole, nodes, placements)
 
 
 def _check_extensions(gltf: Gltf) -> None:
@@ -302,12 +288,13 @@ def _check_extensions(gltf: Gltf) -> None:
         )
 
 
-def extension(entry: Any, name: str) -> dict[str, Any]:
+def extension(entry: Any, name: str) -> Entry:
     """Return what an extension adds to an entry of the tree, which may be nothing."""
-    return _object(_object(entry, "extensions"), name)
+    return member(member(entry, "extensions"), name)
 
 
-def _object(entry: dict[str, Any], key: str) -> dict[str, Any]:
+def member(entry: Entry, key: str) -> Entry:
+    """Return an object in another one; without it an empty one."""
     value = entry.get(key, {})
     if not isinstance(value, dict):
         raise FileFormatError(f"{key} of a glTF file must be an object; it is {str(value)[:60]!r}.")
@@ -341,18 +328,18 @@ def _choose_scene(gltf: Gltf, wanted: str | int | None) -> int | None:
 
 def _copy_piece(piece: Piece, matrices: np.ndarray) -> Piece:
     """Place copies of triangles."""
-    count = len(matrices)
-    points = piece.vertices @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
-    # A reflection turns triangles inside out; by the format they must be turned back.
-    flips = (sides(matrices) < 0)[:, None, None]
-    faces = np.where(flips, piece.faces[:, ::-1], piece.faces)
-    starts = len(piece.vertices) * np.arange(count)
-    return Piece(
-        points.reshape(-1, 3),
-        (faces + starts[:, None, None]).reshape(-1, 3),
-        np.tile(piece.rows, count),
-        np.tile(piece.primitives, count),
-    )
+    count, n_vertices = len(matrices), len(piece.vertices)
+    points = transform_points(matrices[:, None], piece.vertices).reshape(-1, 3)
+    starts = np.repeat(n_vertices * np.arange(count), len(piece.faces))
+    faces = np.tile(piece.faces, (count, 1)) + starts[:, None]
+    signs = np.repeat(sides(matrices), n_vertices)
+    rows, primitives = np.tile(piece.rows, count), np.tile(piece.primitives, count)
+    return Piece(points, turn_back(faces, signs), rows, primitives)
+
+
+def turn_back(faces: np.ndarray, signs: np.ndarray) -> np.ndarray:
+    """Reverse the triangles whose vertices a reflection turns over, as the format demands."""
+    return np.where(signs[faces].sum(axis=1, keepdims=True) < 0, faces[:, ::-1], faces)
 
 
 def sides(matrices: np.ndarray) -> np.ndarray:
@@ -363,19 +350,16 @@ def sides(matrices: np.ndarray) -> np.ndarray:
 
 def _merge_pieces(pieces: Sequence[Piece]) -> Piece:
     starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
-    none = np.empty(0, dtype=np.int64)
-    faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=False)]
-    return Piece(
-        np.concatenate([np.empty((0, 3)), *(piece.vertices for piece in pieces)]),
-        np.concatenate([NO_TRIANGLES, *faces]),
-        np.concatenate([none, *(piece.rows for piece in pieces)]),
-        np.concatenate([none, *(piece.primitives for piece in pieces)]),
-    )
+    moved = [
+        piece._replace(faces=piece.faces + start)
+        for piece, start in zip(pieces, starts, strict=False)
+    ]
+    return Piece(*map(np.concatenate, zip(NOTHING, *moved, strict=True)))
 
 
-def _placements(gltf: Gltf, roots: list[Any]) -> dict[int, Placement]:
-    """Return how each node below the roots shows its mesh."""
-    matrices, hidden = _world_matrices(gltf, roots)
+def _placements(gltf: Gltf, scene: int | None) -> dict[int, Placement]:
+    """Return how each node of a scene shows its mesh."""
+    matrices, hidden = _world_matrices(gltf, scene)
     skins: dict[int, np.ndarray] = {}
     found = {}
     for index, matrix in matrices.items():
@@ -390,26 +374,30 @@ def _placements(gltf: Gltf, roots: list[Any]) -> dict[int, Placement]:
         weights = [0.0] * n_targets
         for entry in (mesh, node):
             weights = _numbers(entry, "weights", weights).tolist()
+        copies = matrix @ _instances(gltf, node)
         skin, bones = node.get("skin"), None
         if skin is not None:
             gltf.entry("skins", skin)
             if skin not in skins:
                 skins[skin] = _bones(gltf, skin, matrices)
-            bones = skins[skin]
-        # By the format only the joints place a skin, and neither its node nor instances.
-        copies = _instances(gltf, index) if bones is None else np.eye(4)[None]
-        copies = matrix @ copies if bones is None else copies
+            # By the format only the joints place a skin, and neither its node nor instances.
+            bones, copies = skins[skin], np.eye(4)[None]
         found[index] = Placement(node["mesh"], tuple(weights), matrix, copies, skin, bones)
     if n_hidden := sum("mesh" in gltf.entry("nodes", index) for index in hidden):
         gltf.notes.append(f"{n_hidden} nodes with a mesh are hidden by {VISIBILITY}, and left out")
     return found
 
 
-def _world_matrices(gltf: Gltf, roots: list[Any]) -> tuple[dict[int, np.ndarray], set[int]]:
-    """Return the matrices of all nodes below the roots, and which of these nodes are hidden."""
+def _world_matrices(gltf: Gltf, scene: int | None) -> tuple[dict[int, np.ndarray], set[int]]:
+    """Return the matrices of all nodes of a scene, and which of these nodes are hidden."""
+    nodes = gltf.entries("nodes")
+    coarser = _named_nodes(_list(extension(node, LEVELS), "ids") for node in nodes)
+    if scene is None:
+        below = _named_nodes(_list(node, "children") for node in nodes)
+        roots = [index for index in range(len(nodes)) if index not in below]
+    else:
+        roots = _list(gltf.entry("scenes", scene), "nodes")
     waiting = [(index, np.eye(4), True) for index in reversed(roots)]
-    levels = [_list(extension(node, LEVELS), "ids") for node in gltf.entries("nodes")]
-    coarser = {index for ids in levels for index in ids if type(index) is int}
     matrices: dict[int, np.ndarray] = {}
     hidden = set()
     while waiting:
@@ -431,12 +419,8 @@ def _world_matrices(gltf: Gltf, roots: list[Any]) -> tuple[dict[int, np.ndarray]
     return matrices, hidden
 
 
-def _roots(gltf: Gltf, scene: int | None) -> list[Any]:
-    if scene is not None:
-        return _list(gltf.entry("scenes", scene), "nodes")
-    nodes = gltf.entries("nodes")
-    below = {child for node in nodes for child in _list(node, "children") if type(child) is int}
-    return [index for index in range(len(nodes)) if index not in below]
+def _named_nodes(lists: Iterable[list[Any]]) -> set[int]:
+    return {index for entries in lists for index in entries if type(index) is int}
 
 
 def _bones(gltf: Gltf, index: int, matrices: dict[int, np.ndarray]) -> np.ndarray:
@@ -463,10 +447,9 @@ def _bones(gltf: Gltf, index: int, matrices: dict[int, np.ndarray]) -> np.ndarra
     return bones @ columns.transpose(0, 2, 1)
 
 
-def _instances(gltf: Gltf, index: int) -> np.ndarray:
+def _instances(gltf: Gltf, node: Entry) -> np.ndarray:
     """Return the matrix of each instance of the mesh of a node; the identity if it has none."""
-    node = gltf.entry("nodes", index)
-    named = _object(extension(node, INSTANCES), "attributes")
+    named = member(extension(node, INSTANCES), "attributes")
     if not named:
         return np.eye(4)[None]
     count = max(_whole(gltf.entry("accessors", accessor), "count") for accessor in named.values())
@@ -479,7 +462,7 @@ def _instances(gltf: Gltf, index: int) -> np.ndarray:
     return _compose(*columns)
 
 
-def _local_matrix(node: dict[str, Any]) -> np.ndarray:
+def _local_matrix(node: Entry) -> np.ndarray:
     if "matrix" in node:
         return _numbers(node, "matrix", [0.0] * 16).reshape(4, 4).T  # stored by columns
     return _compose(
@@ -510,27 +493,14 @@ def _mesh(gltf: Gltf, place: Placement) -> Piece:
     Parts that differ only in material share their vertices, as in the file.
     """
     primitives = _list(gltf.entry("meshes", place.mesh), "primitives")
-    sharing: dict[str, list[int]] = {}
-    for number, part in enumerate(primitives):
-        if _whole(part, "mode", TRIANGLES) in SURFACES:
-            _whole(part.get("attributes"), "POSITION")
-            placing = [
-                pair
-                for pair in part["attributes"].items()
-                if pair[0].startswith(("POSITION", *SKINS))
-            ]
-            key = json.dumps([sorted(placing), part.get("targets")])
-            sharing.setdefault(key, []).append(number)
     pieces = []
     total = 0
-    for numbers in sharing.values():
-        vertices, flips = _vertices(gltf, primitives[numbers[0]], place)
+    for numbers in families(primitives, ("POSITION", *SKINS)):
+        vertices, turned = _vertices(gltf, primitives[numbers[0]], place)
         total += len(vertices)
         faces = []
         for number in numbers:
-            corners = _faces(gltf, primitives[number], len(vertices))
-            turned = flips[corners].sum(axis=1) < 0 if len(flips) else np.zeros(len(corners), bool)
-            faces.append(np.where(turned[:, None], corners[:, ::-1], corners))
+            faces.append(turn_back(_faces(gltf, primitives[number], len(vertices)), turned))
             total += 1 + len(faces[-1])
             gltf.require_few(total)
         owners = np.repeat(numbers, [len(block) for block in faces])
@@ -538,12 +508,25 @@ def _mesh(gltf: Gltf, place: Placement) -> Piece:
     return _merge_pieces(pieces)
 
 
-def _vertices(gltf: Gltf, part: dict[str, Any], place: Placement) -> tuple[np.ndarray, np.ndarray]:
-    """Read the vertices of a primitive, and the sides that a skin turns them to, if there is one."""
+def families(primitives: list[Any], names: tuple[str, ...] = ("",)) -> list[list[int]]:
+    """Return the numbers of surfaces with the same targets and, of attributes that begin so, the same."""
+    found: dict[str, list[int]] = {}
+    for number, part in enumerate(primitives):
+        if _whole(part, "mode", TRIANGLES) in SURFACES:
+            _whole(part.get("attributes"), "POSITION")
+            same = {
+                key: index for key, index in part["attributes"].items() if key.startswith(names)
+            }
+            key = json.dumps([same, part.get("targets")], sort_keys=True)
+            found.setdefault(key, []).append(number)
+    return list(found.values())
+
+
+def _vertices(gltf: Gltf, part: Entry, place: Placement) -> tuple[np.ndarray, np.ndarray]:
+    """Read the vertices of a primitive, and the sides that a skin turns them to."""
     attributes = part["attributes"]
-    if extension(part, DRACO) and "bufferView" not in gltf.entry(
-        "accessors", attributes["POSITION"]
-    ):
+    accessor = gltf.entry("accessors", attributes["POSITION"])
+    if extension(part, DRACO) and "bufferView" not in accessor:
         raise FileFormatError(COMPRESSED.format(DRACO))
     vertices = read_accessor(gltf, attributes["POSITION"], 3)
     count = len(vertices)
@@ -551,54 +534,59 @@ def _vertices(gltf: Gltf, part: dict[str, Any], place: Placement) -> tuple[np.nd
         if weight and isinstance(target, dict) and "POSITION" in target:
             vertices = vertices + weight * read_column(gltf, target, "POSITION", 3, count)
     if place.bones is None:
-        return vertices, np.empty(0)
-    # Each set has four joints and weights, and the first one must be there.
-    joints = sorted({"JOINTS_0", *(name for name in attributes if name.startswith("JOINTS"))})
-    names = [*joints, *(name.replace(*SKINS) for name in joints)]
-    columns = {name: read_column(gltf, attributes, name, 4, count) for name in names}
-    weights = np.hstack([columns[name] for name in names[len(joints) :]])
-    n_odd = int((np.abs(weights.sum(axis=1) - 1.0) > SAME_SUM).sum())
+        return vertices, np.ones(count)
+    matrices, n_odd = pose_matrices(
+        attributes, lambda name: read_column(gltf, attributes, name, 4, count), place.bones
+    )
     if n_odd:
         gltf.notes.append(
             f"weights of {n_odd} vertices of a skin do not sum to 1, and were divided by their sum; "
             "vertices without weights follow their first joint"
         )
-    matrices = pose_matrices(columns, place.bones)
     return transform_points(matrices, vertices), sides(matrices)
 
 
-def pose_matrices(columns: Mapping[str, np.ndarray], bones: np.ndarray) -> np.ndarray:
-    """Return the mean matrix of the joints of each vertex (glTF 2.0, section 3.7.3.3)."""
-    names = sorted(name for name in columns if name.startswith(SKINS[0]))
-    joints = np.hstack([columns[name] for name in names])
-    weights = np.hstack([columns[name.replace(*SKINS)] for name in names])
-    weights[weights.sum(axis=1) == 0, 0] = 1.0
+def pose_matrices(
+    attributes: Iterable[str], read: Callable[[str], np.ndarray], bones: np.ndarray
+) -> tuple[np.ndarray, int]:
+    """Return the mean matrix of the joints of each vertex (glTF 2.0, section 3.7.3.3).
+
+    Return also how many vertices have weights that do not sum to 1.
+    """
+    # Each set has four joints and weights, and the first one must be there.
+    sets = sorted({"JOINTS_0", *(name for name in attributes if name.startswith("JOINTS"))})
+    joints, weights = (
+        np.hstack([read(name.replace("JOINTS", kind)) for name in sets]) for kind in SKINS
+    )
+    sums = weights.sum(axis=1)
+    n_odd = int((np.abs(sums - 1.0) > SAME_SUM).sum())
+    weights[sums == 0, 0] = 1.0
     weights /= weights.sum(axis=1, keepdims=True)
     joints = np.where(weights != 0, joints, 0).astype(np.int64)
-    bad = np.flatnonzero((joints >= len(bones)).any(axis=1))
+    bad, places = np.nonzero((joints < 0) | (joints >= len(bones)))
     if bad.size:
         raise FileFormatError(
             f"Joints of vertices must be within 0..{len(bones) - 1}; vertex {bad[0]} has joint "
-            f"{joints[bad[0]].max()}."
+            f"{joints[bad[0], places[0]]}."
         )
-    starts = np.arange(0, joints.size + 1, joints.shape[1])
-    means = csr_array((weights.ravel(), joints.ravel(), starts), shape=(len(joints), len(bones)))
-    return (means @ bones.reshape(-1, 16)).reshape(-1, 4, 4)
+    pairs = zip(weights.T, joints.T, strict=True)
+    return sum(weight[:, None, None] * bones[joint] for weight, joint in pairs), n_odd
 
 
 def transform_points(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Move points by a matrix each, or by one for all."""
-    moved = np.einsum("...ij,...j->...i", matrices[:, :3, :3], points)
-    return moved + matrices[:, :3, 3]
+    moved = np.einsum("...ij,...j->...i", matrices[..., :3, :3], points)
+    return moved + matrices[..., :3, 3]
 
 
-def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
+def _faces(gltf: Gltf, part: Entry, n_vertices: int) -> np.ndarray:
     """Read the triangles of a primitive: a list, a strip or a fan."""
     corners = np.arange(n_vertices)
     if "indices" in part:
         indices = read_accessor(gltf, part["indices"], 1)[:, 0]
-        is_known = (indices >= 0) & (indices < n_vertices) & (indices == np.floor(indices))
-        bad = np.flatnonzero(~is_known)
+        bad = np.flatnonzero(
+            (indices != np.floor(indices)) | (indices < 0) | (indices >= n_vertices)
+        )
         if bad.size:
             raise FileFormatError(
                 f"Indices of a primitive must be whole and within 0..{n_vertices - 1}; index {bad[0]} is "
@@ -619,7 +607,7 @@ def _faces(gltf: Gltf, part: dict[str, Any], n_vertices: int) -> np.ndarray:
     return corners[np.column_stack([place, place + 1 + odd, place + 2 - odd])]
 
 
-def read_column(gltf: Gltf, named: dict[str, Any], name: str, width: int, count: int) -> np.ndarray:
+def read_column(gltf: Gltf, named: Entry, name: str, width: int, count: int) -> np.ndarray:
     """Read one of several accessors that have a row each for the same things."""
     rows = read_accessor(gltf, _whole(named, name), width)
     if len(rows) != count:
@@ -631,8 +619,7 @@ def read_column(gltf: Gltf, named: dict[str, Any], name: str, width: int, count:
 
 def read_accessor(gltf: Gltf, index: Any, width: int) -> np.ndarray:
     """Read an accessor as float64, with as many numbers a row as `width`."""
-    is_normalized = gltf.entry("accessors", index).get("normalized") is True
-    return decode(raw_accessor(gltf, index, width), is_normalized)
+    return decode(*raw_accessor(gltf, index, width))
 
 
 def decode(rows: np.ndarray, is_normalized: bool) -> np.ndarray:
@@ -642,7 +629,7 @@ def decode(rows: np.ndarray, is_normalized: bool) -> np.ndarray:
     return rows.astype(np.float64)
 
 
-def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarray:
+def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> Column:
     """Return the rows of an accessor as they are stored, if possible without a copy; `wanted` numbers each."""
     accessor = gltf.entry("accessors", index)
     name = f"accessors[{index}]"
@@ -659,21 +646,19 @@ def raw_accessor(gltf: Gltf, index: Any, wanted: int | None = None) -> np.ndarra
     else:
         gltf.require_few(count)  # zeros take memory, and none of the file
         rows = np.zeros((count, width), kind)
-    if "sparse" not in accessor:
-        return rows
-    # Some rows are replaced.
-    sparse = accessor["sparse"]
-    n_replaced = _whole(sparse, "count")
-    places, values = (sparse.get(key) for key in ("indices", "values"))
-    kind_of_places = np.dtype(KINDS.get(_whole(places, "componentType"), "V0"))
-    chosen = _stored_rows(gltf, places, kind_of_places, 1, n_replaced, name).ravel()
-    if kind_of_places.kind != "u" or (chosen >= count).any():
-        raise FileFormatError(
-            f"{name} must replace rows that it has, 0..{count - 1}; it replaces {chosen[:5]}."
-        )
-    rows = rows.copy()
-    rows[chosen] = _stored_rows(gltf, values, kind, width, n_replaced, name)
-    return rows
+    if "sparse" in accessor:  # some rows are replaced
+        sparse = accessor["sparse"]
+        n_replaced = _whole(sparse, "count")
+        places, values = (sparse.get(key) for key in ("indices", "values"))
+        kind_of_places = np.dtype(KINDS.get(_whole(places, "componentType"), "V0"))
+        chosen = _stored_rows(gltf, places, kind_of_places, 1, n_replaced, name).ravel()
+        if kind_of_places.kind != "u" or (chosen >= count).any():
+            raise FileFormatError(
+                f"{name} must replace rows that it has, 0..{count - 1}; it replaces {chosen[:5]}."
+            )
+        rows = rows.copy()
+        rows[chosen] = _stored_rows(gltf, values, kind, width, n_replaced, name)
+    return rows, accessor.get("normalized") is True
 
 
 def _stored_rows(
@@ -717,7 +702,7 @@ def _whole(entry: Any, key: str, default: int | None = None) -> int:
     return value
 
 
-def _numbers(entry: dict[str, Any], key: str, default: list[float]) -> np.ndarray:
+def _numbers(entry: Entry, key: str, default: list[float]) -> np.ndarray:
     value = entry.get(key, default)
     known = isinstance(value, list) and len(value) == len(default)
     if not known or not all(type(part) in (int, float) and abs(part) <= LARGEST for part in value):

@@ -3,17 +3,17 @@
 import copy
 import json
 import mimetypes
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int
 from scipy.sparse import csr_array
 
 from eigenshape._errors import FileFormatError
-from eigenshape._files import read_regular
+from eigenshape.geometry.measure import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (
     Material,
@@ -23,103 +23,108 @@ from eigenshape.io.attributes import (
     linear_colors,
     plain_attributes,
     screen_colors,
-    unit_rows,
 )
 from eigenshape.io.carrying import interpolate
 from eigenshape.io.formats.gltf import (
     COMPRESSIONS,
     INSTANCES,
+    KINDS,
     LEVELS,
     SURFACES,
+    WIDTHS,
+    Column,
+    Entry,
     Gltf,
     Placement,
     Scene,
     decode,
-    decode_buffers,
+    decode_buffer,
     extension,
-    file_beside,
+    families,
+    member,
     pack,
+    place_triangles,
     pose_matrices,
     raw_accessor,
-    read_accessor,
+    read_beside,
     read_gltf,
-    read_scene,
     sides,
     transform_points,
+    turn_back,
     view_of,
 )
 from eigenshape.io.formats.rounding import rounding_loss
 from eigenshape.io.formats.stl import single_precision
 from eigenshape.io.opening import SourceFile
 
-COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
-TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+COMPONENTS = {kind[-2:]: number for number, kind in KINDS.items()}
+TYPES = {width: name for name, width in WIDTHS.items()}
 # What a document may hold besides a scene with materials.
 EXTRAS = ("skins", "animations", "cameras", "extensions")
 TANGENTS = "tangents, which viewers compute anew"
 MADE_ANEW = ("POSITION", "NORMAL", "TANGENT")
 # Attributes of vertices that are made anew, go to other formats or are named as skins.
 CARRIED = {*MADE_ANEW, "COLOR_0", "JOINTS_0", "WEIGHTS_0"}
+PBR = "pbrMetallicRoughness"
+KEPT_OF_MATERIALS = {"name", PBR, "baseColorFactor", "baseColorTexture", "metallicFactor"}
 # Extensions that copy, compress or replace the old geometry, or name its vertices by number.
-OF_GEOMETRY = (
+OF_GEOMETRY = {
     *COMPRESSIONS, INSTANCES, LEVELS, "EXT_instance_features", "EXT_mesh_manifold", "EXT_mesh_polygon",
     "EXT_mesh_primitive_edge_visibility", "CESIUM_primitive_outline", "FB_ngon_encoding",
-)  # fmt: skip
+}  # fmt: skip
 # A shape that lies this many times its size from the origin is written about its own middle: three
 # of the 24 binary digits of single precision are worth a node that is moved.
 FAR = 8
-Columns = dict[str, tuple[np.ndarray, bool]]  # numbers, and whether whole ones mean shares of one
+Columns = dict[str, Column]
 
 
 def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     """Return the attributes of the triangles of a scene, by face as in the mesh that was read."""
     gltf, scene = _open(source)
-    n_faces = len(scene.piece.faces)
-    corner_rows = scene.piece.rows[scene.piece.faces]
-    found: dict[str, Any] = {}
-    materials = [_material(gltf, source, entry) for entry in gltf.tree.get("materials", [])]
+    rows_of_corners = scene.piece.rows[scene.piece.faces]
+    found: Entry = {}
     nodes = list(scene.placements)
-    face_materials, face_groups, face_parts = np.full((3, n_faces), -1)
-    for part, (node, _, primitive, chosen) in enumerate(_placed_primitives(gltf, scene)):
-        named = primitive["attributes"]
-        number = primitive.get("material", -1)
-        face_materials[chosen], face_groups[chosen] = number, nodes.index(node)
-        face_parts[chosen] = part
+    parts, face_parts = _parts(scene)
+    face_materials, face_groups = np.full((2, len(face_parts)), -1)
+    for number, (node, place) in enumerate(parts):
+        chosen = np.flatnonzero(face_parts == number)
+        primitive = gltf.entry("meshes", scene.placements[node].mesh)["primitives"][place]
+        face_materials[chosen] = primitive.get("material", -1)
+        face_groups[chosen] = nodes.index(node)
         coordinates, transform = _base_coordinates(gltf, primitive)
-        columns = {"normals": ("NORMAL", (3,)), "texture_coordinates": (coordinates, (2,)),
-                   "colors": ("COLOR_0", (3, 4))}  # fmt: skip
-        for key, (name, widths) in columns.items():
-            if name not in named:
+        columns = {"normals": ("NORMAL", 3), "texture_coordinates": (coordinates, 2),
+                   "colors": ("COLOR_0", 4)}  # fmt: skip
+        for key, (name, width) in columns.items():
+            if name not in primitive["attributes"]:
                 continue
-            width = raw_accessor(gltf, named[name]).shape[1]
-            if width not in widths:
+            rows = decode(*raw_accessor(gltf, primitive["attributes"][name]))
+            if key == "colors" and rows.shape[1] == 3:
+                rows = np.pad(rows, ((0, 0), (0, 1)), constant_values=1.0)
+            if rows.shape[1] != width:
                 raise FileFormatError(
-                    f"{name} of a primitive must have {widths[0]} numbers each; it has {width}."
+                    f"{name} of a primitive must have {width} numbers each; it has {rows.shape[1]}."
                 )
-            rows = read_accessor(gltf, named[name], width)
-            if key == "colors" and width == 3:
-                rows = np.column_stack([rows, np.ones(len(rows))])
             if key == "texture_coordinates":
-                rows = _transform_coordinates(rows, transform)
+                rows = _upward_coordinates(rows, transform)
             default = 1.0 if key == "colors" else 0.0
-            table = found.setdefault(key, np.full((n_faces, 3, max(widths)), default))
-            table[chosen] = _take(rows, corner_rows[chosen], name)
-    if "texture_coordinates" in found:
-        found["texture_coordinates"][..., 1] = 1.0 - found["texture_coordinates"][..., 1]
+            table = found.setdefault(key, np.full((*mesh.faces.shape, width), default))
+            table[chosen] = _take(rows, rows_of_corners[chosen], name)
     if "colors" in found:
         found["colors"][..., :3] = screen_colors(found["colors"][..., :3])
         found["colors"] = np.rint(255 * found["colors"].clip(0, 1)).astype(np.uint8)
-    entries = [gltf.entry("nodes", node) for node in nodes]
     names = [
-        str(entry.get("name") or gltf.entry("meshes", entry["mesh"]).get("name", ""))
-        for entry in entries
+        str(
+            gltf.entry("nodes", node).get("name")
+            or gltf.entry("meshes", place.mesh).get("name", "")
+        )
+        for node, place in scene.placements.items()
     ]
     return replace(
         plain_attributes(mesh),
         face_parts=face_parts,
         face_materials=face_materials,
         face_groups=face_groups,
-        materials=tuple(materials),
+        materials=tuple(_material(gltf, source, entry) for entry in gltf.entries("materials")),
         groups=tuple(names),
         others=_others(gltf),
         source=source,
@@ -129,19 +134,14 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
 
 def _open(source: SourceFile) -> tuple[Gltf, Scene]:
     gltf = read_gltf(source.data, source.folder if source.suffix == ".gltf" else None)
-    return gltf, read_scene(gltf, source.scene)
+    return gltf, place_triangles(gltf, source.scene)
 
 
-def _placed_primitives(
-    gltf: Gltf, scene: Scene
-) -> Iterator[tuple[int, int, dict[str, Any], Int[np.ndarray, " k"]]]:
-    """Give the node, the number and the faces of each primitive of each node that has faces."""
-    for node in scene.placements:
-        primitives = gltf.entry("meshes", gltf.entry("nodes", node)["mesh"])["primitives"]
-        for number, primitive in enumerate(primitives):
-            chosen = (scene.nodes == node) & (scene.piece.primitives == number)
-            if chosen.any():
-                yield node, number, primitive, np.flatnonzero(chosen)
+def _parts(scene: Scene) -> tuple[list[list[int]], np.ndarray]:
+    """Return the node and the number of each primitive that has faces, and each face's primitive in this list."""
+    size = scene.piece.primitives.max() + 1
+    codes, owners = np.unique(scene.nodes * size + scene.piece.primitives, return_inverse=True)
+    return np.transpose(np.divmod(codes, size)).tolist(), owners
 
 
 def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
@@ -153,62 +153,54 @@ def _take(rows: np.ndarray, corners: np.ndarray, name: str) -> np.ndarray:
     return rows[corners]
 
 
-def _base_color(material: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = material.get("pbrMetallicRoughness", {})
-    return found
-
-
-def _base_coordinates(gltf: Gltf, primitive: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+def _base_coordinates(gltf: Gltf, primitive: Entry) -> tuple[str, Entry]:
     """Name the texture coordinates of the base color of a primitive, and what transforms them."""
     number = primitive.get("material", -1)
-    pbr = {} if number < 0 else _base_color(gltf.entry("materials", number))
+    pbr = {} if number < 0 else member(gltf.entry("materials", number), PBR)
     texture = pbr.get("baseColorTexture", {})
     transform = extension(texture, "KHR_texture_transform")
     return f"TEXCOORD_{transform.get('texCoord', texture.get('texCoord', 0))}", transform
 
 
-def _transform_coordinates(rows: np.ndarray, transform: dict[str, Any]) -> np.ndarray:
-    """Scale, turn and shift texture coordinates, whose v goes down (KHR_texture_transform)."""
+def _upward_coordinates(rows: np.ndarray, transform: Entry) -> np.ndarray:
+    """Scale, turn and shift texture coordinates (KHR_texture_transform), and let v go up."""
     angle = transform.get("rotation", 0.0)
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     scaled = rows * transform.get("scale", [1.0, 1.0])
-    turned: np.ndarray = scaled @ turn.T + transform.get("offset", [0.0, 0.0])
-    return turned
+    moved: np.ndarray = scaled @ turn + transform.get("offset", [0.0, 0.0])
+    return moved * [1, -1] + [0, 1]
 
 
-def _material(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> Material:
-    pbr = _base_color(entry)
+def _material(gltf: Gltf, source: SourceFile, entry: Entry) -> Material:
+    pbr = member(entry, PBR)
     *light, alpha = pbr.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])
     red, green, blue = screen_colors(np.array(light, dtype=np.float64)).tolist()
     image, image_name = None, ""
+    texture: Entry = {}
     if "baseColorTexture" in pbr:
         texture = gltf.entry("textures", pbr["baseColorTexture"].get("index"))
-        # Images of newer formats, such as WebP, are named by extensions.
-        named = [texture, *texture.get("extensions", {}).values()]
-        number = next((each["source"] for each in named if "source" in each), None)
-        if number is not None:
-            held = gltf.entry("images", number)
-            image, kind = _image(gltf, source, held)
-            ending = mimetypes.guess_extension(kind) or f".{kind.rpartition('/')[2]}"
-            ending = ".jpg" if kind == "image/jpeg" else ending
-            stem = Path(str(held.get("name") or held.get("uri", "")[:80])).name
-            stem = Path(stem).stem if not stem.startswith("data:") else ""
-            image_name = f"{stem or f'image{number}'}{ending}"
+    # Images of newer formats, such as WebP, are named by extensions.
+    named = [texture, *texture.get("extensions", {}).values()]
+    if numbers := [each["source"] for each in named if "source" in each]:
+        held = gltf.entry("images", numbers[0])
+        image, kind = _image(gltf, source, held)
+        uri = held.get("uri", "data:")
+        file = Path(str(held.get("name") or ("" if uri.startswith("data:") else uri)))
+        ending = mimetypes.guess_extension(kind) or f".{kind.rpartition('/')[2]}"
+        image_name = f"{file.stem or f'image{numbers[0]}'}{ending}"
     return Material(str(entry.get("name", "")), (red, green, blue, alpha), image, image_name)
 
 
-def _image(gltf: Gltf, source: SourceFile, entry: dict[str, Any]) -> tuple[bytes | None, str]:
+def _image(gltf: Gltf, source: SourceFile, entry: Entry) -> tuple[bytes | None, str]:
     """Return the bytes of an image, None if its file is missing, and its type."""
     if "bufferView" in entry:
         return bytes(view_of(gltf, entry["bufferView"])[0]), entry.get("mimeType", "image/png")
     uri = str(entry.get("uri", ""))
     kind = entry.get("mimeType") or mimetypes.guess_type(uri)[0] or "image/png"
     if uri.startswith("data:"):
-        return decode_buffers({"buffers": [{"uri": uri}]}, b"")[0], uri[5:].partition(";")[
-            0
-        ] or kind
+        return decode_buffer(0, entry, b"", None), kind
     try:
-        return read_regular(file_beside(0, uri, source.folder), "an image"), kind
+        return read_beside(0, uri, source.folder), kind
     except (OSError, FileFormatError):
         return None, kind
 
@@ -218,21 +210,18 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
     tree = gltf.tree
     names = [kind for kind in EXTRAS if tree.get(kind)]
     primitives = [part for mesh in tree.get("meshes", []) for part in mesh.get("primitives", [])]
-    further: set[str] = set()
-    for part in primitives:
-        further |= {*part["attributes"]} - CARRIED - {_base_coordinates(gltf, part)[0]}
+    tables = [{*part["attributes"]} - {_base_coordinates(gltf, part)[0]} for part in primitives]
+    further = set().union(*tables) - CARRIED
     names.extend(f"the values {name} of vertices" for name in sorted(further))
     if any("targets" in part for part in primitives):
         names.append("morph targets")
     if any(part.get("mode", 4) not in SURFACES for part in primitives):
         names.append("lines and points")
-    plain_pbr = {"baseColorFactor", "baseColorTexture", "metallicFactor"}
     for entry in tree.get("materials", []):
-        pbr = _base_color(entry)
-        is_metal = pbr.get("metallicFactor", 1.0) != 0.0  # our own files say 0
+        pbr = member(entry, PBR)
         is_clear = pbr.get("baseColorFactor", [1.0])[-1] < 1
-        plain = {"name", "pbrMetallicRoughness", *(["alphaMode"] if is_clear else [])}
-        if is_metal or set(entry) - plain or set(pbr) - plain_pbr:
+        further_keys = {*entry, *pbr} - KEPT_OF_MATERIALS - ({"alphaMode"} if is_clear else set())
+        if further_keys or pbr.get("metallicFactor") != 0.0:  # our own files say 0
             names.append("properties of materials other than color and image")
             break
     if len(tree.get("nodes", [])) > len(tree.get("meshes", [])):
@@ -241,18 +230,15 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
 
 
 class _Document:
-    """A glTF tree and its one buffer, to which accessors are added."""
+    """A glTF tree and the contents of its views, to which accessors are added."""
 
-    def __init__(self, tree: dict[str, Any], binary: bytes | bytearray = b"") -> None:
-        self.tree, self.binary = tree, bytearray(binary)
+    def __init__(self, tree: Entry, contents: Iterable[bytes | memoryview] = ()) -> None:
+        self.tree, self.contents = tree, list(contents)
 
     def add_view(self, data: bytes, **entry: Any) -> int:
-        self.binary += b"\0" * (-len(self.binary) % 4)
-        views: list[Any] = self.tree.setdefault("bufferViews", [])
-        place = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}
-        views.append({**place, **entry})
-        self.binary += data
-        return len(views) - 1
+        self.contents.append(data)
+        self.tree.setdefault("bufferViews", []).append(entry)
+        return len(self.contents) - 1
 
     def add_accessor(self, rows: np.ndarray, view: int, **entry: Any) -> int:
         accessors: list[Any] = self.tree.setdefault("accessors", [])
@@ -265,41 +251,40 @@ class _Document:
         found = {}
         for name, (values, is_normalized) in columns.items():
             rows = np.ascontiguousarray(values)
-            size = rows.dtype.itemsize * rows.shape[1]
-            step = size + -size % 4  # rows of attributes begin at multiples of four bytes
-            padded = np.zeros((len(rows), step), np.uint8)
-            padded[:, :size] = rows.view(np.uint8).reshape(len(rows), size)
-            view = self.add_view(padded.tobytes(), byteStride=step, target=34962)
-            facts: dict[str, Any] = {"normalized": True} if is_normalized else {}
+            octets = rows.view(np.uint8).reshape(len(rows), -1)
+            # Rows of attributes begin at multiples of four bytes.
+            padded = np.pad(octets, ((0, 0), (0, -octets.shape[1] % 4)))
+            view = self.add_view(padded.tobytes(), byteStride=padded.shape[1], target=34962)
+            facts: Entry = {"normalized": True} if is_normalized else {}
             if name == "POSITION":
                 facts |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
             found[name] = self.add_accessor(rows, view, **facts)
         return found
 
-    def add_indices(self, indices: Int[np.ndarray, " c"], n_vertices: int) -> int:
+    def add_indices(self, indices: np.ndarray, n_vertices: int) -> int:
         rows = indices.astype("<u2" if n_vertices < 2**16 - 1 else "<u4").reshape(-1, 1)
         return self.add_accessor(rows, self.add_view(rows.tobytes(), target=34963))
 
     def pack(self) -> bytes:
-        """Write the document, without the parts of its buffer that nothing uses."""
-        views = self.tree.get("bufferViews", [])
+        """Write the document, without views that nothing uses."""
         users = list(_view_users(self.tree))
-        used = sorted({user["bufferView"] for user in users})
-        kept = bytearray()
-        for index in used:
-            start = views[index].get("byteOffset", 0)
-            views[index]["byteOffset"] = len(kept)
-            kept += self.binary[start : start + views[index]["byteLength"]]
-            kept += b"\0" * (-len(kept) % 4)
-        places = {index: place for place, index in enumerate(used)}
+        views: list[Entry] = []
+        places = {}
+        binary = bytearray()
+        for index in sorted({user["bufferView"] for user in users}):
+            data = self.contents[index]
+            places[index] = len(views)
+            place = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(data)}
+            views.append({**self.tree["bufferViews"][index], **place})
+            binary += data
+            binary += b"\0" * (-len(binary) % 4)
         for user in users:
             user["bufferView"] = places[user["bufferView"]]
-        self.tree["bufferViews"] = [views[index] for index in used]
-        self.tree["buffers"] = [{"byteLength": len(kept)}]
-        return pack(self.tree, bytes(kept))
+        self.tree |= {"bufferViews": views, "buffers": [{"byteLength": len(binary)}]}
+        return pack(self.tree, bytes(binary))
 
 
-def _view_users(value: Any) -> Iterator[dict[str, Any]]:
+def _view_users(value: Any) -> Iterator[Entry]:
     """Give all objects of a tree that name a view; extensions do so by the same key."""
     if isinstance(value, dict):
         if type(value.get("bufferView")) is int:
@@ -332,16 +317,15 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     gltf, scene = _open(source)
     document = _copy_document(gltf, source, job.lost)
     file_rows = scene.piece.rows[scene.piece.faces.ravel()]
-    parts = [(node, number) for node, number, _, _ in _placed_primitives(gltf, scene)]
-    nodes, primitive_numbers = np.array(parts)[attributes.face_parts].T
+    nodes, primitive_numbers = np.array(_parts(scene)[0])[attributes.face_parts].T
     places = mesh.vertices[mesh.faces]
     found = np.zeros_like(places)  # where the written file puts the corners
     normals = corner_normals(attributes, mesh)
-    written: dict[int, list[dict[str, Any]]] = {}
+    written: dict[int, list[Entry]] = {}
     for node, place in scene.placements.items():
         primitives = gltf.entry("meshes", place.mesh)["primitives"]
         written[node] = [part for part in primitives if part.get("mode", 4) not in SURFACES]
-        for numbers in _sharing(primitives):
+        for numbers in families(primitives):
             shared = primitives[numbers[0]]
             chosen = np.flatnonzero((nodes == node) & np.isin(primitive_numbers, numbers))
             if not chosen.size:
@@ -353,33 +337,25 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
             blends = csr_array((blends.data, inverse.ravel(), blends.indptr))
             columns = _carry_columns(gltf, shared, rows, blends)
             old = decode(*columns[0].pop("POSITION"))
-            normal = (
-                normals[chosen].reshape(-1, 3)
-                if normals is not None and "NORMAL" in shared["attributes"]
-                else None
-            )
+            normal = np.empty((blends.shape[0], 0))
+            if normals is not None and "NORMAL" in shared["attributes"]:
+                normal = normals[chosen].reshape(-1, 3)
             # Corners of the file agree if their rows do, others if all their values do.
             keys = [rows[blends.indices]]
             if blends.nnz > 3 * len(chosen):
-                keys = [
-                    column
-                    for table in columns
-                    for values, _ in table.values()
-                    for column in values.T
-                ]
-            keys += [] if normal is None else [*np.rint(normal.T * 1e5)]
-            first, indices = _split_corners([mesh.faces[chosen].ravel(), *keys])
+                keys = [values for table in columns for values, _ in table.values()]
+            first, indices = _split_corners(
+                [mesh.faces[chosen].ravel(), *keys, np.rint(normal * 1e5)]
+            )
             columns = [_choose_rows(table, first) for table in columns]
             wanted = places[chosen].reshape(-1, 3)[first]
-            facing = None if normal is None else normal[first]
-            turned, put = _place_vertices(place, columns, old[first], wanted, facing)
+            turned, put = _place_vertices(place, columns, old[first], wanted, normal[first])
             triangles = indices.reshape(-1, 3)
             found[chosen] = put[triangles]
-            # A reflection turns triangles over, and the reader has turned them back.
-            flips = turned[triangles].sum(axis=1) < 0
-            triangles = np.where(flips[:, None], triangles[:, ::-1], triangles)
-            job.lost.extend([TANGENTS] if "TANGENT" in shared["attributes"] else [])
-            changed: dict[str, Any] = {"attributes": document.add_columns(columns[0])}
+            triangles = turn_back(triangles, turned)  # as the reader does
+            if "TANGENT" in shared["attributes"]:
+                job.lost.append(TANGENTS)
+            changed: Entry = {"attributes": document.add_columns(columns[0])}
             if columns[1:]:
                 changed["targets"] = [document.add_columns(table) for table in columns[1:]]
             for number in np.unique(primitive_numbers[chosen]).tolist():
@@ -395,13 +371,11 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     return document.pack()
 
 
-def _choose_rows(columns: Columns, chosen: Int[np.ndarray, " n"]) -> Columns:
+def _choose_rows(columns: Columns, chosen: np.ndarray) -> Columns:
     return {name: (values[chosen], flag) for name, (values, flag) in columns.items()}
 
 
-def _carry_columns(
-    gltf: Gltf, part: dict[str, Any], rows: Int[np.ndarray, " r"], blends: csr_array
-) -> list[Columns]:
+def _carry_columns(gltf: Gltf, part: Entry, rows: np.ndarray, blends: csr_array) -> list[Columns]:
     """Return the attributes of a primitive at new corners, and those of each of its morph targets.
 
     Normals, but those of targets, and tangents are made anew.
@@ -422,9 +396,9 @@ def _place_vertices(
     columns: list[Columns],
     old: np.ndarray,
     places: np.ndarray,
-    normals: np.ndarray | None,
+    normals: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Add the positions that a node moves into places, and normals, to the columns of vertices.
+    """Add the positions that a node moves into places, and normals if there are any, to the columns of vertices.
 
     What stays in its place keeps its old position, also below a node or joint of scale 0. Return
     the side that each vertex is turned to, and the place of its rounded position.
@@ -432,16 +406,16 @@ def _place_vertices(
     table, *targets = columns
     pose = place.matrix[None]
     if place.bones is not None:
-        pose = pose_matrices({name: decode(*column) for name, column in table.items()}, place.bones)
+        pose, _ = pose_matrices(table, lambda name: decode(*table[name]), place.bones)
     linear = pose[:, :3, :3]
     shifts, turns = (_morph(place, targets, name) for name in ("POSITION", "NORMAL"))
     moves = places - transform_points(pose, old + shifts)
     with np.errstate(over="ignore"):  # what is too large is found when places are compared
         local = (old + np.einsum("...ij,...j->...i", np.linalg.pinv(linear), moves)).astype("<f4")
     table["POSITION"] = local, False
-    if normals is not None:
-        normals = unit_rows(np.einsum("...ji,...j->...i", linear, normals))
-        table["NORMAL"] = unit_rows(normals - turns).astype("<f4"), False
+    if normals.size:
+        normals = unit_vectors(np.einsum("...ji,...j->...i", linear, normals))
+        table["NORMAL"] = unit_vectors(normals - turns).astype("<f4"), False
     return np.broadcast_to(sides(pose), len(local)), transform_points(pose, local + shifts)
 
 
@@ -451,36 +425,26 @@ def _morph(place: Placement, targets: list[Columns], name: str) -> Any:
     return sum(weight * decode(*target[name]) for weight, target in pairs if name in target)
 
 
-def _drop_extensions(tree: dict[str, Any], nodes: Iterable[int]) -> list[str]:
+def _drop_extensions(tree: Entry, nodes: Iterable[int]) -> list[str]:
     """Drop the extensions of some nodes and their meshes that belong to the old geometry, and name them."""
     owners = [tree["nodes"][node] for node in nodes]
     meshes = [tree["meshes"][owner["mesh"]] for owner in owners if "mesh" in owner]
     parts = [part for mesh in meshes for part in mesh["primitives"]]
-    dropped: set[str] = set()
+    dropped = set()
     for entry in [*owners, *meshes, *parts, *tree["bufferViews"]]:
-        extensions = entry.pop("extensions", {})
-        kept = {name: value for name, value in extensions.items() if name not in OF_GEOMETRY}
-        dropped |= extensions.keys() - kept.keys()
-        if kept:
-            entry["extensions"] = kept
+        extensions = entry.get("extensions", {})
+        for name in extensions.keys() & OF_GEOMETRY:
+            del extensions[name]
+            dropped.add(name)
+        if not extensions:
+            entry.pop("extensions", None)
     text = json.dumps(tree)
     for key in ("extensionsUsed", "extensionsRequired"):
         names = tree.pop(key, [])
         still_used = [name for name in names if name not in dropped or f'"{name}":' in text]
-        if still_used:
-            tree[key] = still_used
+        tree |= {key: still_used} if still_used else {}
     return [f"the extension {name}, which is about the old geometry"
             for name in sorted(dropped.difference(COMPRESSIONS))]  # fmt: skip
-
-
-def _sharing(primitives: list[dict[str, Any]]) -> list[list[int]]:
-    """Return the numbers of surfaces that share their vertices and differ in material alone."""
-    families: dict[str, list[int]] = {}
-    for number, part in enumerate(primitives):
-        if part.get("mode", 4) in SURFACES:
-            key = json.dumps([part["attributes"], part.get("targets")], sort_keys=True)
-            families.setdefault(key, []).append(number)
-    return list(families.values())
 
 
 def _split_corners(keys: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -491,28 +455,20 @@ def _split_corners(keys: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return first, indices.ravel()
 
 
-def _blend(
-    gltf: Gltf, index: int, name: str, rows: Int[np.ndarray, " r"], blends: csr_array
-) -> tuple[np.ndarray, bool]:
+def _blend(gltf: Gltf, index: int, name: str, rows: np.ndarray, blends: csr_array) -> Column:
     """Interpolate an attribute; joints, whose weights go along, and numbers of things are only chosen."""
-    values = _take(raw_accessor(gltf, index), rows, name)
+    values, is_normalized = raw_accessor(gltf, index)
+    values = _take(values, rows, name)
     is_chosen = name.startswith(("JOINTS", "WEIGHTS"))
     is_chosen |= name.startswith("_") and values.dtype.kind in "iu"
-    is_normalized = gltf.entry("accessors", index).get("normalized") is True
     return interpolate(blends, values, blend=not is_chosen), is_normalized
 
 
 def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document:
-    """Copy a tree, with all buffers and images of other files in one buffer."""
+    """Copy a tree, with the contents of its views, and images of other files as views."""
     tree = copy.deepcopy(gltf.tree)
-    starts, binary = [], bytearray()
-    for data in gltf.buffers:
-        starts.append(len(binary))
-        binary += data + b"\0" * (-len(data) % 4)
-    for view in tree.get("bufferViews", []):
-        view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
-        view["buffer"] = 0
-    document = _Document(tree, binary)
+    count = len(tree.get("bufferViews", []))
+    document = _Document(tree, [view_of(gltf, index)[0] for index in range(count)])
     for entry in tree.get("images", []):
         uri = str(entry.get("uri", "data:"))
         if uri.startswith("data:"):
@@ -527,89 +483,83 @@ def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document
     return document
 
 
-def _replace_meshes(tree: dict[str, Any], written: dict[int, list[dict[str, Any]]]) -> None:
+def _replace_meshes(tree: Entry, written: dict[int, list[Entry]]) -> None:
     """Give each node a mesh of its new primitives, and empty the accessors that they replace."""
     nodes, meshes = tree["nodes"], tree["meshes"]
-    before = copy.deepcopy(meshes)
-    first_user: dict[int, int] = {}
-    for node, entry in enumerate(nodes):
-        first_user.setdefault(entry.get("mesh", -1), node)
+    before = _accessors_of(meshes)
+    users = Counter(node.get("mesh") for node in nodes)
     for node, primitives in written.items():
         index = nodes[node]["mesh"]
+        users[index] -= 1
+        mesh = {**meshes[index], "primitives": primitives}
         if not primitives:
             del nodes[node]["mesh"]  # all its faces were dropped
             nodes[node].pop("skin", None)
-        elif first_user[index] == node:
-            meshes[index] = {**before[index], "primitives": primitives}
+        elif not users[index]:
+            meshes[index] = mesh
         else:  # several nodes share a mesh, and each has its own positions now
             nodes[node]["mesh"] = len(meshes)
-            meshes.append({**before[index], "primitives": primitives})
-    still_used = {index for mesh in meshes for index in _accessors_of(mesh)}
-    for animation in tree.get("animations", []):
-        still_used |= {s[key] for s in animation.get("samplers", []) for key in ("input", "output")}
-    still_used |= {skin.get("inverseBindMatrices") for skin in tree.get("skins", [])}
-    for index in {index for mesh in before for index in _accessors_of(mesh)} - still_used:
+            meshes.append(mesh)
+    for index in before - _accessors_of(meshes):
         for key in ("bufferView", "byteOffset", "sparse", "min", "max"):
             tree["accessors"][index].pop(key, None)  # its data are left out when packed
 
 
-def _accessors_of(mesh: dict[str, Any]) -> Iterator[int]:
-    for part in mesh["primitives"]:
-        for columns in (part["attributes"], *part.get("targets", [])):
-            yield from columns.values()
-        if "indices" in part:
-            yield part["indices"]
+def _accessors_of(meshes: list[Entry]) -> set[int]:
+    parts = [part for mesh in meshes for part in mesh["primitives"]]
+    tables = [table for part in parts for table in (part["attributes"], *part.get("targets", []))]
+    indices = {part["indices"] for part in parts if "indices" in part}
+    return indices.union(*(table.values() for table in tables))
 
 
 def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
     """Write a GLB file with a node for each group and a primitive for each of its materials."""
     document = _Document({"asset": {"version": "2.0", "generator": "eigenshape"}, "scene": 0})
-    tree = document.tree
-    tree |= {"scenes": [{"nodes": []}], "nodes": [], "meshes": []}
+    nodes: list[Entry] = []
+    meshes: list[Entry] = []
     places, offset = _local_places(mesh)
-    normals = corner_normals(attributes, mesh)
     if attributes.materials:
-        tree["materials"] = [_write_material(document, m) for m in attributes.materials]
-    tables: Columns = {}  # with a row for each corner
+        document.tree["materials"] = [_write_material(document, m) for m in attributes.materials]
+    tables = {}  # with rows for the corners of each face
+    normals = corner_normals(attributes, mesh)
     if normals is not None:
-        tables["NORMAL"] = normals.astype("<f4"), False
+        tables["NORMAL"] = normals
     if attributes.texture_coordinates is not None:
-        flipped = [0, 1] + attributes.texture_coordinates * [1, -1]
-        tables["TEXCOORD_0"] = flipped.astype("<f4"), False
+        tables["TEXCOORD_0"] = [0, 1] + attributes.texture_coordinates * [1, -1]
     if attributes.colors is not None:
-        tints = attributes.colors / 255
-        tints[..., :3] = linear_colors(tints[..., :3])
         # Other programs keep the low byte of colors of 16 bits (trimesh 5.2, MeshLab).
-        tables["COLOR_0"] = tints.astype("<f4"), False
+        tables["COLOR_0"] = attributes.colors / 255
+        tables["COLOR_0"][..., :3] = linear_colors(tables["COLOR_0"][..., :3])
     groups = np.unique(attributes.face_groups)
     for group in groups:
         in_group = np.flatnonzero(attributes.face_groups == group)
         corners = mesh.faces[in_group].ravel()
         rows = {
-            name: (table[in_group].reshape(-1, table.shape[2]), is_normalized)
-            for name, (table, is_normalized) in tables.items()
+            name: table[in_group].reshape(len(corners), -1).astype("<f4")
+            for name, table in tables.items()
         }
         if not tables and len(groups) == 1:  # vertices keep their order, also those without a face
             first, indices, positions = np.arange(mesh.n_vertices), corners, places
         else:
-            keys = [corners, *(column for values, _ in rows.values() for column in values.T)]
-            first, indices = _split_corners(keys)
+            first, indices = _split_corners([corners, *rows.values()])
             positions = places[corners]
-        table = document.add_columns(_choose_rows({"POSITION": (positions, False), **rows}, first))
-        materials = attributes.face_materials[in_group]
-        primitives: list[dict[str, Any]] = []
-        for material in np.unique(materials).tolist():
-            of_part = np.repeat(materials == material, 3)
-            entry = {
-                "attributes": table,
-                "indices": document.add_indices(indices[of_part], len(first)),
+        columns = document.add_columns(
+            {
+                name: (values[first], False)
+                for name, values in {"POSITION": positions, **rows}.items()
             }
-            primitives.append(entry | ({"material": material} if material >= 0 else {}))
-        name = attributes.groups[group] if group >= 0 else ""
-        tree["scenes"][0]["nodes"].append(len(tree["nodes"]))
-        node = {"mesh": len(tree["meshes"]), **({"name": name} if name else {})}
-        tree["nodes"].append(node | ({"translation": offset.tolist()} if offset.any() else {}))
-        tree["meshes"].append({"primitives": primitives})
+        )
+        materials = attributes.face_materials[in_group]
+        primitives: list[Entry] = []
+        for material in np.unique(materials).tolist():
+            of_part = indices[np.repeat(materials == material, 3)]
+            part = {"attributes": columns, "indices": document.add_indices(of_part, len(first))}
+            primitives.append(part | ({"material": material} if material >= 0 else {}))
+        node = {"mesh": len(meshes), "name": attributes.groups[group] if group >= 0 else ""}
+        nodes.append(node | ({"translation": offset.tolist()} if offset.any() else {}))
+        meshes.append({"primitives": primitives})
+    scenes = [{"nodes": list(range(len(nodes)))}]
+    document.tree |= {"scenes": scenes, "nodes": nodes, "meshes": meshes}
     return document.pack()
 
 
@@ -627,10 +577,10 @@ def _local_places(
     return (mesh.vertices - middle).astype(np.float32), middle
 
 
-def _write_material(document: _Document, material: Material) -> dict[str, Any]:
+def _write_material(document: _Document, material: Material) -> Entry:
     *tint, alpha = material.color
     color = [*linear_colors(np.array(tint)).tolist(), alpha]
-    pbr: dict[str, Any] = {"baseColorFactor": color, "metallicFactor": 0.0}
+    pbr: Entry = {"baseColorFactor": color, "metallicFactor": 0.0}
     if material.image is not None:
         tree = document.tree
         images, textures = tree.setdefault("images", []), tree.setdefault("textures", [])
@@ -639,5 +589,5 @@ def _write_material(document: _Document, material: Material) -> dict[str, Any]:
         images.append({"bufferView": view, "mimeType": kind, "name": material.image_name})
         textures.append({"source": len(images) - 1})
         pbr["baseColorTexture"] = {"index": len(textures) - 1}
-    see_through = {"alphaMode": "BLEND"} if material.color[3] < 1 else {}
-    return {"name": material.name, "pbrMetallicRoughness": pbr, **see_through}
+    see_through = {"alphaMode": "BLEND"} if alpha < 1 else {}
+    return {"name": material.name, PBR: pbr, **see_through}

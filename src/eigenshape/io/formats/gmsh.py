@@ -11,13 +11,21 @@ Refused: versions 1 and 3; a mesh of Ansys, with the call of meshio that convert
 """
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.cells import CellLists, Cells, require_splittable
-from eigenshape.io.formats.numbers import Cursor, quote_line, wholes
+from eigenshape.io.formats.cells import CellLists, ParsedShape, require_splittable
+from eigenshape.io.formats.numbers import (
+    Cursor,
+    find_keys,
+    quote_line,
+    require_distinct,
+    whole,
+    wholes,
+)
 from eigenshape.io.formats.vtk_cells import (
     HEXAHEDRON,
     LINE,
@@ -27,6 +35,7 @@ from eigenshape.io.formats.vtk_cells import (
     TRIANGLE,
     VERTEX,
     WEDGE,
+    TypedCells,
     sort_cells,
 )
 
@@ -50,13 +59,13 @@ LEFT_OUT = {
     b"ElementData": "fields on elements",
     b"ElementNodeData": "fields on corners of elements",
 }
-NODE = np.dtype([("tag", "<i4"), ("place", "<f8", 3)])  # of a binary file of version 2
 RULE = "Nodes and elements of a gmsh file must be as it declares them"
 
+Nodes = tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n width"]]  # tags, and places
 Rows = list[tuple[int, Int[np.ndarray, "_ _"]]]  # gmsh's number of a type, and tags of nodes
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...]]:
+def parse(data: bytes) -> ParsedShape:
     """Return points, cells by kind, and notes.
 
     Raise FileFormatError if a section is missing or occurs twice, or nodes and elements are not as
@@ -79,26 +88,27 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...
         raise FileFormatError(
             "A binary gmsh file must have the order of bytes of this machine. Save it anew as text."
         )
-    if is_text and b"$ParametricNodes" in data:
+    is_parametric = b"$ParametricNodes" in data
+    if is_parametric and not is_text:
+        raise FileFormatError(
+            "Nodes of a binary gmsh file of version 2 must have three coordinates; these have "
+            "parametric ones, too. Save it without (Mesh.SaveParametric = 0)."
+        )
+    in_nodes = _section(data, b"ParametricNodes" if is_parametric else b"Nodes")
+    if is_parametric:
         # Places on curves and surfaces follow the coordinates.
-        lines = _section(data, b"ParametricNodes").splitlines()
-        in_nodes = b"\n".join([b" ".join(line.split()[:4]) for line in lines]) + b"\n"
-    else:
-        if b"$ParametricNodes" in data:
-            raise FileFormatError(
-                "Nodes of a binary gmsh file of version 2 must have three coordinates; these have "
-                "parametric ones, too. Save it without (Mesh.SaveParametric = 0)."
-            )
-        in_nodes = _section(data, b"Nodes")
+        lines = in_nodes.splitlines()
+        in_nodes = b"\n".join([*[b" ".join(line.split()[:4]) for line in lines], b""])
     nodes = Cursor(in_nodes, "A gmsh file", is_text=is_text)
     elements = Cursor(_section(data, b"Elements"), "A gmsh file", is_text=is_text)
     if version >= 4:
         tags, points = _node_blocks(nodes, size, version)
         rows = _element_blocks(elements, size, version)
     else:
-        tags, points = _plain_nodes(nodes, _plain_count(nodes))
+        tags, points = _tagged_nodes(nodes, _count(nodes))
+        nodes.require_end()
         read_elements = _listed_elements if is_text else _plain_elements
-        rows = read_elements(elements, _plain_count(elements))
+        rows = read_elements(elements, _count(elements))
     lost = [what for section, what in LEFT_OUT.items() if b"$" + section in data]
     notes = [f"its {', '.join(lost)} are not kept"] if lost else []
     shape = sort_cells(points, *_cells(tags, rows))
@@ -117,26 +127,19 @@ def _section(data: bytes, name: bytes) -> bytes:
     return data[starts[0] : end]
 
 
-def _plain_count(section: Cursor) -> int:
+def _count(section: Cursor) -> int:
     """Return the count before a section of version 2, which is text in binary files, too."""
-    head = (
-        section if section.is_text else Cursor(section.line() + b"\n", section.what, is_text=True)
-    )
-    return int(head.wholes("<i8", 1)[0])
+    line = section.line()
+    return whole(line, (1, line), "The count of a section")
 
 
-def _plain_nodes(
-    section: Cursor, count: int
-) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
-    """Read nodes of version 2: a tag and three coordinates for each node."""
+def _tagged_nodes(section: Cursor, count: int, width: int = 3) -> Nodes:
+    """Read nodes of version 2 and 4.0: a tag and coordinates for each node."""
     if section.is_text:
-        table = section.take("<f8", 4 * count).reshape(-1, 4)
-        tags, points = wholes(table[:, 0], "Node tags of a gmsh file"), table[:, 1:]
-    else:
-        nodes = section.take(NODE, count)
-        tags, points = nodes["tag"].astype(np.int64), nodes["place"].astype(np.float64)
-    section.require_end()
-    return tags, points
+        table = section.take("<f8", (1 + width) * count).reshape(-1, 1 + width)
+        return wholes(table[:, 0], "Node tags of a gmsh file"), table[:, 1:]
+    nodes = section.take([("tag", "<i4"), ("place", "<f8", width)], count)
+    return nodes["tag"].astype(np.int64), nodes["place"].astype(np.float64)
 
 
 def _listed_elements(section: Cursor, count: int) -> Rows:
@@ -147,16 +150,15 @@ def _listed_elements(section: Cursor, count: int) -> Rows:
     starts: dict[int, list[int]] = {}
     for index in range(count):
         kind, n_tags = words[place + 1 : place + 3] if place + 3 <= n_words else (1, -1)
-        _require_known([kind])
         place += 3 + n_tags
         starts.setdefault(kind, []).append(place)
-        place += ELEMENTS[kind][1]
+        place += _n_nodes(kind)
         if n_tags < 0 or place > n_words:
             raise FileFormatError(f"{RULE}; element {index} of {count} is not whole.")
     if place != n_words:
         raise FileFormatError(f"{RULE}; more follows after the last of {count} elements.")
     return [
-        (kind, flat[np.array(some)[:, None] + np.arange(ELEMENTS[kind][1])])
+        (kind, flat[np.array(some)[:, None] + np.arange(_n_nodes(kind))])
         for kind, some in starts.items()
     ]
 
@@ -169,12 +171,11 @@ def _plain_elements(section: Cursor, count: int) -> Rows:
     rows: Rows = []
     while count > 0:
         kind, height, n_tags = section.take("<i4", 3).tolist()
-        _require_known([kind])
         if not (0 < height <= count and n_tags >= 0):
             raise FileFormatError(
                 f"{RULE}; a block declares {height} elements with {n_tags} tags each."
             )
-        width = 1 + n_tags + ELEMENTS[kind][1]
+        width = 1 + n_tags + _n_nodes(kind)
         block = section.take("<i4", height * width).reshape(height, width)
         rows.append((kind, block[:, 1 + n_tags :]))
         count -= height
@@ -182,97 +183,77 @@ def _plain_elements(section: Cursor, count: int) -> Rows:
     return rows
 
 
-def _node_blocks(
-    section: Cursor, size: str, version: float
-) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
-    """Read nodes of version 4: counts, then blocks of a head, tags and coordinates.
-
-    In version 4.0 each tag stands before its coordinates.
-    """
+def _blocks(
+    section: Cursor, size: str, version: float, what: str
+) -> Iterator[tuple[list[int], int]]:
+    """Yield the head of each block of version 4, and the number of its rows."""
     n_blocks, total, *_ = section.wholes(size, 4 if version > 4 else 2).tolist()
-    tags, points = [np.empty(0, dtype=np.int64)], [np.empty((0, 3))]
+    found = 0
     for _ in range(n_blocks):
         head = section.wholes("<i4", 3).tolist()
+        height = int(section.wholes(size, 1)[0])
+        found += height
+        yield head, height
+    section.require_end()
+    if found != total:
+        raise FileFormatError(f"{RULE}; it declares {total} {what} and holds {found}.")
+
+
+def _node_blocks(section: Cursor, size: str, version: float) -> Nodes:
+    """Read blocks of tags and coordinates; in version 4.0 each tag stands before its coordinates."""
+    tags, points = [np.empty(0, dtype=np.int64)], [np.empty((0, 3))]
+    for head, height in _blocks(section, size, version, "nodes"):
         dim = head[0] if version > 4 else head[1]
         # Places on a curve or surface follow the coordinates.
         width = 3 + (dim if head[2] and 0 <= dim <= 3 else 0)
-        (height,) = section.wholes(size, 1).tolist()
         if version > 4:
-            tags.append(section.wholes(size, height))
+            found = section.wholes(size, height)
             places = section.take("<f8", width * height).reshape(-1, width)
-        elif section.is_text:
-            table = section.take("<f8", (1 + width) * height).reshape(-1, 1 + width)
-            tags.append(wholes(table[:, 0], "Node tags of a gmsh file"))
-            places = table[:, 1:]
         else:
-            rows = section.take([("tag", "<i4"), ("place", "<f8", width)], height)
-            tags.append(rows["tag"].astype(np.int64))
-            places = rows["place"]
+            found, places = _tagged_nodes(section, height, width)
+        tags.append(found)
         points.append(places[:, :3])
-    section.require_end()
-    _require_total(sum(map(len, tags)), total, "nodes")
     return np.concatenate(tags), np.concatenate(points)
 
 
 def _element_blocks(section: Cursor, size: str, version: float) -> Rows:
-    """Read elements of version 4: counts, then blocks of a head and rows of tag and nodes."""
-    n_blocks, total, *_ = section.wholes(size, 4 if version > 4 else 2).tolist()
+    """Read blocks of rows of tag and nodes."""
     rows: Rows = []
-    for _ in range(n_blocks):
-        _, _, kind = section.wholes("<i4", 3).tolist()
-        (height,) = section.wholes(size, 1).tolist()
+    for (_, _, kind), height in _blocks(section, size, version, "elements"):
         if height:
-            _require_known([kind])
-            width = 1 + ELEMENTS[kind][1]
+            width = 1 + _n_nodes(kind)
             block = section.wholes(size if version > 4 else "<i4", height * width)
             rows.append((kind, block.reshape(-1, width)[:, 1:]))
-    section.require_end()
-    _require_total(sum(len(block) for _, block in rows), total, "elements")
     return rows
 
 
-def _require_known(kinds: list[int]) -> None:
-    require_splittable(
-        [f"elements of gmsh's type {kind}" for kind in kinds if kind not in ELEMENTS]
-    )
+def _n_nodes(kind: int) -> int:
+    if kind not in ELEMENTS:
+        require_splittable([f"elements of gmsh's type {kind}"])
+    return ELEMENTS[kind][1]
 
 
-def _require_total(found: int, declared: int, what: str) -> None:
-    if found != declared:
-        raise FileFormatError(f"{RULE}; it declares {declared} {what} and holds {found}.")
-
-
-def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> tuple[CellLists, Int[np.ndarray, " c"]]:
+def _cells(tags: Int[np.ndarray, " n"], rows: Rows) -> TypedCells:
     """Return the elements and VTK's numbers of their types.
 
     Nodes have their place in the file instead of their tags.
 
-    Raise FileFormatError if tags are not positive and distinct, or an element refers to a tag
-    without node.
+    Raise FileFormatError if two nodes have one tag, or an element refers to a tag without node.
     """
-    if tags.size and tags.min() < 1:
+    if (tags < 1).any():
         raise FileFormatError(
             f"Node tags of a gmsh file must be 1 or more; the least is {tags.min()}."
         )
-    order = np.argsort(tags, kind="stable")
-    ascending = tags[order]
-    twice = np.flatnonzero(ascending[1:] == ascending[:-1])
-    if twice.size:
-        raise FileFormatError(
-            "Nodes of a gmsh file must have tags of their own; two have the tag "
-            f"{ascending[twice[0]]}."
-        )
     rows = [(kind, nodes) for kind, nodes in rows if ELEMENTS[kind][0] != VERTEX]
+    require_distinct(tags, "Node tags of a gmsh file")
     lists = CellLists.join(
         [CellLists(nodes.shape[1] * np.arange(len(nodes) + 1), nodes.ravel()) for _, nodes in rows]
     )
-    places = np.searchsorted(ascending, lists.corners).clip(max=max(len(tags) - 1, 0))
-    is_unknown = ascending[places] != lists.corners if tags.size else places >= 0
-    unknown = lists.corners[is_unknown]
+    places = find_keys(tags, lists.corners)
+    unknown = lists.corners[places < 0]
     if unknown.size:
         raise FileFormatError(
             f"Elements of a gmsh file must join its nodes; no node has the tag {unknown[0]}."
         )
-    types = [np.full(len(nodes), ELEMENTS[kind][0]) for kind, nodes in rows]
-    none = np.empty(0, dtype=np.int64)
-    return CellLists(lists.starts, order[places]), np.concatenate([none, *types])
+    types = np.array([ELEMENTS[kind][0] for kind, _ in rows], dtype=np.int64)
+    return CellLists(lists.starts, places), np.repeat(types, [len(nodes) for _, nodes in rows])

@@ -29,8 +29,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray | Cells]:
         )
     vertices, faces = arrays["vertices"], arrays["faces"]
     if (
-        vertices.ndim != 2
-        or faces.ndim != 2
+        not vertices.ndim == faces.ndim == 2
         or vertices.dtype.kind not in "fiu"
         or faces.dtype.kind not in "iu"
     ):

@@ -5,6 +5,7 @@ import contextlib
 import lzma
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,18 +27,8 @@ def lines_of(data: bytes, first: int = 1) -> list[Line]:
     return [line for line in bare if line[1]]
 
 
-def number_table(lines: Sequence[Line]) -> Float[np.ndarray, "n c"] | None:
+def number_table(lines: Sequence[Line], allowed: bytes = PLAIN) -> Float[np.ndarray, "n c"] | None:
     """Read a table of plain numbers at once; return None if the lines are no such table."""
-    return _table(lines, PLAIN)
-
-
-def whole_table(lines: Sequence[Line]) -> Int[np.ndarray, "n c"] | None:
-    """Read a table of plain whole numbers at once; return None if the lines are no such table."""
-    values = _table(lines, PLAIN_WHOLE)
-    return values.astype(np.int64) if values is not None and np.abs(values).max() < EXACT else None
-
-
-def _table(lines: Sequence[Line], allowed: bytes) -> np.ndarray | None:
     text = b"\n".join([text for _, text in lines])
     if not text.strip() or text.translate(None, allowed):
         return None
@@ -48,12 +39,16 @@ def _table(lines: Sequence[Line], allowed: bytes) -> np.ndarray | None:
     return values if len(values) == len(lines) else None  # loadtxt ignores empty lines
 
 
+def whole_table(lines: Sequence[Line]) -> Int[np.ndarray, "n c"] | None:
+    """Read a table of plain whole numbers at once; return None if the lines are no such table."""
+    values = number_table(lines, PLAIN_WHOLE)
+    return values.astype(np.int64) if values is not None and np.abs(values).max() < EXACT else None
+
+
 def coordinates(lines: Sequence[Line], *, least: int = 3) -> Float[np.ndarray, "n d"]:
     """Read the first three numbers of each line, or two if all lines have two and that is enough."""
     values = number_table(lines)
-    if values is not None and least == values.shape[1] == 2:
-        return values
-    if values is not None and values.shape[1] >= 3:
+    if values is not None and values.shape[1] >= least:
         return values[:, :3]
     rows = []
     for line in lines:
@@ -116,6 +111,24 @@ def wholes(numbers: Shaped[np.ndarray, " k"], what: str) -> Int[np.ndarray, " k"
     return numbers.astype(np.int64)
 
 
+def find_keys(keys: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the place of each value among the keys, or -1."""
+    if not len(keys):
+        return np.full(len(values), -1)
+    order = np.argsort(keys, kind="stable")
+    found = order[np.searchsorted(keys, values, sorter=order).clip(0, len(keys) - 1)]
+    return np.where(keys[found] == values, found, -1)
+
+
+def require_distinct(numbers: Int[np.ndarray, " k"], what: str) -> None:
+    """Raise an error if a number occurs twice."""
+    different, counts = np.unique(numbers, return_counts=True)
+    if (counts > 1).any():
+        raise FileFormatError(
+            f"{what} must differ; {different[counts.argmax()]} occurs twice or more."
+        )
+
+
 def quote_line(line: Line) -> str:
     """Quote a line, shortened if it is long."""
     return repr(line[1].strip()[:60].decode("latin-1"))
@@ -126,15 +139,23 @@ def rows_text(prefix: str, rows: np.ndarray) -> list[str]:
     return [prefix + " ".join(map(repr, row)) for row in rows.tolist()]
 
 
+def end_lines(lines: Sequence[str]) -> bytes:
+    """Return the content of a file of some lines."""
+    return ("\n".join(lines) + "\n").encode()
+
+
 # Compression ratios: a regular lattice of tetrahedra has 9 with zlib and 36 with LZMA, zeros 1,000.
 MOST_TIMES = 40
 ALWAYS = 2**25  # bytes that a file of any size may unpack to
+# Bytes for a volume: labels of a head, 256 voxels a side in 32 bits, are 64 MiB, and pack 200 times.
+VOLUME_SIZE = 2**28
 LZMA_MEMORY = 2**27  # bytes; level 9, the most that compressors use, needs 65 MiB
 ZLIB, LZMA, LZ4 = "vtkZLibDataCompressor", "vtkLZMADataCompressor", "vtkLZ4DataCompressor"
 COMPRESSORS = (ZLIB, LZMA, LZ4)
 USUAL_WORD = 16  # bytes of a number in a text file with the space after it
 
 
+@dataclass
 class Cursor:
     """A position in a file or a section of one, from which numbers and lines are taken in order.
 
@@ -149,8 +170,10 @@ class Cursor:
         Number of bytes before the position.
     """
 
-    def __init__(self, data: bytes, what: str, *, is_text: bool = False, place: int = 0) -> None:
-        self.data, self.what, self.is_text, self.place = data, what, is_text, place
+    data: bytes
+    what: str
+    is_text: bool = False
+    place: int = 0
 
     def line(self) -> bytes:
         """Return the next line that is not blank, without spaces around it; an empty one at the end."""
@@ -272,18 +295,14 @@ def _unpack_lz4(packed: bytes, size: int) -> bytes:
     while len(out) <= size:
         token = packed[place]
         place += 1
-        n_literals = token >> 4
-        if n_literals == 15:
-            n_literals, place = _long_length(packed, place)
+        n_literals, place = _length(packed, place, token >> 4)
         out += packed[place : place + n_literals]
         place += n_literals
         if place >= len(packed):  # the last sequence has no copy
             break
         back = packed[place] + 256 * packed[place + 1]
         place += 2
-        count = token & 15
-        if count == 15:
-            count, place = _long_length(packed, place)
+        count, place = _length(packed, place, token & 15)
         count = min(count + 4, size + 1 - len(out))
         start = len(out) - back
         if start < 0 or not back:
@@ -295,10 +314,11 @@ def _unpack_lz4(packed: bytes, size: int) -> bytes:
     return bytes(out)
 
 
-def _long_length(packed: bytes, place: int) -> tuple[int, int]:
-    """Return a length of 15 or more, to which bytes are added up to one below 255, and its end."""
-    total = 15
-    while packed[place] == 255:
-        total += 255
+def _length(packed: bytes, place: int, length: int) -> tuple[int, int]:
+    """Return a length, and its end: to 15, bytes are added up to one below 255."""
+    more = 255 if length == 15 else 0
+    while more == 255:
+        more = packed[place]
+        length += more
         place += 1
-    return total + packed[place], place + 1
+    return length, place

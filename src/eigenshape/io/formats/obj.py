@@ -12,7 +12,7 @@ import re
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from eigenshape._arrays import record
 from eigenshape._errors import FileFormatError
@@ -32,8 +32,6 @@ JOINT = re.compile(rb"\\\r?\n")
 KEPT = (b"vt", b"o", b"g", b"s", b"usemtl", b"mtllib")
 OTHER_LINES = {"l": "polylines", "p": "points"}
 AFTER_POSITION = re.compile(rb"(?<=\d)/\S*")  # a corner is position/texture/normal
-# A vertex, its texture coordinate from 1 or 0 for none, and its normal from 0 or -1 for none
-Corner = tuple[int, int, int]
 
 
 def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
@@ -42,24 +40,24 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     Vertices are in the plane if all of them have two numbers.
     """
     positions: list[Line] = []
-    cells: dict[bytes, list[Line]] = {b"f": [], b"l": []}
-    n_before: dict[bytes, list[int]] = {b"f": [], b"l": []}  # vertices before each
+    # Each with the number of vertices before it
+    cells: dict[bytes, list[tuple[Line, int]]] = {b"f": [], b"l": []}
     for number, text in lines_of(join_lines(data)):
         keyword = text.split(None, 1)[0]
         if keyword == b"v":
             positions.append((number, text[1:]))
         elif keyword in cells:
-            cells[keyword].append((number, AFTER_POSITION.sub(b"", text[1:])))
-            n_before[keyword].append(len(positions))
+            line = (number, AFTER_POSITION.sub(b"", text[1:]))
+            cells[keyword].append((line, len(positions)))
     vertices = coordinates(positions, least=2)
-    table = whole_table(cells[b"f"])
+    table = whole_table([line for line, _ in cells[b"f"]])
     if table is not None and table.shape[1] >= 3 and (table > 0).all():
         return vertices, polygon_triangles(vertices, table - 1)
     kind, least, noun = b"l", 2, "polyline must have two points"
     if cells[b"f"]:
         kind, least, noun = b"f", 3, "face must have three corners"
     rows = []
-    for line, count in zip(cells[kind], n_before[kind], strict=True):
+    for line, count in cells[kind]:
         words = line[1].split()
         if len(words) < least:
             raise FileFormatError(f"A {noun} or more; line {line[0]} is {quote_line(line)}.")
@@ -108,8 +106,11 @@ class ObjSheet:
         For each vertex, the text after its coordinates: a weight or a color.
     normals : tuple
         Three numbers each.
-    polygons : tuple
-        The corners of each face.
+    corners : (k, 3) int
+        Of all polygons: a vertex, its texture coordinate from 1 or 0 for none, and its normal from
+        0 or -1 for none.
+    starts : (p + 1,) int
+        Polygon i has the corners from start i to start i + 1.
     rows : tuple
         Lines to copy, and numbers of polygons, in the order of the file.
     dropped : tuple of str
@@ -119,7 +120,8 @@ class ObjSheet:
     vertices: Float[np.ndarray, "n 3"]
     tails: tuple[str, ...]
     normals: tuple[tuple[float, ...], ...]
-    polygons: tuple[tuple[Corner, ...], ...]
+    corners: Int[np.ndarray, "k 3"]
+    starts: Int[np.ndarray, " p1"]
     rows: tuple[str | int, ...]
     dropped: tuple[str, ...]
 
@@ -131,7 +133,8 @@ def read_sheet(data: bytes) -> ObjSheet:
     """
     positions: list[Line] = []
     tails: list[str] = []
-    polygons: list[tuple[Corner, ...]] = []
+    corners: list[tuple[int, int, int]] = []
+    starts = [0]
     rows: list[str | int] = []
     normals: list[Line] = []
     dropped: set[str] = set()
@@ -143,11 +146,11 @@ def read_sheet(data: bytes) -> ObjSheet:
             positions.append((number, text[1:]))
             tails.append(" ".join(word.decode("latin-1") for word in text.split()[4:]))
         elif keyword == b"f":
-            rows.append(len(polygons))
+            rows.append(len(starts) - 1)
             line = (number, text[1:])
             counts = (len(positions), n_textures, len(normals))
-            corners = (_corner(word, line, counts) for word in text.split()[1:])
-            polygons.append(tuple(corners))
+            corners += (_corner(word, line, counts) for word in text.split()[1:])
+            starts.append(len(corners))
         elif keyword == b"vn":
             normals.append((number, text[2:]))
         elif keyword in KEPT:
@@ -156,28 +159,26 @@ def read_sheet(data: bytes) -> ObjSheet:
         elif keyword:
             kind = keyword.decode("latin-1")[:20]
             dropped.add(OTHER_LINES.get(kind, f"lines that begin with {kind!r}"))
+    table = np.array(corners, dtype=np.int64).reshape(-1, 3)
+    # A corner whose normal the file does not hold has none.
+    table[(table[:, 2] < 0) | (table[:, 2] >= len(normals)), 2] = -1
     return ObjSheet(
         coordinates(positions),
         tuple(tails),
         tuple(map(tuple, coordinates(normals).tolist())),
-        # A corner whose normal the file does not hold has none.
-        tuple(
-            tuple((v, t, n if 0 <= n < len(normals) else -1) for v, t, n in polygon)
-            for polygon in polygons
-        ),
+        table,
+        np.array(starts),
         tuple(rows),
         tuple(sorted(dropped)),
     )
 
 
-def _corner(word: bytes, line: Line, counts: tuple[int, int, int]) -> Corner:
+def _corner(word: bytes, line: Line, counts: tuple[int, int, int]) -> tuple[int, int, int]:
     """Read a corner, after so many vertices, texture coordinates and normals."""
     position, texture, normal = (*word.split(b"/"), b"", b"")[:3]
     vertex = corner_index(position, line, counts[0])
-    place = whole(texture, line, "A texture coordinate") if texture else 0
-    number = whole(normal, line, "A normal") if normal else 0
-    return (
-        vertex,
-        (place if place > 0 else counts[1] + 1 + place) if texture else 0,
-        (number - 1 if number > 0 else counts[2] + number) if normal else -1,
-    )
+    place = whole(texture or b"0", line, "A texture coordinate")
+    number = whole(normal or b"0", line, "A normal")
+    place = place if place >= 0 else counts[1] + 1 + place
+    number = number if number >= 0 else counts[2] + 1 + number
+    return vertex, place, number - 1

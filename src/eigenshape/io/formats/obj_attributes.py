@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
-from eigenshape.geometry.measure import area_vectors
+from eigenshape.geometry.measure import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.polygons import cut_polygons
 from eigenshape.io.attributes import (
@@ -20,10 +20,9 @@ from eigenshape.io.attributes import (
     WriteJob,
     corner_normals,
     plain_attributes,
-    unit_rows,
 )
-from eigenshape.io.formats.numbers import rows_text
-from eigenshape.io.formats.obj import Corner, ObjSheet, read_sheet
+from eigenshape.io.formats.numbers import end_lines, rows_text
+from eigenshape.io.formats.obj import ObjSheet, read_sheet
 from eigenshape.io.opening import SourceFile
 
 MAP = re.compile(r"(?im)^([ \t]*(?:map_\w+|bump|disp|decal|norm|refl)[ \t]+)(.+?)[ \t\r]*$")
@@ -37,8 +36,8 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     coordinates = np.array(
         [[*map(float, row.split()[1:3]), 0.0][:2] for row in _rows(sheet, "vt")] or [[0.0, 0.0]]
     )
-    places, polygon_of, _, corners = _cut_polygons(sheet)
-    _, textures, normals = np.moveaxis(corners[places], 2, 0)
+    places, polygon_of = _cut_polygons(sheet)
+    _, textures, normals = np.moveaxis(sheet.corners[places], 2, 0)
     if textures.max() > len(coordinates):
         raise FileFormatError(
             f"A corner must name one of {len(coordinates)} texture coordinates; one names {textures.max()}."
@@ -46,7 +45,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     groups, face_groups = _switches(sheet, ("g ", "o "))
     names, face_materials = _switches(sheet, ("usemtl ",))
     defined, others = _read_materials(sheet, source)
-    if len(polygon_of) > len(sheet.polygons):
+    if len(places) >= len(sheet.starts):
         others.append("polygons, of which triangles are made")
     if _rows(sheet, "o") and _rows(sheet, "g"):
         others.append("names of objects beside those of groups")
@@ -60,9 +59,7 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         face_groups=face_groups[polygon_of],
         texture_coordinates=coordinates[textures - 1] if textures.any() else None,
         normals=np.array([*sheet.normals, (0.0, 0.0, 0.0)])[normals] if has_normals else None,
-        colors=_colors(sheet)[mesh.faces]
-        if any(len(t.split()) == 3 for t in sheet.tails)
-        else None,
+        colors=_colors(sheet, mesh),
         materials=tuple(defined.get(name, Material(_unicode(name))) for name in names),
         groups=tuple(map(_unicode, groups)),
         others=tuple(others),
@@ -70,21 +67,10 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     )
 
 
-def _cut_polygons(
-    sheet: ObjSheet,
-) -> tuple[
-    Int[np.ndarray, "f 3"], Int[np.ndarray, " f"], Int[np.ndarray, " p1"], Int[np.ndarray, "k 3"]
-]:
-    """Return triangles and their polygons, and where the corners of polygons begin, and they.
-
-    A triangle names three of these corners.
-    """
-    corners = np.array([corner for polygon in sheet.polygons for corner in polygon])
-    starts = np.cumsum([0, *map(len, sheet.polygons)])
-    places, polygon_of, _ = cut_polygons(
-        sheet.vertices[corners[:, 0]], starts, np.arange(len(corners))
-    )
-    return places, polygon_of, starts, corners
+def _cut_polygons(sheet: ObjSheet) -> tuple[Int[np.ndarray, "f 3"], Int[np.ndarray, " f"]]:
+    """Return three places among the corners of a sheet for each triangle, and its polygon."""
+    points = sheet.vertices[sheet.corners[:, 0]]
+    return cut_polygons(points, sheet.starts, np.arange(len(points)))[:2]
 
 
 def _rows(sheet: ObjSheet, keyword: str) -> list[str]:
@@ -104,14 +90,14 @@ def _switches(sheet: ObjSheet, keywords: tuple[str, ...]) -> tuple[list[str], np
     return list(names), np.array(numbers, dtype=np.int64)
 
 
-def _colors(sheet: ObjSheet) -> np.ndarray:
-    """Return the colors behind coordinates; vertices without one are white."""
-    table = np.full((len(sheet.tails), 4), 255, np.uint8)
-    for number, tail in enumerate(sheet.tails):
-        words = tail.split()
-        if len(words) == 3:
-            table[number, :3] = np.rint(255 * np.nan_to_num(np.array(words, float)).clip(0, 1))
-    return table
+def _colors(sheet: ObjSheet, mesh: TriangleMesh) -> np.ndarray | None:
+    """Return the colors behind coordinates at corners, if there are any; white where there is none."""
+    tails = [tail.split() for tail in sheet.tails]
+    if 3 not in map(len, tails):
+        return None
+    rows = [[*tail, "1"] if len(tail) == 3 else ["1"] * 4 for tail in tails]
+    shares = np.nan_to_num(np.array(rows, float)).clip(0, 1)
+    return np.rint(255 * shares).astype(np.uint8)[mesh.faces]
 
 
 def _unicode(name: str) -> str:
@@ -147,11 +133,13 @@ def _material_files(sheet: ObjSheet, source: SourceFile) -> tuple[str, list[str]
     return text, missing
 
 
-def _image_of(rest: str, folder: Path) -> Path | None:
-    """Return the image that a line of a material names, behind its options."""
-    return find_beside(_unicode(rest), folder) or find_beside(
-        _unicode(rest.rsplit(maxsplit=1)[-1]), folder
-    )
+def _find_image(rest: str, folder: Path, lost: list[str]) -> Path | None:
+    """Return the image that a line of a material names, behind its options, or note that it is lost."""
+    name = _unicode(rest)
+    path = find_beside(name, folder) or find_beside(name.rsplit(maxsplit=1)[-1], folder)
+    if path is None:
+        lost.append(f"the image {rest[:80]!r}, which is not in the folder of the file")
+    return path
 
 
 def _read_materials(sheet: ObjSheet, source: SourceFile) -> tuple[dict[str, Material], list[str]]:
@@ -164,17 +152,12 @@ def _read_materials(sheet: ObjSheet, source: SourceFile) -> tuple[dict[str, Mate
         if set(values) - PLAIN_MATERIAL:
             lost.append("properties of materials other than color and image")
         red, green, blue = ([float(x) for x in values.get("kd", "1 1 1").split()[:3]] * 3)[:3]
-        alpha = float(values["d"].split()[-1]) if "d" in values else None
-        if alpha is None:
-            alpha = 1.0 - float(values.get("tr", "0").split()[-1])
+        clear = float(values.get("tr", "0").split()[-1])
+        alpha = float(values["d"].split()[-1]) if "d" in values else 1.0 - clear
         image, image_name = None, ""
         if "map_kd" in values:
-            path = _image_of(values["map_kd"], source.folder)
-            if path is None:
-                lost.append(
-                    f"the image {values['map_kd'][:80]!r}, which is not in the folder of the file"
-                )
-            else:
+            path = _find_image(values["map_kd"], source.folder, lost)
+            if path:
                 image, image_name = read_regular(path, "an image"), path.name
         found[name] = Material(_unicode(name), (red, green, blue, alpha), image, image_name)
     return found, lost
@@ -198,9 +181,8 @@ def write(job: WriteJob) -> Files:
     files: Files = {}
 
     def link(match: re.Match[str]) -> str:
-        image = _image_of(match[2], source.folder)
+        image = _find_image(match[2], source.folder, job.lost)
         if image is None:
-            job.lost.append(f"the image {match[2][:80]!r}, which is not in the folder of the file")
             return match[0]
         copy = add_image(files, job.path, image.name, read_regular(image, "an image"))
         return match[1] + copy.name.encode().decode("latin-1")
@@ -240,7 +222,7 @@ def format_sheet(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh
             textures = [n_textures + number for number in (1, 2, 3)]
             n_textures += 3
         vertices = mesh.faces[face].tolist()
-        rows.append([(vertices[place], textures[place], -1) for place in range(3)])
+        rows.append([[*corner, -1] for corner in zip(vertices, textures, strict=True)])
 
     lines = _vertex_lines(sheet, attributes, mesh)
     faces = [content for content in rows if not isinstance(content, str)]
@@ -252,17 +234,22 @@ def format_sheet(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh
             continue
         lines.append("f")
         for vertex, texture, normal in content:
-            number = numbers.get((vertex, sheet.normals[normal])) if normal >= 0 else None
-            tail = "" if number is None else f"/{number + 1}"
-            lines[-1] += f" {vertex + 1}" + (f"/{texture or ''}{tail}" if texture or tail else "")
+            number = numbers[vertex, sheet.normals[normal]] + 1 if normal >= 0 else 0
+            lines[-1] += f" {_corner_text(vertex + 1, texture, number)}"
     return ("\n".join(lines) + "\n").encode("latin-1")
+
+
+def _corner_text(vertex: int, texture: int, normal: int) -> str:
+    """Write a corner; a texture coordinate or normal 0 is none."""
+    return f"{vertex}/{texture or ''}/{normal or ''}".rstrip("/")
 
 
 def _remaining_rows(
     sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMesh
-) -> tuple[list[str | list[Corner]], list[int]]:
+) -> tuple[list[str | list[list[int]]], list[int]]:
     """Return the lines and faces of a file that are left, and the faces that it does not have."""
-    places, polygon_of, starts, corners = _cut_polygons(sheet)
+    places, polygon_of = _cut_polygons(sheet)
+    corners, starts = sheet.corners, sheet.starts
     # The new corners at the three corners of each triangle of the file that is still there
     file_corners = attributes.corners.indices[attributes.corners.indptr[:-1]].reshape(-1, 3)
     order = np.argsort(file_corners % 3, axis=1)
@@ -288,26 +275,18 @@ def _remaining_rows(
     )
     is_whole = np.bincount(polygon_of[~is_same], minlength=len(starts) - 1) == 0
 
-    rows: list[str | list[Corner]] = []
-    old_corners, vertices_at = corners.tolist(), outlines.tolist()
+    rows: list[str | list[list[int]]] = []
+    of_polygons = np.column_stack([outlines, corners[:, 1:]]).tolist()
+    of_triangles = np.dstack([new_corners, corners[places][..., 1:]]).tolist()
     for row in sheet.rows:
         if isinstance(row, str):
             rows.append(row)
             continue
-        start, end = int(starts[row]), int(starts[row + 1])
         triangles = range(first_triangles[row], first_triangles[row + 1])
-        pieces = [(old_corners[start:end], vertices_at[start:end], turns[triangles[0]])]
+        pieces = [(of_polygons[starts[row] : starts[row + 1]], turns[triangles[0]])]
         if not is_whole[row]:
-            pieces = [
-                (corners[places[t]].tolist(), new_corners[t].tolist(), turns[t])
-                for t in triangles
-                if turns[t] >= 0
-            ]
-        for old_ones, vertices, is_turned in pieces:
-            piece = [
-                (vertex, texture, normal)
-                for vertex, (_, texture, normal) in zip(vertices, old_ones, strict=True)
-            ]
+            pieces = [(of_triangles[t], turns[t]) for t in triangles if turns[t] >= 0]
+        for piece, is_turned in pieces:
             rows.append([piece[0], *piece[:0:-1]] if is_turned else piece)
     return rows, np.setdiff1d(np.arange(mesh.n_faces), kept_faces).tolist()
 
@@ -321,8 +300,7 @@ def _vertex_lines(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMes
     shared = min(mesh.n_vertices, len(sheet.vertices))
     stays = (attributes.mesh.vertices[:shared] == sheet.vertices[:shared]).all(axis=1)
     tails = {index: sheet.tails[index] for index in np.flatnonzero(stays).tolist()}
-    places, _, _, corners = _cut_polygons(sheet)
-    file_vertices = corners[places, 0].ravel()
+    file_vertices = sheet.corners[_cut_polygons(sheet)[0], 0].ravel()
     starts = attributes.corners.indptr
     singles = np.flatnonzero(np.diff(starts) == 1)
     sources = file_vertices[attributes.corners.indices[starts[singles]]]
@@ -332,7 +310,7 @@ def _vertex_lines(sheet: ObjSheet, attributes: MeshAttributes, mesh: TriangleMes
 
 
 def _normals(
-    sheet: ObjSheet, faces: Sequence[Sequence[Corner]], vertices: Float[np.ndarray, "n 3"]
+    sheet: ObjSheet, faces: Sequence[Sequence[list[int]]], vertices: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "m 3"], dict[tuple[int, tuple[float, ...]], int]]:
     """Compute a normal for each vertex and each normal that it had, so that creases stay."""
     numbers: dict[tuple[int, tuple[float, ...]], int] = {}
@@ -342,15 +320,14 @@ def _normals(
         fan = [(row[0][0], one[0], two[0]) for one, two in pairwise(row[1:])]
         for vertex, _, normal in row:
             if normal >= 0:
-                key = (vertex, sheet.normals[normal])
-                number = numbers.setdefault(key, len(numbers))
+                number = numbers.setdefault((vertex, sheet.normals[normal]), len(numbers))
                 triangles += fan
                 owners += [number] * len(fan)
     if not numbers:
         return np.empty((0, 3)), numbers
     vectors = area_vectors(vertices[np.array(triangles)])
     sums = np.column_stack([np.bincount(owners, weights=column) for column in vectors.T])
-    units, old = unit_rows(sums), np.array([normal for _, normal in numbers])
+    units, old = unit_vectors(sums), np.array([normal for _, normal in numbers])
     return np.where(units.any(axis=1, keepdims=True), units, old), numbers
 
 
@@ -368,7 +345,7 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Fil
     if materials and of_faces.min() < 0:  # a line usemtl holds for all faces that follow
         of_faces = np.where(of_faces < 0, len(materials), of_faces)
         materials = (*materials, Material("plain"))
-    names = _distinct([material.name for material in materials], "material")
+    names = _distinct([material.name for material in materials])
     if materials:
         library = path.with_suffix(".mtl")
         lines.append(f"mtllib {library.name}")
@@ -379,7 +356,7 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Fil
             if material.image is not None:
                 image = add_image(files, path, material.image_name, material.image)
                 text.append(f"map_Kd {image.name}")
-        files[library] = ("\n".join(text) + "\n").encode()
+        files[library] = end_lines(text)
     vertices = rows_text("v ", mesh.vertices)
     if attributes.colors is not None:
         tints = np.ones((mesh.n_vertices, 3))
@@ -394,25 +371,21 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh, path: Path) -> Fil
         if table is None:
             columns.append(np.zeros_like(columns[0]))
             continue
-        distinct, numbers = np.unique(
-            table.reshape(-1, table.shape[2]), axis=0, return_inverse=True
-        )
+        rows = table.reshape(-1, table.shape[2])
+        distinct, numbers = np.unique(rows, axis=0, return_inverse=True)
         lines += rows_text(f"{keyword} ", distinct)
         columns.append(numbers.ravel() + 1)
-    corners = [
-        f"{v}" if not t and not n else f"{v}/{t or ''}" + (f"/{n}" if n else "")
-        for v, t, n in np.column_stack(columns).tolist()
-    ]
+    corners = [_corner_text(*numbers) for numbers in np.column_stack(columns).tolist()]
     state = (-1, -1)
     for face in np.lexsort([of_faces, attributes.face_groups]).tolist():
         group, number = int(attributes.face_groups[face]), int(of_faces[face])
         if group != state[0]:
             lines.append(f"g {attributes.groups[group] or f'group_{group}'}")
-        if number != state[1] and number >= 0:
+        if number != state[1]:
             lines.append(f"usemtl {names[number]}")
         state = group, number
         lines.append("f " + " ".join(corners[3 * face : 3 * face + 3]))
-    files[path] = ("\n".join(lines) + "\n").encode()
+    files[path] = end_lines(lines)
     return files
 
 
@@ -432,10 +405,10 @@ def _word(name: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", name) or "image"
 
 
-def _distinct(names: list[str], noun: str) -> list[str]:
+def _distinct(names: list[str]) -> list[str]:
     """Return words that name materials, each another one."""
     words: list[str] = []
     for number, name in enumerate(names):
-        word = _word(name) if name else f"{noun}_{number}"
+        word = _word(name) if name else f"material_{number}"
         words.append(f"{word}_{number}" if word in words else word)
     return words

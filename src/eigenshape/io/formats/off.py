@@ -17,6 +17,7 @@ from eigenshape.io.formats.cells import polygon_triangles
 from eigenshape.io.formats.numbers import (
     Line,
     coordinates,
+    end_lines,
     lines_of,
     number,
     quote_line,
@@ -36,8 +37,7 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
     binary = BINARY.match(data)
     if binary:
         return _parse_binary(data[binary.end() :])
-    lines = lines_of(data)
-    first = lines[0] if lines else (1, b"")
+    first, *rows = lines_of(data) or [(1, b"")]
     keyword, *words = first[1].split() or [b""]
     match = KEYWORD.fullmatch(keyword)
     if match is None:
@@ -46,9 +46,9 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
             f"vertex; it begins with {quote_line(first)}. Save it as OFF."
         )
     # The counts stand behind the keyword or in the next line.
-    counts, rows = (first[0], b" ".join([match["glued"], *words]).strip()), lines[1:]
+    counts = (first[0], b" ".join([match["glued"], *words]).strip())
     if not counts[1]:
-        counts, rows = (rows[0] if rows else (first[0] + 1, b"")), rows[1:]
+        counts, *rows = rows or [(first[0] + 1, b"")]
     declared = counts[1].split()[:2]
     if len(declared) < 2:
         raise FileFormatError(
@@ -161,9 +161,10 @@ def _polygons(numbers: list[int], n_faces: int, *, has_colors: bool) -> list[lis
 
 def format_text(mesh: TriangleMesh) -> bytes:
     """Write a mesh so that it reads back exactly."""
-    lines = [
-        f"OFF\n{mesh.n_vertices} {mesh.n_faces} 0",
-        *rows_text("", mesh.vertices),
-        *rows_text("3 ", mesh.faces),
-    ]
-    return ("\n".join(lines) + "\n").encode()
+    return end_lines(
+        [
+            f"OFF\n{mesh.n_vertices} {mesh.n_faces} 0",
+            *rows_text("", mesh.vertices),
+            *rows_text("3 ", mesh.faces),
+        ]
+    )

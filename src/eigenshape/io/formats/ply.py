@@ -19,13 +19,13 @@ from jaxtyping import Int
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import (
-    NO_TRIANGLES,
     list_corners,
     polygon_triangles,
     strip_triangles,
 )
 from eigenshape.io.formats.numbers import (
     Line,
+    end_lines,
     lines_of,
     number,
     number_table,
@@ -37,6 +37,7 @@ from eigenshape.io.formats.numbers import (
 
 AXES = ("x", "y", "z")
 CORNERS = ("vertex_indices", "vertex_index")
+READ_ELEMENTS = ("face", "tristrips")  # that have corners
 WRITTEN_TYPES = {"u1": "uchar", "i4": "int", "f8": "double"}  # of columns
 LABEL = "label"  # the property of faces that holds the number of their part
 Table = dict[str, Any]  # the values of each column, by name
@@ -67,24 +68,19 @@ class Column:
 
 @dataclass(frozen=True)
 class Element:
-    """A table: its name, its declared number of rows, and its columns."""
+    """A table: its name, its declared number of rows, and its columns by name."""
 
     name: str
     count: int
-    columns: tuple[Column, ...] = ()
-
-    @property
-    def least_bytes(self) -> int:
-        """Least number of bytes of a row of the table, in binary."""
-        return sum(np.dtype(column.length_kind or column.kind).itemsize for column in self.columns)
+    columns: dict[str, Column]
 
 
 @dataclass(frozen=True)
 class Header:
-    """The byte order (or TEXT), the tables, and the place where their rows begin."""
+    """The byte order (or TEXT), the tables by name, and the place where their rows begin."""
 
     order: str
-    elements: tuple[Element, ...]
+    elements: dict[str, Element]
     end: int
     n_lines: int
 
@@ -95,7 +91,6 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
     vertices = np.column_stack(
         [np.asarray(tables["vertex"][axis], dtype=np.float64) for axis in AXES]
     )
-    triangles = [NO_TRIANGLES]
     polygons = read_lists(tables, "face")
     are_equal = isinstance(polygons, np.ndarray)
     for index, corners in enumerate(polygons[:1] if are_equal else polygons):
@@ -103,19 +98,17 @@ def parse(data: bytes) -> tuple[np.ndarray, np.ndarray, *tuple[str, ...]]:
             raise FileFormatError(
                 f"A face must have three corners or more; face {index} is {list(map(int, corners))}."
             )
-    if len(polygons):
-        corners = polygons.astype(np.int64) if are_equal else polygons
-        triangles.append(polygon_triangles(vertices, corners))
+    corners = polygons.astype(np.int64) if are_equal else polygons
+    triangles = [polygon_triangles(vertices, corners)]
     for strip in read_lists(tables, "tristrips"):
         corners = np.asarray(strip, dtype=np.int64)
         pieces = np.split(corners, np.flatnonzero(corners == -1))  # -1 separates strips
         strips = list_corners([piece[piece != -1].tolist() for piece in pieces])
         triangles.append(strip_triangles(strips)[0])
-    others = [name for name in tables if len(read_lists(tables, name))]
     notes = [
         f"the element {name}, which has {CORNERS[0]}, is not read"
-        for name in others
-        if name not in ("face", "tristrips")
+        for name in tables
+        if name not in READ_ELEMENTS and len(read_lists(tables, name))
     ]
     return vertices, np.concatenate(triangles), *notes
 
@@ -136,8 +129,10 @@ def parse_header(data: bytes) -> Header:
     # Where lines end in a carriage return alone, a line feed that follows belongs to the rows.
     end = mark.end() - (mark[1] == b"\r\n" and not re.match(rb"ply[ \t]*\r?\n", data))
     n_bytes = len(data) - end
-    for element in elements:
-        least = element.least_bytes if order != TEXT else 2 * len(element.columns)
+    for element in elements.values():
+        kinds = [column.length_kind or column.kind for column in element.columns.values()]
+        # A list may be empty, and a word of text takes a letter and a space.
+        least = sum(2 if order == TEXT else struct.calcsize("<" + kind) for kind in kinds)
         if element.count * least > n_bytes + 1:  # the last line of a text may lack its end
             raise FileFormatError(
                 f"A PLY file must hold the rows it declares; {element.count} rows of {element.name} take "
@@ -146,12 +141,11 @@ def parse_header(data: bytes) -> Header:
     return Header(order, elements, end, len(lines) + 1)
 
 
-def _declarations(lines: Sequence[bytes]) -> tuple[str, tuple[Element, ...]]:
+def _declarations(lines: Sequence[bytes]) -> tuple[str, dict[str, Element]]:
     """Return the byte order, empty if there is none, and the tables that the lines of a header declare."""
     order = ""
-    counts: dict[str, int] = {}
-    tables: dict[str, dict[str, Column]] = {}
-    columns: dict[str, Column] | None = None  # of the last table
+    elements: dict[str, Element] = {}
+    columns: dict[str, Column] | None = None  # of the last element
     for index, line in enumerate(lines, 1):
         match line.decode("latin-1").split():
             case [] | ["ply" | "comment" | "obj_info", *_]:
@@ -159,10 +153,10 @@ def _declarations(lines: Sequence[bytes]) -> tuple[str, tuple[Element, ...]]:
             case ["format", name, *_] if name in ORDERS:
                 order = ORDERS[name]
             case ["element", name, count, *_] if (
-                name not in tables and count.isdecimal() and len(count) <= MOST_DIGITS
+                name not in elements and count.isdecimal() and len(count) <= MOST_DIGITS
             ):
-                counts[name] = int(count)
-                columns = tables[name] = {}
+                columns = {}
+                elements[name] = Element(name, int(count), columns)
             case ["property", "list", lengths, kind, name, *_] if (
                 columns is not None
                 and name not in columns
@@ -179,28 +173,22 @@ def _declarations(lines: Sequence[bytes]) -> tuple[str, tuple[Element, ...]]:
                     f"A PLY header must declare format, elements and properties; "
                     f"line {index} is {quote_line((index, line))}."
                 )
-    return order, tuple(
-        Element(name, counts[name], tuple(table.values())) for name, table in tables.items()
-    )
+    return order, elements
 
 
 def read_tables(data: bytes) -> dict[str, Table]:
     """Read all columns, by table and name; of text those that make no mesh are left as words."""
     header = parse_header(data)
-    elements = [element for element in header.elements if element.columns]
-    columns = {
-        (element.name, column.name): column for element in elements for column in element.columns
-    }
-    axes = [columns.get(("vertex", axis)) for axis in AXES]
-    if any(axis is None or axis.length_kind for axis in axes):
+    elements = [element for element in header.elements.values() if element.columns]
+    places = header.elements["vertex"].columns if "vertex" in header.elements else {}
+    if any(axis not in places or places[axis].length_kind for axis in AXES):
         raise FileFormatError(
             "A PLY file must declare an element vertex with the numbers x, y and z; it does not."
         )
     for element in elements:
-        if element.name not in ("face", "tristrips") or not element.count:
+        if element.name not in READ_ELEMENTS or not element.count:
             continue
-        names = [(element.name, name) for name in CORNERS]
-        corners = next((columns[name] for name in names if name in columns), None)
+        corners = next((element.columns[name] for name in CORNERS if name in element.columns), None)
         if corners is None or not corners.length_kind or not corners.is_whole:
             raise FileFormatError(
                 f"The element {element.name} of a PLY file must declare a list of whole vertex_indices; it does not."
@@ -241,33 +229,34 @@ def _read_text(lines: Sequence[Line], elements: Sequence[Element]) -> dict[str, 
 
 def _plain_table(rows: Sequence[Line], element: Element) -> Table | None:
     """Read rows of plain numbers with lists of equal lengths at once; None if there are others."""
-    is_whole = all(column.is_whole for column in element.columns)
-    if not is_whole and any(column.length_kind for column in element.columns):
+    columns = element.columns.values()
+    is_whole = all(column.is_whole for column in columns)
+    if not is_whole and any(column.length_kind for column in columns):
         return None
     values = whole_table(rows) if is_whole else number_table(rows)
     if values is None:
         return None
     table, place = {}, 0
-    for column in element.columns:
+    for column in columns:
         if place >= values.shape[1]:
             return None
-        length = int(values[0, place]) if column.length_kind else 1
-        if column.length_kind and (length < 0 or (values[:, place] != length).any()):
-            return None
-        place += bool(column.length_kind)
-        table[column.name] = (
-            values[:, place : place + length] if column.length_kind else values[:, place]
-        )
-        place += length
+        table[column.name] = first = values[:, place]
+        place += 1
+        if column.length_kind:
+            length = int(first[0])
+            if length < 0 or (first != length).any():
+                return None
+            table[column.name] = values[:, place : place + length]
+            place += length
     return table if place == values.shape[1] else None
 
 
 def _row_by_row(rows: Sequence[Line], element: Element) -> Table:
-    table: Table = {column.name: [] for column in element.columns}
+    table: Table = {name: [] for name in element.columns}
     for row in rows:
         words = row[1].split()
         place = 0
-        for column in element.columns:
+        for column in element.columns.values():
             count = 1
             if column.length_kind and place < len(words):
                 count = whole(words[place], row, "The length of a list")
@@ -297,26 +286,24 @@ def _binary_table(body: bytes, element: Element, order: str, start: int) -> tupl
     if not element.count:
         return first, end
     fields: list[Any] = []
-    for column in element.columns:
-        shape: tuple[int, ...] = ()
+    for name, column in element.columns.items():
         if column.length_kind:
-            fields.append((f"length of {column.name}", order + column.length_kind))
-            shape = (len(first[column.name][0]),)
-        fields.append((column.name, order + column.kind, shape))
+            fields.append((f"length of {name}", order + column.length_kind))
+        fields.append((name, order + column.kind, np.shape(first[name][0])))
     record = np.dtype(fields)
     end = start + element.count * record.itemsize
     if end <= len(body):
         rows = np.frombuffer(body, record, element.count, start)
-        lists = [column.name for column in element.columns if column.length_kind]
+        lists = [name for name, column in element.columns.items() if column.length_kind]
         if all((rows[f"length of {name}"] == rows[name].shape[1]).all() for name in lists):
-            return {column.name: rows[column.name] for column in element.columns}, end
+            return {name: rows[name] for name in element.columns}, end
     return _ragged_table(body, element, order, start)
 
 
 def _ragged_table(body: bytes, element: Element, order: str, start: int) -> tuple[Table, int]:
-    table: Table = {column.name: [] for column in element.columns}
+    table: Table = {name: [] for name in element.columns}
     for index in range(element.count):
-        for column in element.columns:
+        for column in element.columns.values():
             try:
                 count = 1
                 if column.length_kind:
@@ -353,14 +340,9 @@ def parse_labels(data: bytes) -> Int[np.ndarray, " f"]:
     return np.repeat(values, n_triangles)
 
 
-def format_text(
-    mesh: TriangleMesh,
-    of_vertices: Table | None = None,
-    of_faces: Table | None = None,
-    comment: str = "",
-) -> bytes:
-    """Write a mesh, and columns of vertices and faces by name, as text that reads back exactly."""
-    tables = _columns(mesh, of_vertices, of_faces)
+def format_text(mesh: TriangleMesh, *more: Table, comment: str = "") -> bytes:
+    """Write a mesh, and more columns of vertices and of faces, as text that reads back exactly."""
+    tables = _columns(mesh, *more)
     rows: list[str] = []
     for columns in tables.values():
         words = [
@@ -370,17 +352,12 @@ def format_text(
             for values in columns.values()
         ]
         rows += map(" ".join, zip(*words, strict=True))
-    return _header_text(tables, "ascii", comment) + ("\n".join(rows) + "\n").encode()
+    return _header_text(tables, "ascii", comment) + end_lines(rows)
 
 
-def format_binary(
-    mesh: TriangleMesh,
-    of_vertices: Table | None = None,
-    of_faces: Table | None = None,
-    comment: str = "",
-) -> bytes:
-    """Write a mesh, and columns of vertices and faces by name, in binary that reads back exactly."""
-    return _pack(_columns(mesh, of_vertices, of_faces), comment)
+def format_binary(mesh: TriangleMesh, *more: Table, comment: str = "") -> bytes:
+    """Write a mesh, and more columns of vertices and of faces, in binary that reads back exactly."""
+    return _pack(_columns(mesh, *more), comment)
 
 
 def format_points(points: np.ndarray, _suffix: str) -> bytes:
@@ -388,27 +365,24 @@ def format_points(points: np.ndarray, _suffix: str) -> bytes:
     return _pack({"vertex": dict(zip(AXES, points.T, strict=True))})
 
 
-def _columns(
-    mesh: TriangleMesh, of_vertices: Table | None, of_faces: Table | None
-) -> dict[str, Table]:
-    corners = {CORNERS[0]: mesh.faces.astype(np.int32)}
+def _columns(mesh: TriangleMesh, *more: Table) -> dict[str, Table]:
     places = dict(zip(AXES, mesh.vertices.T, strict=True))
-    return {"vertex": places | (of_vertices or {}), "face": corners | (of_faces or {})}
+    tables = {"vertex": places, "face": {CORNERS[0]: mesh.faces.astype(np.int32)}}
+    for table, columns in zip(tables.values(), more, strict=False):
+        table.update(columns)
+    return tables
 
 
 def _pack(tables: dict[str, Table], comment: str = "") -> bytes:
     data = _header_text(tables, "binary_little_endian", comment)
     for columns in tables.values():
-        filled: Table = {}
-        for name, values in columns.items():
+        pieces = []
+        for values in columns.values():
             if values.ndim == 2:
-                filled[f"length of {name}"] = np.full(len(values), values.shape[1], np.uint8)
-            filled[name] = values
-        kinds = [(name, v.dtype.newbyteorder("<"), v.shape[1:]) for name, v in filled.items()]
-        rows = np.zeros(len(next(iter(columns.values()))), dtype=kinds)
-        for name, values in filled.items():
-            rows[name] = values
-        data += rows.tobytes()
+                pieces.append(np.full((len(values), 1), values.shape[1], np.uint8))
+            rows = values.astype(values.dtype.newbyteorder("<"), order="C")
+            pieces.append(np.frombuffer(rows, np.uint8).reshape(len(rows), -1))
+        data += np.hstack(pieces).tobytes()
     return data
 
 
@@ -419,4 +393,4 @@ def _header_text(tables: dict[str, Table], order: str, comment: str) -> bytes:
         for name, values in columns.items():
             kind = WRITTEN_TYPES[values.dtype.str[1:]]
             lines.append(f"property {'list uchar ' if values.ndim == 2 else ''}{kind} {name}")
-    return ("\n".join([*lines, "end_header"]) + "\n").encode()
+    return end_lines([*lines, "end_header"])

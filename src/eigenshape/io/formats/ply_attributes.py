@@ -48,8 +48,8 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
     tables, header = read_tables(source.data), parse_header(source.data)
     columns = {
         (element.name, column.name): column
-        for element in header.elements
-        for column in element.columns
+        for element in header.elements.values()
+        for column in element.columns.values()
         if element.count and column.name not in CORNERS
     }
     left = {key: None for key in columns if key[0] != "vertex" or key[1] not in AXES}
@@ -94,13 +94,8 @@ def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
         column = columns[element, name]
         is_of_faces = element == "face" and are_faces and mesh.n_faces != mesh.n_vertices
         if not column.length_kind and name not in fields and (element == "vertex" or is_of_faces):
-            # As one of the types that PLY files are written in
-            kinds = (
-                {"B": np.uint8} | dict.fromkeys("bhHi", np.int32) | dict.fromkeys("Iq", np.int64)
-            )
-            values = (
-                _numbers(tables[element][name]).ravel().astype(kinds.get(column.kind, np.float64))
-            )
+            values = _numbers(tables[element][name])
+            values = values.astype(column.kind) if column.is_whole else values
             fields[name] = values[polygon_of] if is_of_faces else values
             del left[element, name]
     others = [f"{name} of {element}" for element, name in left]
@@ -143,7 +138,6 @@ def _numbers(values: Any) -> Float[np.ndarray, "..."]:
 def write(job: WriteJob) -> dict[Path, bytes]:
     """Write a PLY file with columns of vertices and faces."""
     mesh, held, labels, lost = job.mesh, job.attributes, job.face_labels, job.lost
-    job.lose([])
     of_vertices: Table = {}
     of_faces: Table = {}
     if held.colors is not None:
@@ -175,19 +169,16 @@ def write(job: WriteJob) -> dict[Path, bytes]:
         else:
             table[name] = values.astype(_kind(values))
     files: dict[Path, bytes] = {}
-    comment, kept = "", set[str]()
+    comment, kinds = "", ["materials", "images"]
     material = held.materials[0] if held.materials and not held.face_materials.any() else None
     if material and material.image is not None:  # one image for all faces
         place = add_image(files, job.path, material.image_name, material.image)
         comment = f"TextureFile {place.name}"
-        name = Path(material.image_name).stem
-        is_plain = material.name == name and material.color == Material().color
-        kept = {"images", "materials"} if is_plain else {"images"}
-    lost += [name for name in ("materials", "images") if held.contents[name] and name not in kept]
-    if held.contents["names of groups"] and not (numbered and labels is None):
-        lost.append("names of groups")
+        plain = replace(material, name=Path(material.image_name).stem, color=Material.color)
+        kinds = [] if material == plain else ["materials"]
+    job.lose(kinds if numbered and labels is None else [*kinds, "names of groups"])
     format_columns = format_binary if job.binary else format_text
-    return {**files, job.path: format_columns(mesh, of_vertices, of_faces, comment)}
+    return {**files, job.path: format_columns(mesh, of_vertices, of_faces, comment=comment)}
 
 
 def _kind(values: np.ndarray) -> type[np.generic]:

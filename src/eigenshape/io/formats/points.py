@@ -11,7 +11,14 @@ from jaxtyping import Float
 
 from eigenshape._errors import FileFormatError
 from eigenshape.io.formats.cells import NO_TRIANGLES
-from eigenshape.io.formats.numbers import coordinates, lines_of, quote_line, rows_text, whole
+from eigenshape.io.formats.numbers import (
+    coordinates,
+    end_lines,
+    lines_of,
+    quote_line,
+    rows_text,
+    whole,
+)
 
 EXPE = b"[Expe/PointSet/Binary/"
 
@@ -78,4 +85,4 @@ def _parse_binary(data: bytes) -> Float[np.ndarray, "n 3"]:
 def format_points(points: Float[np.ndarray, "n 3"], suffix: str) -> bytes:
     """Write points so that they read back exactly; a .pts file has their number before them."""
     count = [str(len(points))] if suffix == ".pts" else []
-    return ("\n".join([*count, *rows_text("", points)]) + "\n").encode()
+    return end_lines([*count, *rows_text("", points)])

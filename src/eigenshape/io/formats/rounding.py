@@ -38,8 +38,8 @@ def rounding_loss(mesh: TriangleMesh, found: Float[np.ndarray, "f 3 3"]) -> list
     if not max(change, moves.max()) <= MOST_CHANGE:
         raise FileFormatError(
             f"A file must keep the area and the places of vertices to {MOST_CHANGE:.0%}; rounding, or a "
-            f"node that flattens, changes the area by {change:.2g} and a place by {moves.max():.2g} of "
-            "the size. Write .ply, which keeps all digits."
+            f"node that flattens, changes the area by {change:.2g} and a place by {moves.max():.2g} of the size. "
+            "Write .ply, which keeps all digits."
         )
     n_flat = int(((after == 0) & (before > 0)).sum())
     return [

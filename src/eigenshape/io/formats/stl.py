@@ -13,7 +13,7 @@ from eigenshape._errors import FileFormatError
 from eigenshape.geometry.measure import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import weld
-from eigenshape.io.formats.numbers import coordinates, lines_of, quote_line
+from eigenshape.io.formats.numbers import coordinates, end_lines, lines_of, quote_line
 
 HEADER = 84  # bytes before the triangles of a binary file: 80 of text, 4 of their number
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -79,7 +79,7 @@ def format_text(mesh: TriangleMesh) -> bytes:
         lines.append(
             f"facet normal {' '.join(map(repr, normal))}\nouter loop\n{rows}\nendloop\nendfacet"
         )
-    return ("\n".join([*lines, "endsolid mesh"]) + "\n").encode()
+    return end_lines([*lines, "endsolid mesh"])
 
 
 def format_binary(mesh: TriangleMesh) -> bytes:

@@ -13,11 +13,10 @@ from typing import Any
 from urllib.parse import quote, unquote_to_bytes
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.cells import FOUR_CORNERED, CellLists, Cells
+from eigenshape.io.formats.cells import FOUR_CORNERED, CellLists, ParsedFields, ParsedShape
 from eigenshape.io.formats.numbers import Cursor, quote_line
 from eigenshape.io.formats.vtk_cells import (
     POLY_VERTEX,
@@ -59,7 +58,7 @@ AS_THEY_ARE = "".join(set(string.punctuation) - set('"%'))
 BLANK_LINE = re.compile(rb"\n[ \t\r]*\n")
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], Cells, *tuple[str, ...]]:
+def parse(data: bytes) -> ParsedShape:
     """Return points, cells by kind, and notes.
 
     Raise FileFormatError if the content differs from the header.
@@ -135,7 +134,7 @@ def _sections(cursor: Cursor) -> dict[bytes, Any]:
     return held
 
 
-def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
+def parse_fields(data: bytes) -> ParsedFields:
     """Return the functions on points and those on simplices, by name, and notes; see `parse`.
 
     Raise FileFormatError if the content differs from the header.
@@ -172,12 +171,11 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
                 f"what follows {quote_line((0, text))} is not read: no such data are known"
             )
             break
-        notes += [
-            f"the array {name!r} of text is not read"
-            for name, values in found.items()
-            if values is None
-        ]
-        fields[section] |= {name: values for name, values in found.items() if values is not None}
+        for each, held in found.items():
+            if held is None:
+                notes.append(f"the array {each!r} of text is not read")
+            else:
+                fields[section][each] = held
     of_points, of_cells = fit_fields(shape, *fields.values())
     return of_points, of_cells, *notes
 
@@ -275,10 +273,7 @@ def _cells(cursor: Cursor, count: int, size: int) -> CellLists:
             )
         return CellLists(offsets, corners)
     cursor.place = start
-    return _cells_by_counts(cursor.wholes(">i4", size), count)
-
-
-def _cells_by_counts(flat: Int[np.ndarray, " k"], count: int) -> CellLists:
+    flat = cursor.wholes(">i4", size)
     numbers = flat.tolist()
     places = []  # where the counts are
     place = 0

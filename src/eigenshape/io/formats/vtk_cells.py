@@ -21,21 +21,20 @@ from eigenshape.io.formats.registry import VTK_REMEDY
 # The types of cells, as vtkCellType.h numbers them
 EMPTY, VERTEX, POLY_VERTEX, LINE, POLYLINE, TRIANGLE, STRIP, POLYGON, PIXEL, QUAD = range(10)
 TETRAHEDRON, VOXEL, HEXAHEDRON, WEDGE, PYRAMID = range(10, 15)
-STRAIGHT = {
-    LINE: SEGMENTS, TRIANGLE: "triangles", QUAD: "quads", PIXEL: "quads", TETRAHEDRON: "tetrahedra",
-    HEXAHEDRON: "hexahedra", VOXEL: "hexahedra", WEDGE: "wedges", PYRAMID: "pyramids",
-}  # fmt: skip
-# Cells of higher order, those of Lagrange and Bézier last; their corners come first.
-CURVED = {
+SIMPLEX_TYPES = {2: LINE, 3: TRIANGLE, 4: TETRAHEDRON}  # by their number of corners
+FIRST_CURVED = 21  # number of the first type of higher order
+# By what they are read as; from 21 on those of higher order, whose corners come first, with those of
+# Lagrange and Bézier last
+KINDS = {
     kind: name
     for name, kinds in {
-        SEGMENTS: (21, 35, 68, 75), "triangles": (22, 34, 69, 76), "quads": (23, 28, 30, 70, 77),
-        "tetrahedra": (24, 71, 78), "hexahedra": (25, 29, 33, 72, 79),
-        "wedges": (26, 31, 32, 73, 80), "pyramids": (27, 37, 74, 81),
+        SEGMENTS: (LINE, POLYLINE, 21, 35, 68, 75), "triangles": (TRIANGLE, STRIP, 22, 34, 69, 76),
+        "quads": (QUAD, PIXEL, 23, 28, 30, 70, 77), "tetrahedra": (TETRAHEDRON, 24, 71, 78),
+        "hexahedra": (HEXAHEDRON, VOXEL, 25, 29, 33, 72, 79), "polygons": (POLYGON,),
+        "wedges": (WEDGE, 26, 31, 32, 73, 80), "pyramids": (PYRAMID, 27, 37, 74, 81),
     }.items()
     for kind in kinds
 }  # fmt: skip
-KINDS = STRAIGHT | CURVED | {POLYLINE: SEGMENTS, STRIP: "triangles", POLYGON: "polygons"}
 # Pixels and voxels list their corners row by row, quads and hexahedra around them.
 AROUND = {PIXEL: [0, 1, 3, 2], VOXEL: [0, 1, 3, 2, 4, 5, 7, 6]}
 OTHER_NAMES = {
@@ -43,6 +42,7 @@ OTHER_NAMES = {
 }  # fmt: skip
 N_SIMPLICES = {"quads": 2, "hexahedra": 6, "wedges": 3, "pyramids": 2}  # of a cell
 Arrays = dict[str, np.ndarray]
+TypedCells = tuple[CellLists, Int[np.ndarray, " c"]]  # and VTK's number of their type
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,11 @@ def other_dataset(found: str) -> FileFormatError:
     )
 
 
-def surface_lists(sections: dict[int, CellLists]) -> tuple[CellLists, Int[np.ndarray, " c"]]:
-    """Return the cells of PolyData by their type, in the order in which VTK counts them."""
-    order = [kind for kind in (POLY_VERTEX, POLYLINE, POLYGON, STRIP) if kind in sections]
-    counts = [len(sections[kind].lengths) for kind in order]
-    types = np.repeat(np.array(order, dtype=np.int64), counts)
-    return CellLists.join([sections[kind] for kind in order]), types
+def surface_lists(sections: dict[int, CellLists]) -> TypedCells:
+    """Return the cells of PolyData, which are given by type in the order in which VTK counts them."""
+    counts = [len(lists.lengths) for lists in sections.values()]
+    types = np.repeat(np.array(list(sections), dtype=np.int64), counts)
+    return CellLists.join(list(sections.values())), types
 
 
 def require_joined(lists: CellLists, n_points: int) -> None:
@@ -111,7 +110,8 @@ def sort_cells(
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}  # corners, and their cells
     for kind in found:
         name, chosen = KINDS[kind], np.flatnonzero(types == kind)
-        lengths = lists.lengths[chosen]
+        some = lists.take(chosen)
+        lengths = some.lengths
         least = N_CORNERS.get(name, 3)
         is_open = kind in (POLYLINE, STRIP, POLYGON)
         wrong = chosen[lengths < least if is_open else lengths != least]
@@ -121,22 +121,22 @@ def sort_cells(
                 f"{wrong[0]} has {lists.lengths[wrong[0]]}."
             )
         if kind == POLYGON:
-            cells[name], numbers[name] = lists.take(chosen), np.repeat(chosen, lengths - 2)
+            cells[name], numbers[name] = some, np.repeat(chosen, lengths - 2)
             continue
         if kind == POLYLINE:
-            corners, owners = lists.take(chosen).pairs(), np.repeat(chosen, lengths - 1)
+            corners, owners = some.pairs(), np.repeat(chosen, lengths - 1)
         elif kind == STRIP:
-            corners, strips = strip_triangles(lists.take(chosen))
+            corners, strips = strip_triangles(some)
             owners = chosen[strips]
         else:
-            corners, owners = lists.rows(chosen, least), chosen
+            corners, owners = some.corners.reshape(-1, least), chosen
         around = AROUND.get(kind, slice(None))
         parts.setdefault(name, []).append((corners[:, around], owners))
-    for name, some in parts.items():
+    for name, found_parts in parts.items():
         # Several types become one kind, in the order of the file.
-        owners = np.concatenate([owners for _, owners in some])
+        owners = np.concatenate([owners for _, owners in found_parts])
         order = np.argsort(owners, kind="stable")
-        cells[name] = np.concatenate([corners for corners, _ in some])[order]
+        cells[name] = np.concatenate([corners for corners, _ in found_parts])[order]
         numbers[name] = np.repeat(owners[order], N_SIMPLICES.get(name, 1))
     return VtkShape(points[kept], cells, kept, numbers, len(points), n_cells, notes)
 
@@ -146,8 +146,8 @@ def _straighten(
 ) -> tuple[CellLists, Int[np.ndarray, " m"], list[str]]:
     """Return the cells by their corners, the points that are between corners alone, and a note."""
     lengths = lists.lengths
-    for kind, name in CURVED.items():
-        lengths = np.where(types == kind, np.minimum(lengths, N_CORNERS[name]), lengths)
+    for kind in set(KINDS) - set(range(FIRST_CURVED)):
+        lengths = np.where(types == kind, lengths.clip(max=N_CORNERS[KINDS[kind]]), lengths)
     n_curved = int((lengths < lists.lengths).sum())
     if not n_curved:
         return lists, np.empty(0, dtype=np.int64), []

@@ -4,12 +4,11 @@ Only what is requested is unpacked, after a check of sizes.
 """
 
 import base64
-import binascii
 import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -17,10 +16,9 @@ from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.io.formats.cells import CellLists, Cells
+from eigenshape.io.formats.cells import CellLists, ParsedFields, ParsedShape
 from eigenshape.io.formats.numbers import (
     COMPRESSORS,
-    numbers_of,
     require_reasonable,
     unpack_block,
     wholes,
@@ -31,6 +29,7 @@ from eigenshape.io.formats.vtk_cells import (
     POLYLINE,
     STRIP,
     Arrays,
+    TypedCells,
     VtkShape,
     fit_fields,
     other_dataset,
@@ -38,6 +37,7 @@ from eigenshape.io.formats.vtk_cells import (
     sort_cells,
     surface_lists,
 )
+from eigenshape.io.formats.xml_arrays import decode_base64, parse_xml, text_numbers
 
 HEADER_TYPES = {"UInt32": "u4", "UInt64": "u8"}
 ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
@@ -61,7 +61,7 @@ class _Packing:
     is_raw: bool
     n_bytes: int  # of the file
 
-    def numbers(self, array: ElementTree.Element, count: int) -> np.ndarray:
+    def numbers(self, array: Element, count: int) -> np.ndarray:
         """Read an array of `count` numbers, which is checked before anything is unpacked."""
         name = array.get("Name", "an array")
         kind = NUMBERS.get(array.get("type", ""))
@@ -70,12 +70,7 @@ class _Packing:
                 f"Arrays of a VTK file must be of numbers; {name!r} is of {array.get('type')!r}."
             )
         if array.get("format", "ascii") == "ascii":
-            try:
-                found = numbers_of((array.text or "").encode().split(), kind)
-            except ValueError as err:
-                raise FileFormatError(
-                    f"Arrays of a VTK file must be of numbers; {name!r} is not: {err}."
-                ) from err
+            found = text_numbers((array.text or "").encode(), kind, "VTK", name)
         else:
             dtype = np.dtype(self.order + kind)
             is_packed = array.get("type") == "Bit"
@@ -88,7 +83,7 @@ class _Packing:
             )
         return found
 
-    def _data(self, array: ElementTree.Element, size: int, name: str) -> bytes:
+    def _data(self, array: Element, size: int, name: str) -> bytes:
         if array.get("format") == "appended":
             offset = array.get("offset", "")
             if not re.fullmatch(r"\s*[0-9]{1,18}\s*", offset):
@@ -106,14 +101,10 @@ class _Packing:
 
         def first(text: bytes, length: int) -> bytes:
             """Return the first bytes that a text holds, raw or in base64."""
-            found = text[:length]
+            found = text
             if not is_raw:
-                try:
-                    found = base64.b64decode(text[: _n_characters(length)], validate=True)[:length]
-                except binascii.Error as err:
-                    raise FileFormatError(
-                        f"Arrays of a VTK file must be in base64; {name!r} is not: {err}."
-                    ) from err
+                found = decode_base64(text[: _n_characters(length)], "VTK", name)
+            found = found[:length]
             if len(found) < length:
                 raise FileFormatError(
                     f"A VTK file must hold what it declares; {name!r} lacks {length - len(found)} of {length} bytes."
@@ -166,26 +157,80 @@ def _require_size(found: int, expected: int, name: str) -> None:
         )
 
 
-def parse(data: bytes) -> tuple[Float[np.ndarray, "n d"], Cells, *tuple[str, ...]]:
+@dataclass(frozen=True)
+class _Piece:
+    """A piece of a file, and the encoding of its arrays."""
+
+    element: Element
+    packing: _Packing
+
+    def count(self, name: str) -> int:
+        """Return the number of points or cells of a section."""
+        text = self.element.get(f"NumberOf{name}", "0").strip()
+        if not re.fullmatch(r"[0-9]{1,18}", text):
+            raise FileFormatError(
+                f"Pieces of a VTK file must count what they hold; NumberOf{name} is {text[:30]!r}."
+            )
+        return int(text)
+
+    def points(self) -> Float[np.ndarray, "n 3"]:
+        array = self.element.find("./Points/DataArray")
+        if array is None:
+            raise FileFormatError("A VTK file must have points; a piece has none.")
+        width = (array.get("NumberOfComponents") or "3").strip()
+        if width != "3":
+            raise FileFormatError(
+                f"Points of a VTK file must have three coordinates each; they have {width[:30]!r}."
+            )
+        numbers = self.packing.numbers(array, 3 * self.count("Points"))
+        return numbers.reshape(-1, 3).astype(np.float64)
+
+    def cells(self) -> TypedCells:
+        """Return the cells, and VTK's number of their type."""
+        if n_cells := self.count("Cells"):
+            return self._lists("Cells", n_cells), self._wholes("Cells", "types", n_cells)
+        counts = {kind: self.count(name) for kind, name in SECTIONS.items()}
+        held = {kind: count for kind, count in counts.items() if count}
+        return surface_lists({kind: self._lists(SECTIONS[kind], held[kind]) for kind in held})
+
+    def _lists(self, section: str, n_cells: int) -> CellLists:
+        ends = self._wholes(section, "offsets", n_cells)
+        starts = np.append(0, ends)
+        if (np.diff(starts) < 0).any():
+            raise FileFormatError(
+                f"Offsets of a VTK file must rise from 0; they begin with {ends[:9].tolist()}."
+            )
+        return CellLists(starts, self._wholes(section, "connectivity", int(starts[-1])))
+
+    def _wholes(self, section: str, name: str, count: int) -> Int[np.ndarray, " count"]:
+        arrays = {each.get("Name", ""): each for each in self.element.findall(f"./{section}/*")}
+        if name not in arrays:
+            raise FileFormatError(
+                f"{section} of a VTK file must have {name}; they have {', '.join(arrays)}."
+            )
+        return wholes(self.packing.numbers(arrays[name], count), f"{name} of a VTK file")
+
+
+def parse(data: bytes) -> ParsedShape:
     """Return points, cells by kind, and notes; functions are not unpacked.
 
     Raise FileFormatError if the content differs from the tags, or they declare more than the file
     can hold.
     """
-    shape = _shape(*_open(data))
+    shape = _shape(_open(data))
     return shape.points, shape.cells, *shape.notes
 
 
-def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
+def parse_fields(data: bytes) -> ParsedFields:
     """Return the functions on points and those on simplices, by name, and notes; see `parse`.
 
     Raise FileFormatError if the content differs from the tags, or they declare more than the file
     can hold.
     """
-    pieces, packing = _open(data)
-    shape = _shape(pieces, packing)
-    of_points, left_out = _fields(pieces, packing, "PointData", ("Points",))
-    of_cells, more = _fields(pieces, packing, "CellData", ("Cells", *SECTIONS.values()))
+    pieces = _open(data)
+    shape = _shape(pieces)
+    of_points, left_out = _fields(pieces, "PointData", ("Points",))
+    of_cells, more = _fields(pieces, "CellData", ("Cells", *SECTIONS.values()))
     notes = [
         f"the array {name!r} is not read: it is of text, or not in all pieces"
         for name in left_out + more
@@ -194,23 +239,15 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays, *tuple[str, ...]]:
     return of_points, of_cells, *notes
 
 
-def _open(data: bytes) -> tuple[list[ElementTree.Element], _Packing]:
-    """Return the pieces of a file that hold anything, and its encoding."""
+def _open(data: bytes) -> list[_Piece]:
+    """Return the pieces of a file that hold anything."""
     # Raw appended data are not text, and are cut out before the tags are parsed.
     raw = RAW.search(data)
     tags, appended = data, b""
     if raw:
-        end = data.rfind(b"</AppendedData")
-        appended = data[raw.end() : max(end, raw.end())]
-        tags = data[: raw.end()] + data[max(end, raw.end()) :]
-    if b"<!DOCTYPE" in tags:
-        raise FileFormatError(
-            "A VTK file must be plain XML; it has a DOCTYPE, whose entities could be of any size."
-        )
-    try:
-        root = ElementTree.fromstring(tags)
-    except (ElementTree.ParseError, ValueError, LookupError) as err:
-        raise FileFormatError(f"A VTK file must be whole XML; {err}.") from err
+        end = max(data.rfind(b"</AppendedData"), raw.end())
+        tags, appended = data[: raw.end()] + data[end:], data[raw.end() : end]
+    root = parse_xml(tags, "VTK")
     kind = str(root.get("type"))
     if root.tag != "VTKFile":
         raise FileFormatError(f"A VTK file in XML must be a VTKFile; it is a {root.tag[:30]}.")
@@ -219,48 +256,38 @@ def _open(data: bytes) -> tuple[list[ElementTree.Element], _Packing]:
     section = root.find("AppendedData")
     if section is not None and not raw:
         appended = (section.text or "").strip().removeprefix("_").encode()
-    header_type, order = root.get("header_type", "UInt32"), root.get("byte_order", "LittleEndian")
-    for name, word, known in (
-        ("header_type", header_type, HEADER_TYPES),
-        ("byte_order", order, ORDERS),
-    ):
-        if word not in known:
-            raise FileFormatError(
-                f"{name} of a VTK file must be {' or '.join(known)}; it is {word[:30]!r}."
-            )
+    order = _choose(root, "byte_order", ORDERS, "LittleEndian")
+    size = np.dtype(order + _choose(root, "header_type", HEADER_TYPES, "UInt32"))
     compressor = root.get("compressor") or None
-    size = np.dtype(ORDERS[order] + HEADER_TYPES[header_type])
-    packing = _Packing(size, ORDERS[order], compressor, appended, raw is not None, len(data))
-    pieces = [each for each in root.findall(f"./{kind}/Piece") if _count(each, "NumberOfPoints")]
+    packing = _Packing(size, order, compressor, appended, raw is not None, len(data))
+    pieces = [_Piece(each, packing) for each in root.findall(f"./{kind}/Piece")]
+    pieces = [piece for piece in pieces if piece.count("Points")]
     if not pieces:
         raise FileFormatError("A VTK file must hold pieces with points; it holds none.")
-    return pieces, packing
+    return pieces
 
 
-def _count(piece: ElementTree.Element, name: str) -> int:
-    text = piece.get(name, "0").strip()
-    if not re.fullmatch(r"[0-9]{1,18}", text):
+def _choose(root: Element, name: str, known: dict[str, str], usual: str) -> str:
+    word = root.get(name, usual)
+    if word not in known:
         raise FileFormatError(
-            f"Pieces of a VTK file must count what they hold; {name} is {text[:30]!r}."
+            f"{name} of a VTK file must be {' or '.join(known)}; it is {word[:30]!r}."
         )
-    return int(text)
+    return known[word]
 
 
-def _shape(pieces: Sequence[ElementTree.Element], packing: _Packing) -> VtkShape:
+def _shape(pieces: Sequence[_Piece]) -> VtkShape:
     """Return the points and cells of all pieces."""
-    points = [_points(piece, packing) for piece in pieces]
-    if len({part.shape[1] for part in points}) > 1:
-        raise FileFormatError(
-            "Pieces of a VTK file must have points of one dimension; they do not."
-        )
-    lists, types = [], []
+    points, lists, types = [], [], []
     first = 0  # point of the piece
-    for piece, part in zip(pieces, points, strict=True):
-        of_piece, kinds = _cells(piece, packing)
-        require_joined(of_piece, len(part))
+    for piece in pieces:
+        points.append(piece.points())
+        of_piece, kinds = piece.cells()
+        n_points = len(points[-1])
+        require_joined(of_piece, n_points)
         lists.append(CellLists(of_piece.starts, of_piece.corners + first))
         types.append(kinds)
-        first += len(part)
+        first += n_points
     shape = sort_cells(np.concatenate(points), CellLists.join(lists), np.concatenate(types))
     if len(pieces) > 1:
         shape.notes.append(
@@ -270,72 +297,19 @@ def _shape(pieces: Sequence[ElementTree.Element], packing: _Packing) -> VtkShape
     return shape
 
 
-def _points(piece: ElementTree.Element, packing: _Packing) -> Float[np.ndarray, "n d"]:
-    array = piece.find("./Points/DataArray")
-    if array is None:
-        raise FileFormatError("A VTK file must have points; a piece has none.")
-    width = (array.get("NumberOfComponents") or "3").strip()
-    if width not in ("1", "2", "3"):
-        raise FileFormatError(
-            f"Points of a VTK file must have 1 to 3 coordinates each; they have {width[:30]!r}."
-        )
-    numbers = packing.numbers(array, _count(piece, "NumberOfPoints") * int(width))
-    return numbers.reshape(-1, int(width)).astype(np.float64)
-
-
-def _cells(
-    piece: ElementTree.Element, packing: _Packing
-) -> tuple[CellLists, Int[np.ndarray, " c"]]:
-    """Return the cells of a piece, and VTK's number of their type."""
-    n_cells = _count(piece, "NumberOfCells")
-    if not n_cells:
-        sections = {}
-        for kind, name in SECTIONS.items():
-            if count := _count(piece, f"NumberOf{name}"):
-                sections[kind] = _lists(
-                    _arrays(piece, name, ("connectivity", "offsets")), packing, count
-                )
-        return surface_lists(sections)
-    arrays = _arrays(piece, "Cells", ("connectivity", "offsets", "types"))
-    types = wholes(packing.numbers(arrays["types"], n_cells), "types of a VTK file")
-    return _lists(arrays, packing, n_cells), types
-
-
-def _arrays(
-    piece: ElementTree.Element, section: str, required: tuple[str, ...]
-) -> dict[str, ElementTree.Element]:
-    arrays = {array.get("Name", ""): array for array in piece.findall(f"./{section}/DataArray")}
-    if not arrays.keys() >= set(required):
-        raise FileFormatError(
-            f"{section} of a VTK file must have {', '.join(required)}; they have {', '.join(arrays)}."
-        )
-    return arrays
-
-
-def _lists(arrays: dict[str, ElementTree.Element], packing: _Packing, n_cells: int) -> CellLists:
-    ends = wholes(packing.numbers(arrays["offsets"], n_cells), "offsets of a VTK file")
-    starts = np.concatenate([[0], ends])
-    if (np.diff(starts) < 0).any():
-        raise FileFormatError(
-            f"Offsets of a VTK file must rise from 0; they begin with {ends[:9].tolist()}."
-        )
-    corners = packing.numbers(arrays["connectivity"], int(starts[-1]))
-    return CellLists(starts, wholes(corners, "connectivity of a VTK file"))
-
-
 def _fields(
-    pieces: Sequence[ElementTree.Element], packing: _Packing, section: str, counts: tuple[str, ...]
+    pieces: Sequence[_Piece], section: str, counted: Sequence[str]
 ) -> tuple[Arrays, list[str]]:
     """Return the functions that all pieces have, and the names of other arrays."""
     found: dict[str, list[np.ndarray]] = {}
     for piece in pieces:
-        count = sum(_count(piece, f"NumberOf{name}") for name in counts)
-        for array in piece.findall(f"./{section}/*"):
+        count = sum(map(piece.count, counted))
+        for array in piece.element.findall(f"./{section}/*"):
             name = array.get("Name", section)
             parts = found.setdefault(name, [])
             width = array.get("NumberOfComponents", "1")
             if array.get("type") in NUMBERS and re.fullmatch(r"[0-9]{1,9}", width):
-                values = packing.numbers(array, count * int(width))
+                values = piece.packing.numbers(array, count * int(width))
                 values = values.astype(values.dtype.newbyteorder("="))
                 parts.append(values if width == "1" else values.reshape(count, int(width)))
     whole = {
@@ -355,8 +329,8 @@ def format_piece(
     """
     n_cells, n_corners = mesh.simplices.shape
     ends = n_corners * np.arange(1, n_cells + 1)
-    places = np.zeros((mesh.n_points, 3))  # VTK has no points in the plane
-    places[:, : mesh.points.shape[1]] = mesh.points
+    # VTK has no points in the plane.
+    places = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
     lines = [
         f'<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
         f"<{kind}>",

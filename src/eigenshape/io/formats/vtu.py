@@ -10,13 +10,10 @@ Refused: polyhedra; more than a file can hold.
 import numpy as np
 
 from eigenshape.geometry.simplicial import Mesh
-from eigenshape.io.formats.vtk_cells import LINE, TETRAHEDRON, TRIANGLE, Arrays
+from eigenshape.io.formats.vtk_cells import SIMPLEX_TYPES, Arrays
 from eigenshape.io.formats.vtk_xml import array_tag, format_piece, parse, parse_fields
 
 __all__ = ["format_fields", "parse", "parse_fields"]
-
-# VTK's number of the type of cell, by its number of corners
-SIMPLEX_TYPES = {2: LINE, 3: TRIANGLE, 4: TETRAHEDRON}
 
 
 def format_fields(mesh: Mesh, of_vertices: Arrays, of_faces: Arrays) -> bytes:

@@ -13,8 +13,8 @@ import numpy as np
 from eigenshape._errors import FileFormatError
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.io.formats.neuro.shared import NO_PARCEL, find_keys, shared_keys
-from eigenshape.io.formats.numbers import Cursor, coordinates, lines_of, whole, wholes
+from eigenshape.io.formats.neuro.shared import NO_PARCEL, find_labels, shared_keys
+from eigenshape.io.formats.numbers import Cursor, coordinates, find_keys, lines_of, whole, wholes
 
 WHAT = "An annotation file"
 PACKING = np.array([1, 2**8, 2**16])  # of red, green and blue into the number of a parcel
@@ -36,8 +36,8 @@ def parse_parcels(data: bytes, mesh: TriangleMesh) -> tuple[Any, ...]:
 
     n_vertices = take_whole()
     rows = cursor.wholes(">i4", 2 * n_vertices).reshape(-1, 2)
-    vertices, values = rows.T
-    odd = np.flatnonzero(np.sort(vertices) != np.arange(n_vertices))
+    vertices, values = rows[np.argsort(rows[:, 0])].T
+    odd = np.flatnonzero(vertices != np.arange(n_vertices))
     if odd.size:
         raise FileFormatError(
             f"{WHAT} must list each of its {n_vertices} vertices once; it does not list {odd[0]} once."
@@ -69,13 +69,7 @@ def parse_parcels(data: bytes, mesh: TriangleMesh) -> tuple[Any, ...]:
             f"Colors of {WHAT} must lie in 0..255; that of {names[bad[0]]!r} is {table[bad[0]].tolist()}."
         )
     keys = table[:, :3] @ PACKING
-    found = find_keys(keys, values)
-    lost = np.flatnonzero((found < 0) & (values != 0))
-    if lost.size:
-        raise FileFormatError(
-            f"Colors of {WHAT} must stand in its table; that of vertex {vertices[lost[0]]} is "
-            f"{values[lost[0]]} ({lost.size} such)."
-        )
+    found = find_labels("Colors of an annotation file", keys, values)
     notes = shared_keys("colors", keys, names, values[values != 0])
     # The number 0 is that of black, and of vertices in no parcel; nibabel and FreeSurfer's tools
     # take it for the latter.
@@ -93,10 +87,8 @@ def parse_parcels(data: bytes, mesh: TriangleMesh) -> tuple[Any, ...]:
             f"{names[hidden[0]]!r} is 255 ({hidden.size} such), so it has the opacity 0. If opacity was "
             "meant, set it to 1 in a copy of the colors, and make a Parcellation with that"
         )
-    labels = np.empty(n_vertices, dtype=np.int64)
-    labels[vertices] = found
     rgba = np.column_stack([table[:, :3], OPAQUE - table[:, 3]]) / OPAQUE
-    return Parcellation(labels, tuple(names), rgba), *notes
+    return Parcellation(found, tuple(names), rgba), *notes
 
 
 def _parse_label(data: bytes, n_points: int) -> tuple[Any, ...]:

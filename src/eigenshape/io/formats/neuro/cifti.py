@@ -17,7 +17,9 @@ from eigenshape.geometry.repairs.masks import hemisphere_of
 from eigenshape.io.formats.neuro.shared import (
     NO_PARCEL,
     Arrays,
-    find_keys,
+    drop_nameless,
+    find_labels,
+    label_table,
     narrow,
     require_nibabel,
 )
@@ -25,7 +27,6 @@ from eigenshape.io.formats.numbers import require_reasonable
 
 PREFIX = "CIFTI_STRUCTURE_"
 NIFTI_HEADER = 540  # bytes
-MAGIC = b"n+2\0\r\n\x1a\n"
 SURFACES = ("cortex_left", "cortex_right")  # structures that files are written for
 SERIES = "series"
 
@@ -46,25 +47,21 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
 def _parse(data: bytes) -> tuple[Any, Arrays]:
     """Return the axis of the functions, and the functions."""
     nibabel = require_nibabel("nibabel")
-    _require_size(data)
     try:
+        _require_size(nibabel.Nifti2Header(data[:NIFTI_HEADER], check=False), len(data))
         image = nibabel.Cifti2Image.from_bytes(data)
         maps, models = image.header.get_axis(0), image.header.get_axis(1)
         values = np.asarray(image.dataobj)
         values = values if values.dtype.kind == "f" else values.astype(np.float64)
-        structures = [
-            (name.removeprefix(PREFIX).lower(), place, part)
-            for name, place, part in models.iter_structures()
-        ]
         tables: Arrays = {}
-        for structure, place, part in structures:
+        for name, place, part in models.iter_structures():
             table = held = values[:, place].T
             if part.surface_mask.all():
                 n_vertices = next(iter(part.nvertices.values()))
                 require_reasonable(8 * n_vertices * len(values), len(data))
                 table = np.full((n_vertices, len(values)), np.nan, values.dtype)
                 table[part.vertex] = held
-            tables[structure] = table
+            tables[name.removeprefix(PREFIX).lower()] = table
         if not hasattr(maps, "name"):
             return maps, {f"{structure}:{SERIES}": table for structure, table in tables.items()}
         found = {
@@ -98,17 +95,10 @@ def parse_parcels(data: bytes, mesh: TriangleMesh) -> tuple[Parcellation]:
             "Move the surface to its side of x = 0 if that is not known."
         )
     labels = np.nan_to_num(of_side[0])
-    rows = [(key, *row) for key, row in tables[0].items() if row[0] != NO_PARCEL]
-    places = find_keys(np.array([key for key, *_ in rows]), labels)
-    nameless = {key for key, row in tables[0].items() if row[0] == NO_PARCEL} | {0}
-    odd = np.flatnonzero((places < 0) & ~np.isin(labels, list(nameless)))
-    if odd.size:
-        raise FileFormatError(
-            f"Labels of a CIFTI file must stand in its table; that of vertex {odd[0]} is "
-            f"{labels[odd[0]]:g} ({odd.size} such)."
-        )
-    names, colors = tuple(name for _, name, _ in rows), [color for *_, color in rows]
-    return (Parcellation(places, names, colors),)
+    names = [name for name, _ in tables[0].values()]
+    colors = [color for name, color in tables[0].values() if name != NO_PARCEL]
+    places = find_labels("Labels of a CIFTI file", np.array(list(tables[0])), labels)
+    return (Parcellation(*drop_nameless(places, names), colors),)
 
 
 def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) -> bytes:
@@ -119,33 +109,25 @@ def format_parcels(mesh: TriangleMesh, parcellation: Parcellation, suffix: str) 
             "A CIFTI file holds parcels of a hemisphere; the surface lies on both sides of x = 0. "
             "Write .label.gii."
         )
-    nibabel = require_nibabel("nibabel")
     axes = require_nibabel("nibabel.cifti2.cifti2_axes")
-    rows = zip((NO_PARCEL, *parcellation.names), [[0] * 4, *parcellation.colors], strict=True)
-    table = {key: (name, tuple(map(float, color))) for key, (name, color) in enumerate(rows)}
     everywhere = np.ones(mesh.n_vertices, dtype=bool)
     model = axes.BrainModelAxis.from_mask(everywhere, name=f"cortex_{side}")
+    maps = axes.LabelAxis(["parcels"], [label_table(parcellation)])
     labels = (parcellation.labels[None] + 1).astype(np.int32)
-    image = nibabel.Cifti2Image(labels, (axes.LabelAxis(["parcels"], [table]), model))
-    image.nifti_header.set_intent("ConnDenseLabel")
-    written: bytes = image.to_bytes()
-    return written
+    return _write(labels, maps, model, "ConnDenseLabel")
 
 
-def _require_size(data: bytes) -> None:
+def _require_size(header: Any, n_bytes: int) -> None:
     """Raise an error for a damaged header, which nibabel would mend, and for numbers that the file cannot hold."""
-    order = "<" if data[:4] == b"\x1c\x02\0\0" else ">"
     size = -1.0
-    if len(data) >= NIFTI_HEADER and data[4:12] == MAGIC:
-        bits = int(np.frombuffer(data, f"{order}i2", 1, 14)[0])
-        shape = np.frombuffer(data, f"{order}i8", 8, 16)
-        offset = np.frombuffer(data, f"{order}i8", 1, 168)[0]
-        if offset >= NIFTI_HEADER:
-            size = float(offset) + bits / 8 * float(np.prod(shape[1:].astype(float)))
-    if not 0 < size <= len(data):
+    if header["magic"] == b"n+2" and header["vox_offset"] >= NIFTI_HEADER:
+        size = header["vox_offset"] + header["bitpix"] / 8 * np.prod(
+            header["dim"][1:].astype(float)
+        )
+    if not 0 < size <= n_bytes:
         raise FileFormatError(
             "A CIFTI file must hold a header of NIfTI-2 and what that declares, uncompressed; "
-            f"{size:.0f} bytes do not fit into its {len(data)} (-1: the header is damaged)."
+            f"{size:.0f} bytes do not fit into its {n_bytes} (-1: the header is damaged)."
         )
 
 
@@ -159,7 +141,6 @@ def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
             f"Functions are written to .dscalar.nii, each map of a series by itself; files in {suffix} "
             "are only read, and es.io.write_parcellation writes parcels."
         )
-    nibabel = require_nibabel("nibabel")
     axes = require_nibabel("nibabel.cifti2.cifti2_axes")
     by_structure: dict[str, Arrays] = {}
     for name, values in of_vertices.items():
@@ -184,7 +165,11 @@ def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
         models = model if models is None else models + model
         columns.append(table[:, kept])
     rows = narrow("functions", np.hstack(columns))
-    image = nibabel.Cifti2Image(rows, (axes.ScalarAxis(names[0]), models))
-    image.nifti_header.set_intent("ConnDenseScalar")
+    return _write(rows, axes.ScalarAxis(names[0]), models, "ConnDenseScalar")
+
+
+def _write(rows: np.ndarray, maps: Any, models: Any, intent: str) -> bytes:
+    image = require_nibabel("nibabel").Cifti2Image(rows, (maps, models))
+    image.nifti_header.set_intent(intent)
     written: bytes = image.to_bytes()
     return written

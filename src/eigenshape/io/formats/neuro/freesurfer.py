@@ -8,7 +8,7 @@ Refused: patches; functions in place of a surface, and the other way around.
 """
 
 import gzip
-import zlib
+import math
 from typing import Any
 
 import numpy as np
@@ -17,15 +17,13 @@ from jaxtyping import Float, Int, Shaped
 from eigenshape._errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.neuro.shared import (
-    GZIP,
     UNNAMED,
-    VOLUME_SIZE,
     Arrays,
-    count_vertices,
     narrow,
-    one_table,
+    require_axes,
+    volume_function,
 )
-from eigenshape.io.formats.numbers import ALWAYS, Cursor, require_reasonable
+from eigenshape.io.formats.numbers import Cursor
 from eigenshape.io.formats.registry import suffix_of_bytes
 from eigenshape.io.formats.stl import single_precision
 
@@ -34,6 +32,7 @@ SURFACE, QUADRANGLES, CURVATURE = b"\xff\xff\xfe", b"\xff\xff\xfd", b"\xff\xff\x
 HUNDREDTHS = 100  # in a unit of numbers of 16 bits
 MGH_NUMBERS = {0: ">u1", 1: ">i4", 3: ">f4", 4: ">i2", 10: ">u2"}
 MGH_HEADER = 284  # bytes
+MGH_PLACE = 28  # bytes before the place of the volume
 # Sides, axes and center of a volume that does not say where it lies
 UNPLACED = (1, 1, 1, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 0)
 MGH_WORD = {"f": 3, "i": 1}
@@ -109,7 +108,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
         if suffix_of_bytes(data[:20], len(data)) == ".curv":  # the old form, without a signature
             numbers = np.frombuffer(data, ">i2", offset=6)
             return {UNNAMED: (numbers / HUNDREDTHS).astype(np.float32)}, {}
-        return {UNNAMED: _mgh_values(_unpack(data) if data.startswith(GZIP) else data)}, {}
+        return {UNNAMED: volume_function(_read_mgh(data, is_volume=False))}, {}
     cursor = Cursor(data, "A file of functions on vertices", place=len(CURVATURE))
     n_vertices, _, width = cursor.wholes(">i4", 3).tolist()
     if width != 1:
@@ -121,78 +120,59 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     return {UNNAMED: values}, {}
 
 
-def _unpack(data: bytes, always: int = ALWAYS) -> bytes:
-    unpacker = zlib.decompressobj(wbits=31)
-    try:
-        # The header tells how large the rest must be before that is unpacked.
-        head = unpacker.decompress(data, MGH_HEADER)
-        size = MGH_HEADER + 4 * int(np.prod(np.frombuffer(head, ">i4", 5)[1:].astype(float)))
-        require_reasonable(size, len(data), always)
-        # Behind the numbers, a little text tells about the scanner.
-        return head + unpacker.decompress(unpacker.unconsumed_tail, max(size, 1))
-    except (zlib.error, ValueError, OverflowError) as err:
-        raise FileFormatError(f"A packed MGH file must be whole; {err}.") from err
-
-
 def parse_volume(data: bytes) -> tuple[Shaped[np.ndarray, "a b c"], Float[np.ndarray, "4 4"]]:
     """Return the numbers of a volume, and the map from voxels to space.
 
     Raise FileFormatError if the file is not MGH of one frame, or does not hold what it declares.
     """
-    unpacked = _unpack(data, VOLUME_SIZE) if data.startswith(GZIP) else data
-    cursor = Cursor(unpacked, "An MGH file")
-    version, *shape, n_frames, kind = cursor.wholes(">i4", 6).tolist()
-    if version != 1 or kind not in MGH_NUMBERS or n_frames != 1 or min(shape) < 1:
-        raise FileFormatError(
-            f"An MGH file of a volume must have one frame; version {version}, type {kind} and "
-            f"{' x '.join(map(str, shape))} x {n_frames} were found."
-        )
-    cursor.place += 4  # a word that means nothing here
+    values = _read_mgh(data, is_volume=True)
+    cursor = Cursor(data, "An MGH file", place=MGH_PLACE)
     placed = cursor.take(">i2", 1)[0] > 0
     numbers = cursor.take(">f4", 15) if placed else np.array(UNPLACED)
     # Sides of a voxel, then where its axes point, then where the center of the volume lies.
     sides, axes, center = np.split(numbers.astype(np.float64), [3, 12])
     to_space = np.eye(4)
     to_space[:3, :3] = axes.reshape(3, 3).T * sides
-    to_space[:3, 3] = center - to_space[:3, :3] @ (np.array(shape) / 2)
+    to_space[:3, 3] = center - to_space[:3, :3] @ (np.array(values.shape[:3]) / 2)
     if not np.isfinite(to_space).all():
         raise FileFormatError(
             f"Places of voxels in an MGH file must be finite; the map is {to_space.tolist()}."
         )
-    cursor.place = MGH_HEADER
-    values = cursor.take(MGH_NUMBERS[kind], int(np.prod(np.array(shape, dtype=float))))
-    # The first axis is the fastest in the file.
-    values = values.reshape(shape, order="F")
-    return np.ascontiguousarray(values, values.dtype.newbyteorder("=")), to_space
+    return np.ascontiguousarray(values[..., 0]), to_space
 
 
-def _mgh_values(data: bytes) -> np.ndarray:
+def _read_mgh(data: bytes, *, is_volume: bool) -> Shaped[np.ndarray, "a b c frames"]:
     cursor = Cursor(data, "An MGH file")
-    version, n, height, depth, n_frames, kind = cursor.wholes(">i4", 6).tolist()
-    n_vertices = count_vertices((n, height, depth))
-    if version != 1 or kind not in MGH_NUMBERS or min(n_vertices, n_frames) < 1:
+    version, *axes, kind = cursor.wholes(">i4", 6).tolist()
+    if version != 1 or kind not in MGH_NUMBERS:
         raise FileFormatError(
-            "An MGH file of a surface must have a number for each vertex and frame, "
-            f"n x 1 x 1 x frames; version {version}, type {kind} and {n} x {height} x {depth} x "
-            f"{n_frames} were found. es.io.read_volume reads volumes."
+            f"An MGH file must be of version 1 and of numbers; it is of version {version} and type {kind}."
         )
+    require_axes("An MGH file", axes, is_volume=is_volume)
     cursor.place = MGH_HEADER
-    values = cursor.take(MGH_NUMBERS[kind], n_vertices * n_frames)
-    table = values.astype(values.dtype.newbyteorder("=")).reshape(n_frames, n_vertices).T
-    return table[:, 0] if n_frames == 1 else np.ascontiguousarray(table)
+    values = cursor.take(MGH_NUMBERS[kind], math.prod(axes))
+    # The first axis is the fastest in the file.
+    native = values.astype(values.dtype.newbyteorder("="))
+    return native.reshape(axes, order="F")
 
 
 def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
     """Write one function, or the columns of a table as frames of an MGH file."""
-    values = one_table(of_vertices, f"A file in {suffix}")
+    if len(of_vertices) != 1:
+        raise FileFormatError(
+            f"A file in {suffix} holds one function, without a name; there are {len(of_vertices)}. "
+            "Write each to a file of its own."
+        )
+    (values,) = (narrow(name, table) for name, table in of_vertices.items())
+    table = values.reshape(mesh.n_vertices, -1)
+    n_frames = table.shape[1]
     if suffix == ".curv":
-        if values.ndim > 1:
+        if n_frames > 1:
             raise FileFormatError(
-                f"A file in .curv holds one number a vertex; there are {values.shape[1]}. Write .mgh."
+                f"A file in .curv holds one number a vertex; there are {n_frames}. Write .mgh."
             )
         counts = np.array([mesh.n_vertices, mesh.n_faces, 1], ">i4").tobytes()
-        return CURVATURE + counts + narrow(UNNAMED, values).astype(">f4").tobytes()
-    n_frames = values.shape[1] if values.ndim > 1 else 1
+        return CURVATURE + counts + values.astype(">f4").tobytes()
     shape = [1, mesh.n_vertices, 1, 1, n_frames, MGH_WORD[values.dtype.kind], 0]
     head = np.array(shape, ">i4").tobytes().ljust(MGH_HEADER, b"\0")
     data = head + values.T.astype(values.dtype.newbyteorder(">")).tobytes()

@@ -7,11 +7,9 @@ Named: the transformation and metadata in other formats; parcels of one key; dig
 Refused: several surfaces; files outside the folder; labels without names as parcels.
 """
 
-import base64
-import binascii
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -24,14 +22,17 @@ from eigenshape.io.formats.neuro.shared import (
     NO_PARCEL,
     UNNAMED,
     Arrays,
-    find_keys,
+    drop_nameless,
+    find_labels,
+    label_table,
     narrow,
     require_nibabel,
     shared_keys,
 )
-from eigenshape.io.formats.numbers import ZLIB, numbers_of, require_reasonable, unpack_block
+from eigenshape.io.formats.numbers import ZLIB, require_reasonable, unpack_block
 from eigenshape.io.formats.obj_attributes import find_beside
 from eigenshape.io.formats.stl import single_precision
+from eigenshape.io.formats.xml_arrays import decode_base64, parse_xml, text_numbers
 
 # The standard has uint8, int32 and float32; other programs write more of the types of NIfTI.
 NUMBERS = {
@@ -56,16 +57,10 @@ def parse(
 
     Raise FileFormatError if the file does not hold one surface, or not what it declares.
     """
-    arrays = parse_tags(data).findall("DataArray")
+    root = parse_tags(data)
     found = []
     for intent, kind in ((POINTS, "f"), (TRIANGLES, "iu")):
-        fitting = [array for array in arrays if array.get("Intent") == intent]
-        if len(fitting) != 1:
-            raise FileFormatError(
-                f"A GIFTI file of a surface must have one array {intent}; it has {len(fitting)}. "
-                "es.io.read_fields reads the functions in it."
-            )
-        rows = _values(fitting[0], len(data), folder)
+        rows = _values(_only_array(root, intent), len(data), folder)
         if rows.ndim != 2 or rows.shape[1] != 3 or rows.dtype.kind not in kind:
             raise FileFormatError(
                 f"{intent} of a GIFTI file must have three numbers a row, coordinates or whole numbers; "
@@ -108,22 +103,15 @@ def parse_parcels(data: bytes, mesh: TriangleMesh, folder: Path | None = None) -
     Raise FileFormatError if there is not one array of labels, or a label has no name or half a color.
     """
     root = parse_tags(data)
-    arrays = [array for array in root.findall("DataArray") if array.get("Intent") == LABELS]
-    if len(arrays) != 1:
-        raise FileFormatError(
-            f"A GIFTI file of labels must have one array {LABELS}; it has {len(arrays)}. "
-            "es.io.read_fields reads the numbers of all arrays."
-        )
-    labels = _values(arrays[0], len(data), folder).ravel()
+    labels = _values(_only_array(root, LABELS), len(data), folder).ravel()
     keys, names, colors = [], [], []
     for label in root.findall("./LabelTable/Label"):
         name, facts = (label.text or "").strip(), label.attrib
         shades = [facts[each] for each in ("Red", "Green", "Blue") if each in facts]
-        color = []
+        words = [*shades, facts.get("Alpha", "1")] if shades and name != NO_PARCEL else []
         try:
             keys.append(int(facts.get("Key", facts.get("Index", ""))))  # Index in files of 2008
-            if shades and name != NO_PARCEL:
-                color = [float(word) for word in (*shades, facts.get("Alpha", "1"))]
+            color = list(map(float, words))
         except ValueError:
             color = [np.nan]
         if len(color) not in (0, 4) or not all(0 <= share <= 1 for share in color):
@@ -133,25 +121,16 @@ def parse_parcels(data: bytes, mesh: TriangleMesh, folder: Path | None = None) -
         names.append(name)
         if name != NO_PARCEL:
             colors.append(color)
-    parcels = tuple(name for name in names if name != NO_PARCEL)
-    if not parcels:
+    if not colors:
         raise FileFormatError(
             "A GIFTI file of labels must have a table of names and colors; it has none. "
             "es.io.read_fields reads its numbers, such as those of a mask."
         )
-    places = find_keys(np.array(keys), labels)
-    odd = np.flatnonzero((places < 0) & (labels != 0))
-    if odd.size:
-        raise FileFormatError(
-            f"Labels of a GIFTI file must stand in its table; that of vertex {odd[0]} is "
-            f"{labels[odd[0]]} ({odd.size} such)."
-        )
-    is_parcel = np.array([name != NO_PARCEL for name in names])
-    numbers = np.append(np.where(is_parcel, np.cumsum(is_parcel) - 1, -1), -1)
-    hues = Parcellation([], parcels).colors
-    chosen = [color or hue for color, hue in zip(colors, hues.tolist(), strict=True)]
+    places = find_labels("Labels of a GIFTI file", np.array(keys), labels)
+    found = Parcellation(*drop_nameless(places, names))
+    chosen = [color or hue for color, hue in zip(colors, found.colors.tolist(), strict=True)]
     notes = shared_keys("keys", np.array(keys), names, labels)
-    return Parcellation(numbers[places], parcels, chosen), *notes
+    return Parcellation(found.labels, found.names, chosen), *notes
 
 
 def structure_of(data: bytes) -> str:
@@ -161,16 +140,9 @@ def structure_of(data: bytes) -> str:
     return next(filter(None, found), "")
 
 
-def parse_tags(data: bytes) -> ElementTree.Element:
+def parse_tags(data: bytes) -> Element:
     """Return the root of a file, and raise FileFormatError if that does not hold its arrays."""
-    if b"<!ENTITY" in data:
-        raise FileFormatError(
-            "A GIFTI file must be plain XML; it declares entities, which could be of any size."
-        )
-    try:
-        root = ElementTree.fromstring(data)
-    except (ElementTree.ParseError, ValueError, LookupError) as err:
-        raise FileFormatError(f"A GIFTI file must be whole XML; {err}.") from err
+    root = parse_xml(data, "GIFTI")
     count = root.get("NumberOfDataArrays", "")
     if root.tag != "GIFTI" or count.strip() != str(len(root.findall("DataArray"))):
         raise FileFormatError(
@@ -180,14 +152,24 @@ def parse_tags(data: bytes) -> ElementTree.Element:
     return root
 
 
-def _meta(element: ElementTree.Element) -> dict[str, str]:
+def _only_array(root: Element, intent: str) -> Element:
+    arrays = root.findall(f"DataArray[@Intent='{intent}']")
+    if len(arrays) != 1:
+        raise FileFormatError(
+            f"A GIFTI file of a surface or of parcels must have one array {intent}; it has "
+            f"{len(arrays)}. es.io.read_fields reads the functions and labels in it."
+        )
+    return arrays[0]
+
+
+def _meta(element: Element) -> dict[str, str]:
     return {
         (pair.findtext("Name") or "").strip(): (pair.findtext("Value") or "").strip()
         for pair in element.findall("./MetaData/MD")
     }
 
 
-def _values(array: ElementTree.Element, n_bytes: int, folder: Path | None) -> np.ndarray:
+def _values(array: Element, n_bytes: int, folder: Path | None) -> np.ndarray:
     """Return the numbers of an array; `n_bytes` is the size of the file, and `folder` its place."""
     intent, encoding = array.get("Intent", "an array"), array.get("Encoding", "")
     kind, order = NUMBERS.get(array.get("DataType", "")), ORDERS.get(array.get("Endian", ""))
@@ -205,19 +187,9 @@ def _values(array: ElementTree.Element, n_bytes: int, folder: Path | None) -> np
     size = int(np.prod([float(each) for each in shape])) * dtype.itemsize
     text = (array.findtext("Data") or "").encode()
     if encoding in TEXT:
-        try:
-            data = numbers_of(text.split()).astype(dtype).tobytes()
-        except ValueError as err:
-            raise FileFormatError(
-                f"Arrays of a GIFTI file must be of numbers; {intent} is not: {err}."
-            ) from err
+        data = text_numbers(text, dtype, "GIFTI", intent).astype(dtype).tobytes()
     elif encoding in PLAIN + PACKED:
-        try:
-            data = base64.b64decode(b"".join(text.split()), validate=True)
-        except binascii.Error as err:
-            raise FileFormatError(
-                f"Arrays of a GIFTI file must be in base64; {intent} is not: {err}."
-            ) from err
+        data = decode_base64(b"".join(text.split()), "GIFTI", intent)
         if encoding in PACKED:
             require_reasonable(size, n_bytes)
             data = unpack_block(data, size, ZLIB)
@@ -255,8 +227,6 @@ def format_fields(
         raise FileFormatError(
             f"GIFTI files hold functions on vertices; {next(iter(of_faces))!r} is on faces."
         )
-    if mesh.n_vertices > np.iinfo(np.int32).max:
-        raise FileFormatError(f"GIFTI files hold 2^31 vertices; the mesh has {mesh.n_vertices}.")
     arrays = [(POINTS, "", single_precision(mesh, "GIFTI")), (TRIANGLES, "", mesh.faces)]
     shapes = [("NIFTI_INTENT_SHAPE", name, values) for name, values in of_vertices.items()]
     return _format(arrays + shapes, structure)
@@ -284,23 +254,18 @@ def _format(
     gifti = require_nibabel("nibabel.gifti")
     table = gifti.GiftiLabelTable()
     if parcellation is not None:
-        rows = zip((NO_PARCEL, *parcellation.names), [[0] * 4, *parcellation.colors], strict=True)
-        for key, (name, color) in enumerate(rows):
-            label = gifti.GiftiLabel(key, *map(float, color))
+        for key, (name, color) in label_table(parcellation).items():
+            label = gifti.GiftiLabel(key, *color)
             label.label = name
             table.labels.append(label)
     named = {STRUCTURE: structure} if structure else {}
     image = gifti.GiftiImage(labeltable=table, meta=gifti.GiftiMetaData(named))
     for intent, name, values in arrays:
-        for column in (
-            [values] if intent in (POINTS, TRIANGLES) else values.reshape(len(values), -1).T
-        ):
-            # Of surfaces, Connectome Workbench reads the structure of the points.
-            meta = gifti.GiftiMetaData(
-                named if intent == POINTS else {"Name": name} if name else {}
-            )
-            image.add_gifti_data_array(
-                gifti.GiftiDataArray(narrow(name, column), intent=intent, meta=meta)
-            )
+        # Of surfaces, Connectome Workbench reads the structure of the points.
+        pairs = named if intent == POINTS else {"Name": name} if name else {}
+        is_surface = intent in (POINTS, TRIANGLES)
+        for column in [values] if is_surface else values.reshape(len(values), -1).T:
+            meta, numbers = gifti.GiftiMetaData(pairs), narrow(name, column)
+            image.add_gifti_data_array(gifti.GiftiDataArray(numbers, intent=intent, meta=meta))
     text: bytes = image.to_bytes()
     return text

@@ -7,7 +7,6 @@ Refused: several frames as a volume; a map that is not finite.
 """
 
 import math
-import zlib
 
 import numpy as np
 from jaxtyping import Float, Shaped
@@ -15,19 +14,15 @@ from jaxtyping import Float, Shaped
 from eigenshape._errors import FileFormatError, MissingExtraError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.neuro.shared import (
-    GZIP,
     UNNAMED,
-    VOLUME_SIZE,
     Arrays,
-    count_vertices,
+    require_axes,
     require_nibabel,
+    volume_function,
 )
-from eigenshape.io.formats.numbers import require_reasonable
 
 # Sizes of headers, which files begin with, and classes of nibabel
 HEADERS = {348: "Nifti1Image", 540: "Nifti2Image"}
-LONGEST_HEADER = 540  # bytes
-MOST_BEFORE = 2**20  # bytes of notes between the header and the numbers
 
 
 def parse_volume(data: bytes) -> tuple[Shaped[np.ndarray, "a b c"], Float[np.ndarray, "4 4"]]:
@@ -45,8 +40,7 @@ def parse_fields(data: bytes) -> tuple[Arrays, Arrays]:
     Raise FileFormatError if the file does not hold what it declares, or holds a volume.
     """
     values, _ = _parse(data, is_volume=False)
-    table = values.reshape(-1, math.prod(values.shape[3:]), order="F")
-    return {UNNAMED: table[:, 0] if table.shape[1] == 1 else np.ascontiguousarray(table)}, {}
+    return {UNNAMED: volume_function(values)}, {}
 
 
 def format_maps(mesh: TriangleMesh, of_vertices: Arrays, suffix: str) -> bytes:
@@ -60,8 +54,6 @@ def _parse(data: bytes, *, is_volume: bool) -> tuple[np.ndarray, Float[np.ndarra
         values, to_space = _load(data, is_volume=is_volume)
     except (FileFormatError, MissingExtraError):
         raise
-    except zlib.error as err:
-        raise FileFormatError(f"A packed NIfTI file must be whole; {err}.") from err
     except Exception as err:  # nibabel and what it calls each raise their own
         cause = " ".join(str(err).split())
         raise FileFormatError(
@@ -78,34 +70,21 @@ def _parse(data: bytes, *, is_volume: bool) -> tuple[np.ndarray, Float[np.ndarra
 def _load(data: bytes, *, is_volume: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return what nibabel reads, once the header has told that the file is whole, and its size."""
     nibabel = require_nibabel("nibabel")
-    packed = data.startswith(GZIP)
-    unpacker = zlib.decompressobj(wbits=31)
-    head = unpacker.decompress(data, LONGEST_HEADER) if packed else data[:LONGEST_HEADER]
-    length = next(
-        (n for n in HEADERS for o in ("little", "big") if head.startswith(n.to_bytes(4, o))), 0
-    )
-    if not length or len(head) < length:
+    length = int.from_bytes(data[:4], "little")
+    if length not in HEADERS:
+        length = int.from_bytes(data[:4], "big")
+    if length not in HEADERS or len(data) < length:
         raise FileFormatError(
             "A NIfTI file must begin with its header, of 348 or 540 bytes; it begins with "
-            f"{head[:4].hex(' ')}, and has {len(head)} bytes of one."
+            f"{data[:4].hex(' ')}, and has {len(data)} bytes."
         )
     kind = getattr(nibabel, HEADERS[length])
-    header = kind.header_class(head[:length], check=False)
+    header = kind.header_class(data[:length], check=False)
     # nibabel returns the number of vertices that FreeSurfer stores elsewhere if 16 bits are too few.
     axes, bits = list(header.get_data_shape()), int(header["bitpix"])
-    if is_volume:
-        rule = "a volume must have three axes and one frame"
-        fits = len(axes) >= 3 and max(axes[3:], default=1) == 1
-    else:
-        rule = "functions on vertices must be n x 1 x 1, or that and frames"
-        fits = count_vertices([*axes, 1, 1, 1][:3]) > 0
-    if not fits or min(axes) < 1 or bits < 1:
-        raise FileFormatError(f"A NIfTI file of {rule}; it has {axes}, of {bits} bits each.")
+    require_axes("A NIfTI file", axes, is_volume=is_volume)
     size = math.prod(axes) * bits // 8
-    if packed:
-        require_reasonable(size, len(data), VOLUME_SIZE)
-        data = head + unpacker.decompress(unpacker.unconsumed_tail, size + MOST_BEFORE)
-    if size > len(data):
+    if not 0 < size <= len(data):
         raise FileFormatError(
             f"A NIfTI file must hold what it declares; {size} bytes do not fit into its {len(data)}."
         )

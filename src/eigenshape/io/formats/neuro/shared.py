@@ -1,5 +1,6 @@
 """What the formats of brains share: nibabel, if it is installed, and numbers of 32 bits."""
 
+import math
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -8,14 +9,12 @@ import numpy as np
 
 from eigenshape._errors import FileFormatError
 from eigenshape._extras import import_extra
+from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.masks import hemisphere_of
+from eigenshape.io.formats.numbers import find_keys
 
 Arrays = dict[str, np.ndarray]
-GZIP = b"\x1f\x8b"  # first bytes
-# Bytes that a packed volume may always unpack to: labels of a head, 256 voxels a side in 32 bits,
-# are 64 MiB, and pack 200 times.
-VOLUME_SIZE = 2**28
 UNNAMED = "values"  # name of a function that has none in its file
 NO_PARCEL = "???"  # name of the label 0 in files of Connectome Workbench
 
@@ -67,25 +66,30 @@ def narrow(name: str, values: np.ndarray) -> np.ndarray:
     return short
 
 
-def one_table(of_vertices: Arrays, what: str) -> np.ndarray:
-    """Return the one function that a file without names can hold."""
-    if len(of_vertices) != 1:
-        raise FileFormatError(
-            f"{what} holds one function, without a name; there are {len(of_vertices)}. "
-            "Write each to a file of its own."
-        )
-    (item,) = of_vertices.items()
-    return narrow(*item)
+def require_axes(what: str, axes: list[int], *, is_volume: bool) -> None:
+    """Raise an error if axes are not those of one volume, or of functions on vertices.
 
-
-def count_vertices(shape: Sequence[int]) -> int:
-    """Return the number of vertices of functions that are stored as a volume, or 0 for a volume.
-
-    They lie along its first axis. FreeSurfer factors a number that is too large for a header, as in
-    163842 = 27307 x 1 x 6, where the first axis is the fastest.
+    Vertices lie along the first axis. FreeSurfer factors a number of them that is too large for a
+    header, as in 163842 = 27307 x 1 x 6, where the first axis is the fastest. Frames follow.
     """
-    n, height, depth = shape
-    return n * depth if height == 1 and (depth == 1 or depth < n) else 0
+    if is_volume:
+        rule = "a volume must have three axes and one frame"
+        fits = len(axes) >= 3 and max(axes[3:], default=1) == 1
+    else:
+        rule = "functions on vertices must be n x 1 x 1, or that and frames"
+        width, height, depth = [*axes, 1, 1, 1][:3]
+        fits = height == 1 and (depth == 1 or depth < width)
+    if not fits or min(axes) < 1:
+        raise FileFormatError(
+            f"{what} of {rule}; it has {axes}. es.io.read_volume reads volumes, es.io.read_fields "
+            "functions."
+        )
+
+
+def volume_function(values: np.ndarray) -> np.ndarray:
+    """Return the function on vertices that is stored as a volume, with a column for each frame."""
+    table = values.reshape(-1, math.prod(values.shape[3:]), order="F")
+    return table[:, 0] if table.shape[1] == 1 else np.ascontiguousarray(table)
 
 
 def shared_keys(what: str, keys: np.ndarray, names: Sequence[str], values: np.ndarray) -> list[str]:
@@ -100,10 +104,26 @@ def shared_keys(what: str, keys: np.ndarray, names: Sequence[str], values: np.nd
     ]
 
 
-def find_keys(keys: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the place of each value among the keys, or -1."""
-    if not len(keys):
-        return np.full(len(values), -1)
-    order = np.argsort(keys, kind="stable")
-    found = order[np.searchsorted(keys, values, sorter=order).clip(0, len(keys) - 1)]
-    return np.where(keys[found] == values, found, -1)
+def label_table(parcellation: Parcellation) -> dict[int, tuple[str, tuple[float, ...]]]:
+    """Return names and colors by label; parcel i has the label i + 1, since 0 is for none."""
+    colors = [(0.0,) * 4, *map(tuple, parcellation.colors.tolist())]
+    return dict(enumerate(zip((NO_PARCEL, *parcellation.names), colors, strict=True)))
+
+
+def find_labels(what: str, keys: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """Return the place of the label of each vertex among the keys, or -1 for 0 where no key is 0."""
+    found = find_keys(keys, labels)
+    odd = np.flatnonzero((found < 0) & (labels != 0))
+    if odd.size:
+        raise FileFormatError(
+            f"{what} must stand in its table; that of vertex {odd[0]} is {labels[odd[0]]:g} "
+            f"({odd.size} such)."
+        )
+    return found
+
+
+def drop_nameless(places: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return the places of vertices among the labels with a name, or -1, and these names."""
+    is_named = np.array([name != NO_PARCEL for name in names], dtype=bool)
+    numbers = np.append(np.where(is_named, np.cumsum(is_named) - 1, -1), -1)
+    return numbers[places], tuple(name for name in names if name != NO_PARCEL)

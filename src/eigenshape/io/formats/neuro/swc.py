@@ -10,8 +10,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._errors import FileFormatError
-from eigenshape.io.formats.neuro.shared import find_keys
-from eigenshape.io.formats.numbers import lines_of, number_table, wholes
+from eigenshape.io.formats.numbers import (
+    find_keys,
+    lines_of,
+    number_table,
+    require_distinct,
+    wholes,
+)
 
 
 def parse(
@@ -34,11 +39,7 @@ def parse(
         )
     numbers = wholes(table[:, 0], "Numbers of an SWC file")
     parents = wholes(table[:, 4], "Parents of an SWC file")
-    different, counts = np.unique(numbers, return_counts=True)
-    if (counts > 1).any():
-        raise FileFormatError(
-            f"Numbers of an SWC file must differ; {different[counts.argmax()]} occurs twice or more."
-        )
+    require_distinct(numbers, "Numbers of an SWC file")
     notes = []
     if any(len(words) > 7 for _, words in rows):
         notes.append("columns after the seventh were left out")

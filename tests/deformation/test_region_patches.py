@@ -9,8 +9,8 @@ from bent_shapes import lump_rig, tube
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import deform
 from eigenshape.deformation.handles import Translation
-from eigenshape.deformation.patches import regions_of_patches, split_region
 from eigenshape.deformation.region import BrushRegion, region_boundary, region_mask
+from eigenshape.deformation.region_patches import regions_of_patches, split_region
 from eigenshape.deformation.rig import rig_shape
 from eigenshape.geometry.distances.geodesic import geodesic_distances
 from eigenshape.geometry.mesh import TriangleMesh

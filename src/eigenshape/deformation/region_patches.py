@@ -101,7 +101,7 @@ def regions_of_patches(mesh: TriangleMesh, region: Region) -> list[Region]:
     pieces = vertex_components(mesh)[1]
     for piece in np.unique(pieces[mask & np.isinf(distances)]):
         whole = np.flatnonzero(pieces == piece)
-        arms = [mesh.vertices[patch] - mesh.vertices[whole].mean(axis=0) for patch in members]
-        nearest = np.argmin([np.linalg.norm(arm, axis=1).min() for arm in arms])
+        away = np.linalg.norm(mesh.vertices - mesh.vertices[whole].mean(axis=0), axis=1)
+        nearest = np.argmin([away[patch].min() for patch in members])
         members[nearest] = np.append(members[nearest], whole)
     return list(members)
