@@ -58,7 +58,7 @@ def read_all(path: Path) -> Shape:
     if isinstance(shape, es.SimplicialMesh):
         kind = KINDS[shape.simplices.shape[1]]
         found[kind] = {"tetra": shape.simplices} if kind == "cells" else shape.simplices
-        if path.suffix in (".vtu", ".vtk"):  # the formats of such shapes that hold fields
+        if path.suffix in (".vtu", ".vtp", ".vtk"):  # the formats of such shapes that hold fields
             fields = es.io.read_fields(path)
             found |= sorted_fields(fields, len(shape.points), len(shape.simplices))
     return found
