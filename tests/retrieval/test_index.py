@@ -18,7 +18,9 @@ from describers import RECIPE, descriptor, keep, spoil
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from eigenshape import _sealed
 from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape._sealed import PAGE, checksum
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.heat.score import HeatDescriptor, matching_score
 from eigenshape.retrieval.index import ShapeIndex
@@ -262,7 +264,7 @@ def edit_recipe(index, edit):
         edit(fields)
         row = (1, json.dumps(fields), *row[1:])
         database.execute("DELETE FROM recipe")
-        values = (*row, store.checksum(*row))
+        values = (*row, checksum(*row))
         database.execute("INSERT INTO recipe VALUES (?, ?, ?, ?, ?)", values)
     return fields
 
@@ -445,7 +447,7 @@ def test_a_copy_without_its_log_is_named(index, tmp_path):
 
 
 def test_a_second_writer_is_told(index, monkeypatch):
-    monkeypatch.setattr(store, "LONGEST_WAIT", 0.05)
+    monkeypatch.setattr(_sealed, "LONGEST_WAIT", 0.05)
     with (
         store.writing(index.folder),
         pytest.raises(
@@ -468,10 +470,10 @@ def test_a_damaged_list_of_names_is_named(index):
     path = index.folder / store.DATABASE
     with closing(sqlite3.connect(path)) as database:
         query = "SELECT rootpage FROM sqlite_master WHERE name = 'sqlite_autoindex_shape_1'"
-        start = store.PAGE * (database.execute(query).fetchone()[0] - 1)
+        start = PAGE * (database.execute(query).fetchone()[0] - 1)
     data = path.read_bytes()
-    page = data[start : start + store.PAGE].replace(b"one", b"two")
-    path.write_bytes(data[:start] + page + data[start + store.PAGE :])
+    page = data[start : start + PAGE].replace(b"one", b"two")
+    path.write_bytes(data[:start] + page + data[start + PAGE :])
     with pytest.raises(StoreError, match="must lead from 'two' to its shape; it leads to 'one'"):
         index.remove("two")
     assert len(index.descriptors("one", RECIPE)) == 1  # by a look at all rows
@@ -481,7 +483,7 @@ def test_a_failed_add_leaves_the_state_before(index):
     keep(index, "one", [descriptor(1)])
     with closing(sqlite3.connect(index.folder / store.DATABASE)) as database:
         (n_pages,) = database.execute("PRAGMA page_count").fetchone()
-    connect = store._connect
+    connect = _sealed.connect
 
     def small(folder, mode):
         database = connect(folder, mode)
@@ -490,7 +492,7 @@ def test_a_failed_add_leaves_the_state_before(index):
 
     large = HeatDescriptor(np.ones((9000, 3)), np.arange(9000), RECIPE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(store, "_connect", small)
+        patch.setattr(_sealed, "connect", small)
         message = "needs space on its disk; .*: database or disk is full. Nothing was changed"
         with pytest.raises(StoreError, match=message):
             index.add_many([DescribedShape("two", [descriptor(2)]), DescribedShape("x", [large])])

@@ -13,6 +13,7 @@ from describers import RECIPE, descriptor, keep
 
 import eigenshape as es
 from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape._sealed import PAGE
 from eigenshape.retrieval import DescribedShape
 from eigenshape.retrieval.search.reader import require_maker
 from eigenshape.retrieval.store import database as store
@@ -266,8 +267,8 @@ def test_a_damaged_bit_never_hides_a_descriptor_of_one_shape(index, table):
         (page,) = database.execute(query, (f"sqlite_autoindex_{table}_1",)).fetchone()
     data = path.read_bytes()
     truth = [each.vectors.tolist() for each in index.descriptors("s4", RECIPE)]
-    start = (page - 1) * store.PAGE
-    used = start + np.flatnonzero(np.frombuffer(data, np.uint8, store.PAGE, start))
+    start = (page - 1) * PAGE
+    used = start + np.flatnonzero(np.frombuffer(data, np.uint8, PAGE, start))
     rng, n_right = np.random.default_rng(0), 0
     for place in rng.choice(used, min(len(used), 60), replace=False).tolist():
         spoilt = bytearray(data)

@@ -11,6 +11,7 @@ from describers import RECIPE, descriptor, keep, spoil
 from store_trials import FILES, LONG, SHARED
 
 import eigenshape as es
+from eigenshape._sealed import PAGE
 from eigenshape.retrieval import DescribedShape
 from eigenshape.retrieval.store import database as store
 from eigenshape.retrieval.store.state import read_state
@@ -151,7 +152,7 @@ def test_a_damaged_list_of_integers_is_made_up_for_by_the_table(index):
     path = index.folder / store.DATABASE
     with closing(sqlite3.connect(path)) as database:
         query = "SELECT rootpage FROM sqlite_master WHERE name = 'integers'"
-        start = store.PAGE * (database.execute(query).fetchone()[0] - 1)
+        start = PAGE * (database.execute(query).fetchone()[0] - 1)
     data = bytearray(path.read_bytes())
     data[start] ^= 255
     path.write_bytes(data)

@@ -17,24 +17,20 @@ from jaxtyping import Int
 
 from eigenshape._arrays import record
 from eigenshape._errors import StoreError
+from eigenshape._sealed import DAMAGE, Seal, checksum, closed_on_error, explained, read_rows
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, restore, row_type
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
-    DAMAGE,
     DATABASE,
+    INDEX,
     INTEGERS,
     Facts,
-    Seal,
-    checksum,
-    closed_on_error,
     committed_changes,
-    explained,
     integer_checksums,
     lost_changes,
     open_to_read,
     read_integers,
     read_recipes,
-    read_rows,
     read_seals,
 )
 
@@ -205,7 +201,7 @@ class IndexState:
         query = "SELECT id FROM shape {} WHERE name = ?"
         # The list of names of SQLite first; a damaged bit of that may hide a name.
         for source in ("", "NOT INDEXED"):
-            with self.lock, explained(self.folder):
+            with self.lock, explained(INDEX, self.folder / DATABASE):
                 row = self.database.execute(query.format(source), (name,)).fetchone()
             if row is not None:
                 facts = self.facts(row)[row[0]]
@@ -411,11 +407,11 @@ def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
         all is the same.
     """
     place, committed = str(folder / DATABASE), committed_changes(folder)
-    with explained(folder):
+    with explained(INDEX, folder / DATABASE):
         database = open_to_read(folder)
         with closed_on_error(database):
             damages: list[Damage] = []
-            seals = read_seals(place, database, damages)
+            seals = read_seals(folder, database, damages)
             damages += [] if damages else lost_changes(committed, seals)
             recipes = read_recipes(place, database, damages)
     columns = None if before is None or before.damages else before.descriptors

@@ -14,13 +14,13 @@ import numpy as np
 from eigenshape._arguments import require_each, require_type
 from eigenshape._arrays import record
 from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape._sealed import checksum
 from eigenshape._text import Shown
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, details_of, recipe_to_text, rows_of
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
     DATABASE,
     Facts,
-    checksum,
     integer_checksums,
     read_recipes,
     read_seals,
@@ -238,7 +238,7 @@ class Writer:
 
     def __init__(self, folder: Path, database: sqlite3.Connection) -> None:
         damages: list[Damage] = []
-        seals = read_seals(str(folder / DATABASE), database)
+        seals = read_seals(folder, database)
         recipes = read_recipes(str(folder / DATABASE), database, damages)
         if damages:
             raise StoreError(
