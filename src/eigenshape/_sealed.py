@@ -139,24 +139,6 @@ def n_changes(seals: dict[str, Seal]) -> int:
     return sum(seal.n_changes for seal in seals.values())
 
 
-def read_table(
-    kind: Kind, path: Path, database: sqlite3.Connection, table: str
-) -> list[tuple[Any, ...]]:
-    """Return all rows of a table without their checksums, which come last, by the order of rowid.
-
-    Raise StoreError if a row differs from its checksum, or rows are lost, added or doubled.
-    """
-    seal = read_seals(kind, path, database)[table]
-    rows = database.execute(f"SELECT * FROM {table} NOT INDEXED ORDER BY rowid").fetchall()
-    whole = [row[:-1] for row in rows if checksum(*row[:-1]) == row[-1]]
-    if len(whole) != len(rows) or (len(rows), sum(row[-1] for row in rows)) != seal[:2]:
-        raise StoreError(
-            f"{path} must hold what was written; of table {table} {len(whole)} rows of {seal.n_rows} "
-            f"are whole. {kind.rescue}"
-        )
-    return whole
-
-
 # ---- files
 
 

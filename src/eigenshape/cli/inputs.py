@@ -1,7 +1,6 @@
 """What the options of several verbs say and take. Nothing heavy is imported here, so that `--help` is quick."""
 
 import re
-from collections.abc import Sequence
 from typing import Literal
 
 from eigenshape._errors import InvalidParameterError
@@ -110,11 +109,6 @@ def numbers_of(text: str) -> list[float]:
         return [float(piece) for piece in text.split(",")]
     except ValueError:
         return []
-
-
-def drops_missing(names: Sequence[str]) -> bool:
-    """Tell whether points that are not finite are to be left out when a file is read."""
-    return "auto" in names or "drop_missing" in names
 
 
 def memory_bytes(gigabytes: float | None) -> float | None:

@@ -86,7 +86,7 @@ def open_file(
         found = recognize(data)
         if suffix == ".obj" and found and found.suffix == ".mniobj":
             suffix = found.suffix
-        require_content(data, suffix)
+        require_content(found, suffix)
     return SourceFile(place, suffix, data, folder, scene)
 
 

@@ -10,6 +10,7 @@ from eigenshape._typing import FileLike, Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
+from eigenshape.geometry.repairs.repair_names import drops_missing
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh
 from eigenshape.io.formats.cells import require_kind
@@ -121,12 +122,11 @@ def load_shape(
     """Read a shape as `read_shape` does, repair it, and report what was left out and done."""
     require_kind(cells)
     source = open_file(path, file_format, SHAPE_FORMATS, scene)
-    drop_missing = "drop_missing" in repairs or "auto" in repairs
     with naming(source.path):
         points, simplices = parse_file(source, cells)
         n_cells, n_corners = simplices.shape
         points, simplices, kept, left_out = require_finite(
-            points, simplices, drop_missing=drop_missing
+            points, simplices, drop_missing=drops_missing(repairs)
         )
         if not n_cells:
             cloud = repair(PointCloud(points, dim), repairs)

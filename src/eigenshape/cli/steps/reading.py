@@ -10,11 +10,12 @@ from scipy.spatial import cKDTree
 
 from eigenshape._errors import EigenshapeError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_repairs
-from eigenshape.cli.inputs import drops_missing, repair_names
+from eigenshape.cli.inputs import repair_names
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair
+from eigenshape.geometry.repairs.repair_names import drops_missing
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io import shape_files

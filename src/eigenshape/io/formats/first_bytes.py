@@ -28,6 +28,7 @@ class Kind(NamedTuple):
 
 UNPACK = "Unpack it, and read what is in it."
 DOWNLOAD = "The address of a page was saved in place of the file; save the file itself."
+ARCHIVE = Kind("a ZIP archive, as .zip and .3mf files are", remedy=UNPACK)  # .npz is one, too
 # Patterns of the first bytes, in the order in which they are tried.
 KINDS = {
     rb"ply[\r\n]": Kind("a PLY file", ".ply"),
@@ -59,7 +60,7 @@ KINDS = {
     rb"\xff\xfe|\xfe\xff": Kind(
         "text in UTF-16", remedy="Save it as UTF-8, for instance from a text editor."
     ),
-    rb"PK\x03\x04": Kind("a ZIP archive, as .zip and .3mf files are", remedy=UNPACK),
+    rb"PK\x03\x04": ARCHIVE,
     rb"BZh|\xfd7zXZ|\x28\xb5\x2f\xfd|7z\xbc\xaf|Rar!": Kind("a packed file", remedy=UNPACK),
     rb"\x89HDF": Kind("an HDF5 file"),
     rb"Kaydara FBX|; FBX": Kind("an FBX file", remedy="Save it as GLB."),
@@ -78,10 +79,9 @@ def recognize(data: bytes) -> Kind | None:
     return next((kind for pattern, kind in COMPILED.items() if pattern.match(head)), None)
 
 
-def require_content(data: bytes, suffix: str) -> None:
+def require_content(found: Kind | None, suffix: str) -> None:
     """Raise an error if the first bytes of a file are those of another format than its suffix."""
-    found = recognize(data)
-    if found is None or (suffix == ".npz" and data.startswith(b"PK")):
+    if found is None or (suffix == ".npz" and found is ARCHIVE):
         return
     remedy = found.remedy
     if found.suffix:
