@@ -20,7 +20,7 @@ from eigenshape.io.formats.registry import (
     FIELD_FORMATS,
     MAP_FORMATS,
     format_of,
-    written_suffix,
+    suffix_to_write,
 )
 from eigenshape.io.formats.rounding import loss_in_single
 from eigenshape.io.opening import SourceFile, naming, open_file
@@ -77,7 +77,7 @@ def write_fields(mesh: MeshLike, path: str | Path, fields: Mapping[str, ArrayLik
     (80,)
     """
     mesh, path = as_simplicial(mesh), as_path(path)
-    suffix = written_suffix(path, FIELD_FORMATS)
+    suffix = suffix_to_write(path, FIELD_FORMATS)
     data = format_fields(mesh, suffix, fields, structure_named(mesh, path, suffix))
     lost = []
     if "single" in format_of(suffix).traits and isinstance(mesh, TriangleMesh):

@@ -30,8 +30,8 @@ from eigenshape.io.formats.registry import (
     WRITTEN,
     CellKind,
     format_of,
+    suffix_to_write,
     suffixes_with,
-    written_suffix,
 )
 from eigenshape.io.formats.rounding import loss_in_single
 from eigenshape.io.opening import SourceFile, naming, open_file
@@ -350,7 +350,7 @@ def save_mesh(
     attributes: MeshAttributes | None = None,
 ) -> str:
     """Write a mesh as `write_mesh` does, and return a sentence that names what is lost, or none."""
-    suffix = written_suffix(path, WRITTEN)
+    suffix = suffix_to_write(path, WRITTEN)
     known = format_of(suffix)
     held = attributes or plain_attributes(mesh)
     if not np.array_equal(held.mesh.faces, mesh.faces):

@@ -9,7 +9,7 @@ from eigenshape.features.parcellation import Parcellation, require_parcels
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.io.field_files import structure_named
 from eigenshape.io.formats.neuro.shared import side_of_file
-from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, written_suffix
+from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, suffix_to_write
 from eigenshape.io.opening import naming, open_file
 
 
@@ -125,7 +125,7 @@ def write_parcellation(mesh: MeshLike, path: str | Path, parcellation: Parcellat
     """
     mesh, path = as_mesh(mesh), as_path(path)
     require_parcels(parcellation, mesh.n_vertices)
-    suffix = written_suffix(path, PARCEL_FORMATS)
+    suffix = suffix_to_write(path, PARCEL_FORMATS)
     structure = structure_named(mesh, path, ".gii")
     named = {"structure": structure} if suffix.endswith(".gii") else {}
     module = format_of(suffix).load()

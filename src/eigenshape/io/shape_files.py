@@ -19,7 +19,7 @@ from eigenshape.io.formats.registry import (
     WRITTEN_CLOUDS,
     CellKind,
     format_of,
-    written_suffix,
+    suffix_to_write,
 )
 from eigenshape.io.mesh_files import parse_file, require_finite
 from eigenshape.io.opening import naming, open_file
@@ -216,7 +216,7 @@ def write_points(cloud: PointCloud, path: str | Path) -> None:
     """
     require_type(cloud, PointCloud, "cloud")
     path = as_path(path)
-    suffix = written_suffix(path, WRITTEN_CLOUDS)
+    suffix = suffix_to_write(path, WRITTEN_CLOUDS)
     if cloud.points.shape[1] != 3:
         raise InvalidShapeError(
             f"Files of points hold three coordinates; these points have {cloud.points.shape[1]}."

@@ -145,10 +145,7 @@ class Guard:
         origin = _only(scope, b"origin", default=f"http://{host}")
         site = _only(scope, b"sec-fetch-site", default="none")
         origins = [f"http://{host}"] + [f"https://{host}"] * (host in self.rules.proxied)
-        if origin not in origins or site not in (
-            "same-origin",
-            "none",
-        ):
+        if origin not in origins or site not in ("same-origin", "none"):
             raise RefusedError(403, f"Only the {self.rules.name}'s own page may send requests.")
 
     def _is_ours(self, host: str) -> bool:

@@ -184,7 +184,7 @@ def suffix_of_bytes(head: bytes, size: int) -> str:
     return ".surf" if suffix == ".curv" and int.from_bytes(head[11:15]) != 1 else suffix
 
 
-def written_suffix(path: Path, known: tuple[str, ...]) -> str:
+def suffix_to_write(path: Path, known: tuple[str, ...]) -> str:
     """Return the suffix that names the format of a file that is to be written; see `suffix_of`."""
     suffix = suffix_of(path, None, known)
     if path.name.lower().endswith(GZ) and not suffix.endswith(GZ):
