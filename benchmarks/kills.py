@@ -74,8 +74,16 @@ class Collection:
             make_quick()
 
     def arguments(self, folder, number):
+        """Return the words of the command that makes a change."""
         names, template = self.CHANGES[number]
-        return ["collection", str(self.place / names), "-o", str(folder), f"--template={template}", "--unmirrored"]
+        return [
+            "collection",
+            str(self.place / names),
+            "-o",
+            str(folder),
+            f"--template={template}",
+            "--unmirrored",
+        ]
 
     def change(self, folder, number):
         """Make a change in this process."""
@@ -98,7 +106,15 @@ class Collection:
             raise
         words = (found.names, found.template, found.sides, found.methods, found.sources)
         notes = (found.notes, found.failures, found.digests)
-        return digest(words, notes, found.mean.vertices, found.mean.faces, found.points, found.gaps, found.confidence)
+        return digest(
+            words,
+            notes,
+            found.mean.vertices,
+            found.mean.faces,
+            found.points,
+            found.gaps,
+            found.confidence,
+        )
 
 
 class Index:
@@ -110,7 +126,9 @@ class Index:
     def __init__(self, place):
         recipe = es.retrieval.SCALE_FREE
         self.shapes = [
-            es.retrieval.DescribedShape(f"ball {i}", [es.describe(make_ball(i), recipe)], label=f"{i % 3}")
+            es.retrieval.DescribedShape(
+                f"ball {i}", [es.describe(make_ball(i), recipe)], label=f"{i % 3}"
+            )
             for i in range(24)
         ]
         self.other = es.ShapeIndex.create(place / "other")

@@ -176,12 +176,15 @@ def lost_changes(committed: int, seals: dict[str, Seal]) -> str | None:
     )
 
 
-def require_changes(kind: Kind, path: Path, committed: int, seals: dict[str, Seal]) -> None:
-    """Raise DamagedFileError if changes that were committed are lost."""
+def require_changes(
+    kind: Kind, path: Path, use: str, committed: int, seals: dict[str, Seal]
+) -> None:
+    """Raise DamagedFileError if changes that were committed are lost from a file to be read or changed."""
     lost = lost_changes(committed, seals)
     if lost is not None:
         raise DamagedFileError(
-            f"{kind.noun} must be whole; {path}: {lost}. Copy all files. {kind.rescue}"
+            f"{kind.noun} must be whole to be {use}; {path.name}-wal in {path.parent}: {lost}. If it "
+            f"is a copy, copy all files. {kind.rescue}"
         )
 
 
@@ -318,7 +321,7 @@ def writing(kind: Kind, path: Path) -> Iterator[sqlite3.Connection]:
         # The lock of SQLite: the system takes it from a process that dies.
         database.execute("BEGIN IMMEDIATE")
         before = read_seals(kind, path, database)
-        require_changes(kind, path, committed_changes(kind, path), before)
+        require_changes(kind, path, "changed", committed_changes(kind, path), before)
         remove_leftovers(path.parent, path.name)  # of a process that died in `create`
         yield database
         now = n_changes(read_seals(kind, path, database))
@@ -375,7 +378,7 @@ def reading(kind: Kind, path: Path) -> Iterator[sqlite3.Connection]:
     """Open a file to read one state of it, all of whose changes are there."""
     committed = committed_changes(kind, path)
     with explained(kind, path), closing(open_to_read(kind, path)) as database:
-        require_changes(kind, path, committed, read_seals(kind, path, database))
+        require_changes(kind, path, "read", committed, read_seals(kind, path, database))
         yield database
 
 
