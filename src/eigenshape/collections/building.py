@@ -92,9 +92,10 @@ def build_collection(
        its first fit in the 8 largest modes of the collection. The last step compares as many points
        as the template has faces.
 
-    What is done is kept in the folder. After Ctrl-C or a crash the same call goes on where it
-    stopped; files that have not changed are not fitted again. A specimen that cannot be read or
-    placed is reported, and the others go on.
+    What is done is kept in one file of the folder, collection.sqlite. After Ctrl-C or a crash the
+    same call goes on where it stopped, and until it has ended, the folder holds the last collection
+    that was finished. Surfaces that have not changed are not fitted again. A specimen that cannot be
+    read or placed is reported, and the others go on.
 
     Parameters
     ----------
@@ -129,6 +130,8 @@ def build_collection(
         If there are fewer than two specimens, or none has the name of the template.
     InvalidShapeError
         If fewer than two specimens can be fitted.
+    StoreError
+        If the folder cannot be written, or its disk is full. What was done is kept.
     EigenshapeError
         If no worker can start. A script must call this under ``if __name__ == "__main__":``, since
         workers import the script.
