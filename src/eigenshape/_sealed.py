@@ -351,18 +351,24 @@ def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
         try:
             with closed_on_error(database):
                 database.execute("SELECT count(*) FROM sqlite_master")
-        except sqlite3.OperationalError:
-            if os.access(path.parent, os.W_OK):
-                raise
-            # SQLite cannot make the files of its log beside a read-only database, which nobody
-            # changes then.
+        except sqlite3.OperationalError as err:
             log = path.with_name(f"{path.name}-wal")
-            if log.exists() and log.stat().st_size:
+            if err.sqlite_errorcode & 0xFF in NO_SPACE:
+                # A full disk has no room for the file by which processes share the log: this one
+                # reads the log into its memory, and others wait.
+                database = connect(path, "mode=rw")
+                database.execute("PRAGMA locking_mode = EXCLUSIVE")
+            elif os.access(path.parent, os.W_OK):
+                raise
+            elif log.exists() and log.stat().st_size:
                 raise StoreError(
                     f"{path.parent} must be writable to be read as long as {log.name} holds changes. "
                     "Read it once with the right to write, or copy it to a writable folder."
                 ) from None
-            database = connect(path, "mode=ro&immutable=1")
+            else:
+                # SQLite cannot make the files of its log beside a read-only database, which nobody
+                # changes then.
+                database = connect(path, "mode=ro&immutable=1")
         with closed_on_error(database):
             require_format(kind, path, database)
             database.execute("PRAGMA query_only = ON")
