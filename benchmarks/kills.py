@@ -332,6 +332,8 @@ def main():
                 seen = trial(store, place, count, rng)
                 took = time.monotonic() - begun
                 sys.stdout.write(f"{options.store}, {trial.__name__}: {dict(seen)}; {took:.0f} s\n")
+                if seen["silent"] or seen["bare"]:
+                    raise SystemExit("A turned bit was not named.")
 
 
 if __name__ == "__main__":
