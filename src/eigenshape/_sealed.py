@@ -225,6 +225,10 @@ def create(kind: Kind, path: Path) -> None:
             with closing(connect(fresh, "mode=rwc")) as database:
                 _make_tables(kind, database)
             _name(fresh, path)
+    except StoreError:
+        if path.exists():  # its first writer has taken ours for what a dead process had left
+            raise FileExistsError(path) from None
+        raise
     finally:
         fresh.unlink(missing_ok=True)
 
