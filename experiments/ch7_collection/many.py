@@ -4,16 +4,17 @@
 
 Specimens are hands of many individuals, each subdivided to 100,000 vertices and turned in its own way.
 `eigenshape collection` is killed (SIGKILL, all of its processes) when a sixth, two sixths, ... of all
-fits are in the folder (with five kills), and run to its end then. Files that were there at a kill must
-be there untouched at the end.
+fits are kept (with five kills), and run to its end then. Fits that were kept at a kill must be there
+untouched at the end.
 """
 
 import json
+import sqlite3
 import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -33,7 +34,6 @@ N_KILLS = 5
 MANY = 200  # specimens that the time is projected to
 N_MARKS = 10
 WORKERS = 2
-FITS = ("first", "fits")  # folders with a file for each fit
 SECONDS_BETWEEN_LOOKS = 0.25
 
 
@@ -61,11 +61,13 @@ def make_specimens(folder: Path, number: int, n_vertices: int) -> None:
         list(track(made, "specimens", total=number))
 
 
-def fits_in(output: Path) -> dict[Path, int]:
-    """Return the times at which the fits in a folder were written, in ns."""
-    return {
-        path: path.stat().st_mtime_ns for room in FITS for path in (output / room).glob("*.npz")
-    }
+def fits_in(output: Path) -> dict[str, int]:
+    """Return the fits that a folder keeps by key, with the checksums of their numbers."""
+    path = output / "collection.sqlite"
+    if not path.is_file():
+        return {}
+    with closing(sqlite3.connect(path)) as database:
+        return dict(database.execute("SELECT key, checksum FROM part"))
 
 
 class Run:
@@ -146,7 +148,7 @@ def main() -> None:
             "vertices": n_vertices,
             "killed": sum(run.process.returncode < 0 for run in runs),
             "fits at kills": len(kept),
-            "lost": sum(at_end.get(path) != when for path, when in kept.items()),
+            "lost": sum(at_end.get(key) != checksum for key, checksum in kept.items()),
             "in the collection": len(answer["specimens"]),
             "failed": len(answer["failures"]),
             "mirrored": sum(side == "mirrored" for side in answer["sides"].values()),

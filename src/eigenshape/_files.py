@@ -1,11 +1,13 @@
 """Reading regular files only, and replacing files atomically."""
 
 import os
+import re
 import secrets
 import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from hashlib import file_digest
 from pathlib import Path
 from typing import BinaryIO
 
@@ -84,3 +86,16 @@ def replace_file(path: Path, data: bytes) -> None:
     """Write bytes to a file atomically, as `replacing` does."""
     with replacing(path) as file:
         file.write(data)
+
+
+def remove_leftovers(folder: Path, name: str = "") -> None:
+    """Delete temporary files of processes that were killed, whose names begin with `name`."""
+    for path in folder.glob(f"{name}.*.tmp*"):
+        if re.fullmatch(r"\.[0-9a-f]{16}\.tmp(-\w+)?", path.name.removeprefix(name)):
+            path.unlink(missing_ok=True)
+
+
+def content_digest(path: Path) -> str:
+    """Return the SHA-256 of a file."""
+    with path.open("rb") as file:
+        return file_digest(file, "sha256").hexdigest()

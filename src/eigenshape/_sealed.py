@@ -6,18 +6,20 @@ whole table notices each row that was changed, lost or doubled. What a transacti
 kept, also if the process is killed; readers see one state until they open the file anew.
 """
 
+import errno
 import json
 import os
 import secrets
 import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
 
 from eigenshape._errors import StoreError
+from eigenshape._files import remove_leftovers
 
 APPLICATION = 0x65696773  # "eigs", by which SQLite files tell whose they are
 # Of 4, 8, 16 and 64 KB, pages of 64 KB return 1,600 shapes of an index at random in 11 ms of CPU time,
@@ -30,8 +32,12 @@ LONGEST_WAIT = 5.0  # seconds for another writer to end; a change takes millisec
 DAMAGE = (sqlite3.Error, UnicodeError)
 BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 NO_SPACE = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
+NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)  # the same of files that are written beside
 NOT_WRITABLE = (sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM)
 WRITE_AHEAD = "PRAGMA journal_mode = WAL"
+# The number of changes, as text. SQLite ignores all of its log that follows a damaged bit; by this
+# file a reader notices that changes are lost. It may be deleted at any time.
+CHANGES = "changes.txt"
 
 SEALS = """CREATE TABLE seal (
     name TEXT PRIMARY KEY, n_rows INTEGER NOT NULL, total INTEGER NOT NULL,
@@ -65,6 +71,8 @@ class Kind:
         Further statements, such as indexes.
     missing, rescue, renew : str
         What to do where there is no such file, where it is damaged, and where it cannot be read.
+    changes : str
+        Name of a file beside it that holds the number of its changes; empty for none.
     """
 
     noun: str
@@ -74,11 +82,16 @@ class Kind:
     missing: str = ""
     rescue: str = ""
     renew: str = ""
+    changes: str = CHANGES
 
     @property
     def a_noun(self) -> str:
         """The noun within a sentence."""
         return self.noun[0].lower() + self.noun[1:]
+
+
+class DamagedFileError(StoreError):
+    """A file does not hold what was written."""
 
 
 class Seal(NamedTuple):
@@ -117,6 +130,8 @@ def read_seals(
     """
     seals = {}
     for name, *numbers, guard in database.execute("SELECT * FROM seal NOT INDEXED").fetchall():
+        if not all(isinstance(number, int) for number in numbers):  # the type of one is damaged
+            continue
         n_rows, total, changes = numbers
         if guard == total + PER_ROW * n_rows + PER_CHANGE * changes:
             seals[name] = Seal(n_rows, total, changes)
@@ -124,7 +139,7 @@ def read_seals(
         if name in seals:
             continue
         if damaged is None:
-            raise StoreError(
+            raise DamagedFileError(
                 f"{path} must hold what was written; the seal of {name} differs. {kind.rescue}"
             )
         damaged.append(name)
@@ -139,6 +154,62 @@ def n_changes(seals: dict[str, Seal]) -> int:
     return sum(seal.n_changes for seal in seals.values())
 
 
+def committed_changes(kind: Kind, path: Path) -> int:
+    """Return the number of changes that a file must hold at least; 0 if it is not known.
+
+    Read it before a transaction begins, so that the state is not older.
+    """
+    try:
+        return int(path.with_name(kind.changes).read_text())
+    except (OSError, ValueError):
+        return 0
+
+
+def lost_changes(committed: int, seals: dict[str, Seal]) -> str | None:
+    """Say how many changes a file lacks of those that were committed; None if it has all."""
+    found = n_changes(seals)
+    if committed <= found:  # it is less if a writer was stopped just after it committed
+        return None
+    return (
+        f"{committed - found} of {committed} changes that were committed are lost: the file is "
+        "damaged, or was not copied with the others"
+    )
+
+
+def require_changes(
+    kind: Kind, path: Path, use: str, committed: int, seals: dict[str, Seal]
+) -> None:
+    """Raise DamagedFileError if changes that were committed are lost from a file to be read or changed."""
+    lost = lost_changes(committed, seals)
+    if lost is not None:
+        raise DamagedFileError(
+            f"{kind.noun} must be whole to be {use}; {path.name}-wal in {path.parent}: {lost}. If it "
+            f"is a copy, copy all files. {kind.rescue}"
+        )
+
+
+def whole_rows(database: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of a table that agree with their checksums, as far as SQLite can read them."""
+    with suppress(*DAMAGE):
+        for row in database.execute(f"SELECT * FROM {table} NOT INDEXED"):
+            if checksum(*row[:-1]) == row[-1]:
+                yield row
+
+
+def read_table(
+    kind: Kind, path: Path, database: sqlite3.Connection, table: str
+) -> list[tuple[Any, ...]]:
+    """Return all rows of a table; raise DamagedFileError if one is damaged or lost."""
+    rows = list(whole_rows(database, table))
+    seal = read_seals(kind, path, database)[table]
+    if (len(rows), sum(row[-1] for row in rows)) != seal[:2]:
+        raise DamagedFileError(
+            f"{path} must hold what was written; of {seal.n_rows} rows of table {table} {len(rows)} "
+            f"do. {kind.rescue}"
+        )
+    return rows
+
+
 # ---- files
 
 
@@ -148,32 +219,36 @@ def create(kind: Kind, path: Path) -> None:
     Raise FileExistsError if the name is taken: of several processes that come at once, the first
     gives it.
     """
-    fresh = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
+    fresh = path.with_name(f"{path.name}.{secrets.token_hex(8)}.tmp")
     try:
         with explained(kind, path):
-            _make_tables(kind, fresh)
+            with closing(connect(fresh, "mode=rwc")) as database:
+                _make_tables(kind, database)
             _name(fresh, path)
+    except StoreError:
+        if path.exists():  # its first writer has taken ours for what a dead process had left
+            raise FileExistsError(path) from None
+        raise
     finally:
         fresh.unlink(missing_ok=True)
 
 
-def _make_tables(kind: Kind, path: Path) -> None:
-    with closing(connect(path, "mode=rwc")) as database:
-        database.execute(f"PRAGMA page_size = {PAGE}")
-        # Free pages can be given back one by one: the file is never written anew.
-        database.execute("PRAGMA auto_vacuum = INCREMENTAL")
-        database.execute("BEGIN IMMEDIATE")
-        for statement in (*kind.tables.values(), *kind.more, SEALS):
-            database.execute(statement)
-        for table in kind.tables:
-            database.execute("INSERT INTO seal VALUES (?, 0, 0, 0, 0)", (table,))
-            names = {"table": table, "per_row": PER_ROW, "per_change": PER_CHANGE}
-            for event, (rows, total) in EVENTS.items():
-                database.execute(TRIGGER.format(event=event, rows=rows, sum=total, **names))
-        database.execute(f"PRAGMA application_id = {APPLICATION}")
-        database.execute(f"PRAGMA user_version = {kind.format}")
-        database.execute("COMMIT")
-        database.execute(WRITE_AHEAD)
+def _make_tables(kind: Kind, database: sqlite3.Connection) -> None:
+    database.execute(f"PRAGMA page_size = {PAGE}")
+    # Free pages can be given back one by one: the file is never written anew.
+    database.execute("PRAGMA auto_vacuum = INCREMENTAL")
+    database.execute("BEGIN IMMEDIATE")
+    for statement in (*kind.tables.values(), *kind.more, SEALS):
+        database.execute(statement)
+    for table in kind.tables:
+        database.execute("INSERT INTO seal VALUES (?, 0, 0, 0, 0)", (table,))
+        names = {"table": table, "per_row": PER_ROW, "per_change": PER_CHANGE}
+        for event, (rows, total) in EVENTS.items():
+            database.execute(TRIGGER.format(event=event, rows=rows, sum=total, **names))
+    database.execute(f"PRAGMA application_id = {APPLICATION}")
+    database.execute(f"PRAGMA user_version = {kind.format}")
+    database.execute("COMMIT")
+    database.execute(WRITE_AHEAD)
 
 
 def _name(fresh: Path, path: Path) -> None:
@@ -186,6 +261,24 @@ def _name(fresh: Path, path: Path) -> None:
         if path.exists():
             raise FileExistsError(path) from None
         fresh.rename(path)
+
+
+def mend(kind: Kind, path: Path) -> None:
+    """Write a damaged file anew, of the rows that are whole, in one transaction.
+
+    Raise StoreError if it is not of this kind and format, or its first page cannot be read.
+    """
+    fresh = sqlite3.connect(":memory:", isolation_level=None)
+    with explained(kind, path), closing(fresh), closing(connect(path, "mode=rw")) as database:
+        require_format(kind, path, database)
+        _make_tables(kind, fresh)
+        for table in kind.tables:
+            for row in whole_rows(database, table):
+                marks = ", ".join("?" * len(row))
+                fresh.execute(f"INSERT OR IGNORE INTO {table} VALUES ({marks})", row)
+        fresh.backup(database)
+    if kind.changes:
+        path.with_name(kind.changes).unlink(missing_ok=True)
 
 
 def require_file(kind: Kind, path: Path) -> None:
@@ -220,8 +313,8 @@ def require_format(kind: Kind, path: Path, database: sqlite3.Connection) -> None
 def writing(kind: Kind, path: Path) -> Iterator[sqlite3.Connection]:
     """Open a file to change it. At the end of the block all changes are committed, or none.
 
-    Raise StoreError if the file is not of this kind and format, another process is writing, or the
-    disk is full.
+    Raise StoreError if the file is not of this kind and format, changes were lost, another process
+    is writing, or the disk is full.
     """
     require_file(kind, path)
     with explained(kind, path), closing(connect(path, "mode=rw")) as database:
@@ -231,9 +324,17 @@ def writing(kind: Kind, path: Path) -> Iterator[sqlite3.Connection]:
         database.execute(f"PRAGMA cache_size = -{CACHED}")
         # The lock of SQLite: the system takes it from a process that dies.
         database.execute("BEGIN IMMEDIATE")
+        before = read_seals(kind, path, database)
+        require_changes(kind, path, "changed", committed_changes(kind, path), before)
+        remove_leftovers(path.parent, path.name)  # of a process that died in `create`
         yield database
+        now = n_changes(read_seals(kind, path, database))
         if database.in_transaction:  # if the block raises before, closing rolls back
             database.execute("COMMIT")
+    if kind.changes and now != n_changes(before):
+        # Not forced to disk: if power fails, a number that is too low misses a lost log at worst.
+        with suppress(OSError):
+            path.with_name(kind.changes).write_text(f"{now}\n")
 
 
 def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
@@ -254,18 +355,24 @@ def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
         try:
             with closed_on_error(database):
                 database.execute("SELECT count(*) FROM sqlite_master")
-        except sqlite3.OperationalError:
-            if os.access(path.parent, os.W_OK):
-                raise
-            # SQLite cannot make the files of its log beside a read-only database, which nobody
-            # changes then.
+        except sqlite3.OperationalError as err:
             log = path.with_name(f"{path.name}-wal")
-            if log.exists() and log.stat().st_size:
+            if err.sqlite_errorcode & 0xFF in NO_SPACE:
+                # A full disk has no room for the file by which processes share the log: this one
+                # reads the log into its memory, and others wait.
+                database = connect(path, "mode=rw")
+                database.execute("PRAGMA locking_mode = EXCLUSIVE")
+            elif os.access(path.parent, os.W_OK):
+                raise
+            elif log.exists() and log.stat().st_size:
                 raise StoreError(
                     f"{path.parent} must be writable to be read as long as {log.name} holds changes. "
                     "Read it once with the right to write, or copy it to a writable folder."
                 ) from None
-            database = connect(path, "mode=ro&immutable=1")
+            else:
+                # SQLite cannot make the files of its log beside a read-only database, which nobody
+                # changes then.
+                database = connect(path, "mode=ro&immutable=1")
         with closed_on_error(database):
             require_format(kind, path, database)
             database.execute("PRAGMA query_only = ON")
@@ -274,6 +381,15 @@ def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
             database.execute("BEGIN")
             database.execute("SELECT count(*) FROM seal").fetchone()  # from here on, one state
         return database
+
+
+@contextmanager
+def reading(kind: Kind, path: Path) -> Iterator[sqlite3.Connection]:
+    """Open a file to read one state of it, all of whose changes are there."""
+    committed = committed_changes(kind, path)
+    with explained(kind, path), closing(open_to_read(kind, path)) as database:
+        require_changes(kind, path, "read", committed, read_seals(kind, path, database))
+        yield database
 
 
 @contextmanager
@@ -296,17 +412,21 @@ def connect(path: Path, mode: str) -> sqlite3.Connection:
 
 @contextmanager
 def explained(kind: Kind, path: Path) -> Iterator[None]:
-    """Turn errors of SQLite into a StoreError that says what to do."""
+    """Turn errors of SQLite, and of a disk that is full, into a StoreError that says what to do."""
     try:
         yield
-    except DAMAGE as err:
+    except (*DAMAGE, OSError) as err:
+        kind_of_error = StoreError
         code = getattr(err, "sqlite_errorcode", 0) & 0xFF  # the extended code has more bits
+        is_full = code in NO_SPACE or getattr(err, "errno", 0) in NO_ROOM
+        if isinstance(err, OSError) and not is_full:
+            raise
         if code in BUSY:
             text = (
                 f"{kind.noun} has one writer at a time; another process has held {path} for more "
                 f"than {LONGEST_WAIT:g} s. Wait for it to end."
             )
-        elif code in NO_SPACE:
+        elif is_full:
             text = (
                 f"{kind.noun} needs space on its disk; {path.parent}: {err}. Nothing was changed: free "
                 "some space and repeat the call."
@@ -317,9 +437,10 @@ def explained(kind: Kind, path: Path) -> Iterator[None]:
                 "writable folder."
             )
         else:
+            kind_of_error = DamagedFileError
             renew = kind.renew[0].upper() + kind.renew[1:]
             text = f"{path} must be a readable {kind.a_noun.split(' ', 1)[1]}; {err}. {renew}."
-        raise StoreError(text) from err
+        raise kind_of_error(text) from err
 
 
 def read_rows(

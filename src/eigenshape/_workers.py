@@ -37,9 +37,10 @@ NO_WORKERS = (
 )
 
 
-# Files of one task of an executor. Each task starts a process of its own, which takes about two
-# seconds to load the library: a twentieth of what it takes to describe so many files.
-FILES_A_TASK = 32
+# Files of one task of an executor, at most. Each task starts a process of its own, which takes about
+# two seconds to load the library: a twentieth of what it takes to describe so many files. Fewer files
+# than this many tasks have a task each, so that they go to as many workers.
+FILES_A_TASK, MOST_SMALL_TASKS = 32, 64
 FILES_AHEAD = 4  # files for each worker that wait for it, or whose results wait for us
 TASKS_AHEAD = 1024  # the same for all workers of an executor, in tasks: a task takes some 40 KB
 SECONDS_BETWEEN_LOOKS = 1.0  # after which the process of a task looks whether its worker lives
@@ -61,7 +62,7 @@ class Workers:
         has an equal share of the memory of the machine. Not limited on macOS and Windows.
     executor : concurrent.futures.Executor, optional
         Runs the work in place of processes of this machine: a cluster's, for example. Each task
-        describes up to 32 files in a process of its own, under the same limits, so a file that
+        describes 1 to 32 files in a process of its own, under the same limits, so a file that
         kills its process costs the executor no worker. Workers must see the same files and have
         the same eigenshape.
 
@@ -345,8 +346,8 @@ def _run_in_executor(
     def submit(files: Sequence[Item]) -> "Future[bytes]":
         return executor.submit(run_apart, pickle.dumps((work, files, each)))
 
-    starts = range(0, len(items), FILES_A_TASK)
-    pieces = (items[start : start + FILES_A_TASK] for start in starts)
+    n_files = min(max(len(items) // MOST_SMALL_TASKS, 1), FILES_A_TASK)
+    pieces = (items[start : start + n_files] for start in range(0, len(items), n_files))
     try:
         for files, task in _as_finished(submit, pieces, TASKS_AHEAD, tasks):
             error = task.exception()

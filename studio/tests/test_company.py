@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from test_workspace import Page, file_of
 
 import eigenshape as es
-from eigenshape.collections.collection import fit_file, save_collection, write_fit
+from eigenshape._files import content_digest
+from eigenshape.collections.parts import kept_fits, write_state
 from eigenshape.matching.spectral_refinement import corners_of_faces
 from eigenshape_studio.calls import RequestError
 from eigenshape_studio.opening import open_workspace
@@ -261,11 +262,17 @@ def collection(tmp_path_factory):
     """The folder of a collection of three balls."""
     folder = tmp_path_factory.mktemp("balls")
     made = collection_of_balls(folder, ("a", "b", "c"), level=2, note="a note")
-    for name, own, gaps, confidence in zip(
-        made.names, made.points, made.gaps, made.confidence, strict=True
-    ):
-        write_fit(fit_file(folder, name), vertices=own, gaps=gaps, confidence=confidence)
-    save_collection(made)
+    fits, rows = [], []
+    for name, source, own in zip(made.names, made.sources, made.points, strict=True):
+        exact, sure = np.zeros(len(own)), np.ones(len(own))
+        fits.append(
+            es.collections.SurfaceFit(own, exact, sure, 0.0, 0.0, 0.0, 0.0, "same", "position")
+        )
+        row = {"name": name, "key": name, "source": str(source), "digest": content_digest(source)}
+        rows.append(row | {"notes": made.notes[name]})
+    facts = {"template": made.template, "specimens": rows, "failures": made.failures}
+    kept_fits(folder)
+    write_state(folder, facts, made.mean, fits, made.names)
     return folder
 
 

@@ -53,6 +53,10 @@ def output(scans):
     assert "4 specimens, 1 failed, 2 labelled; all have 4 landmarks now." in done.stdout
     assert "broken: " in done.stdout
     assert "failed: broken: " in done.stderr
+    # Where stderr is a file, it has a line for each step: three of each specimen, one of what failed.
+    steps_done = re.findall(r"^\d+ of 15, (.*)$", done.stderr, re.MULTILINE)
+    assert steps_done.count("hand 1") == 3
+    assert steps_done.count("broken") == 1
     assert f"wrote {output / 'report.html'}" in done.stderr
     return output
 

@@ -1,10 +1,37 @@
 """Collections that are built, stopped, built further, and opened again."""
 
+import errno
+import re
+import shutil
+import sqlite3
+from contextlib import closing
+
 import numpy as np
 import pytest
 from specimens import make_specimen, mirror, move
 
 import eigenshape as es
+from eigenshape import _sealed
+from eigenshape.collections import alignment, building, surface_fit
+from eigenshape.collections.parts import kept_fits
+
+
+def spoil(folder, query):
+    """Change the file of a collection behind the back of its checksums."""
+    with closing(sqlite3.connect(folder / "collection.sqlite")) as database, database:
+        database.execute(query)
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Make fits rough, for tests of how they are kept."""
+    levels = tuple(level._replace(n_rounds=1, n_points=200) for level in surface_fit.LEVELS[:2])
+    monkeypatch.setattr(surface_fit, "LEVELS", levels)
+    monkeypatch.setattr(building, "SECOND_LEVELS", levels)
+    monkeypatch.setattr(alignment, "N_POINTS", 120)
+    monkeypatch.setattr(alignment, "N_ROUGH", 40)
+    monkeypatch.setattr(surface_fit, "POSES_DIFFER", np.inf)
+    monkeypatch.setattr(surface_fit, "STRAINED", np.inf)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +92,9 @@ def test_what_is_done_is_kept_and_what_is_damaged_is_done_again(folder, built, m
         return fit(source, target, **options)
 
     monkeypatch.setattr(building, "fit_surface", counted)
-    (folder / "out" / "first" / "ball 1.npz").write_bytes(b"PK")
+    spoil(folder / "out", "UPDATE part SET data = x'00' WHERE kind = 'first' AND name = 'ball 1'")
+    with pytest.raises(es.StoreError, match=r"of 6 rows of table part 5 do. Build it again in the"):
+        es.collections.open_collection(folder / "out")
     steps = []
     # Without a template it keeps that of the folder, which has not the median area.
     again = es.collections.build_collection(
@@ -95,19 +124,147 @@ def test_too_few_specimens_are_refused(tmp_path):
 
 
 def test_what_is_no_collection_is_said(tmp_path, built):
-    with pytest.raises(es.StoreError, match="A finished collection must be in the folder"):
+    with pytest.raises(
+        es.StoreError, match=r"A finished collection must be in the folder; .* is not"
+    ):
         es.collections.open_collection(tmp_path)
     (tmp_path / "collection.json").write_text("{}")
-    with pytest.raises(es.StoreError, match="files of a collection must be whole"):
+    with pytest.raises(es.StoreError, match=r"of an earlier version .* Build it again in the same"):
         es.collections.open_collection(tmp_path)
-    text = (built.folder / "collection.json").read_text().replace('"version": 2', '"version": 9')
-    for kept in ("fits", "mean.ply"):
-        (tmp_path / kept).symlink_to(built.folder / kept)
-    (tmp_path / "collection.json").write_text(text)
-    with pytest.raises(es.StoreError, match="The version of a collection must be 2"):
+    kept_fits(tmp_path)
+    with pytest.raises(es.StoreError, match=r"in the folder; the build in .* was stopped"):
+        es.collections.open_collection(tmp_path)
+    spoil(tmp_path, "PRAGMA user_version = 9")
+    with pytest.raises(es.StoreError, match="must be a collection of format 1; it is of format 9"):
         es.collections.open_collection(tmp_path)
     with pytest.raises(es.InvalidParameterError, match="must be that of a specimen of the coll"):
         built.read_specimen("broken")
+
+
+@pytest.fixture
+def scans(folder):
+    """The files of the folder, without the collection that it holds."""
+    return {path.stem: path for path in folder.glob("*.ply")}
+
+
+@pytest.fixture
+def copy(built, tmp_path):
+    """The folder of a copy of the collection."""
+    return shutil.copytree(built.folder, tmp_path / "copy")
+
+
+def same(one, other):
+    """Return whether two collections hold the same numbers."""
+    return np.array_equal(one.points, other.points) and np.array_equal(
+        one.mean.vertices, other.mean.vertices
+    )
+
+
+class StoppedError(Exception):
+    """Raised in the middle of a build, as Ctrl-C is."""
+
+
+@pytest.mark.parametrize("step", [4, 7, 10, 11])
+def test_a_stopped_build_with_another_template_leaves_the_last_collection(
+    scans, built, copy, step, quick
+):
+    def stop(n_done, *_):
+        if n_done == step:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        es.collections.build_collection(scans, copy, template="ball 1", callback=stop)
+    opened = es.collections.open_collection(copy)
+    assert same(opened, built)
+    assert (opened.template, opened.names) == (built.template, built.names)
+    after_stop = es.collections.build_collection(scans, copy, template="ball 1")
+    fresh = es.collections.build_collection(scans, copy.with_name("fresh"), template="ball 1")
+    assert same(after_stop, fresh)
+    assert {path.name for path in copy.iterdir()} == {path.name for path in fresh.folder.iterdir()}
+
+
+def test_a_surface_that_has_changed_is_not_taken_for_that_of_the_collection(tmp_path, quick):
+    balls = {f"ball {i}": make_specimen(i) for i in range(2)}
+    first = es.collections.build_collection(balls, tmp_path)
+    again = es.collections.build_collection(balls | {"ball 1": make_specimen(7)}, tmp_path)
+    assert not np.array_equal(first.points, again.points)
+    assert len(list((tmp_path / "specimens").iterdir())) == 2
+    for name in balls:
+        assert again.read_specimen(name).n_vertices == 642
+    es.write_mesh(make_specimen(3), again.sources[0])
+    with pytest.raises(es.StoreError, match=r"must be the one that was fitted; .*has changed"):
+        again.read_specimen("ball 0")
+
+
+def test_a_file_that_changes_while_it_is_fitted_is_a_failure(scans, copy, quick):
+    scans["extra"] = shutil.copy(scans["ball 1"], copy.with_name("extra.ply"))
+
+    def change(n_done, n_steps, name, error):
+        if n_done == 5:  # all are read
+            es.write_mesh(make_specimen(5), scans["extra"])
+
+    found = es.collections.build_collection(scans, copy, callback=change)
+    assert "A file must not change while it is fitted" in found.failures["extra"]
+
+
+def test_two_builds_at_once_are_both_right(scans, copy, quick):
+    other = "ball 1"
+
+    def build_other(n_done, *_):
+        if n_done == 11:  # the first build has fits that the second one does not use
+            es.collections.build_collection(scans, copy, template=other)
+
+    first = es.collections.build_collection(scans, copy, template="ball 2", callback=build_other)
+    fresh = es.collections.build_collection(scans, copy.with_name("fresh"), template="ball 2")
+    assert same(first, fresh)
+    assert same(es.collections.open_collection(copy), fresh)
+    names = ("mean.ply", "specimens.csv")
+    assert all((copy / n).read_bytes() == (fresh.folder / n).read_bytes() for n in names)
+
+
+@pytest.mark.parametrize("what", [b"", b"not a database", None])
+def test_a_file_that_cannot_be_read_is_named_with_a_remedy(scans, copy, what, quick):
+    path = copy / "collection.sqlite"
+    path.write_bytes(path.read_bytes()[:70_000] if what is None else what)
+    with pytest.raises(es.StoreError, match=r"[Bb]uild it again|Choose another folder") as said:
+        es.collections.open_collection(copy)
+    with pytest.raises(es.StoreError, match=re.escape(str(said.value)[:60])):
+        es.collections.build_collection(scans, copy)
+
+
+def test_a_full_disk_is_named_and_nothing_is_lost(scans, built, copy, quick, monkeypatch):
+    connect = _sealed.connect
+
+    def small(path, mode):
+        database = connect(path, mode)
+        (n_pages,) = database.execute("PRAGMA page_count").fetchone()
+        database.execute(f"PRAGMA max_page_count = {n_pages}")
+        return database
+
+    with monkeypatch.context() as patch:
+        patch.setattr(_sealed, "connect", small)
+        with pytest.raises(es.StoreError, match=r"needs space on its disk; .* is full"):
+            es.collections.build_collection(scans, copy, template="ball 1")
+    assert same(es.collections.open_collection(copy), built)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("eigenshape.collections.collection.replace_file", full)
+        with pytest.raises(es.StoreError, match=r"needs space on its disk; .*No space left"):
+            es.collections.build_collection(scans, copy, template="ball 1")
+    assert es.collections.open_collection(copy).template == "ball 1"
+
+
+def test_what_killed_processes_leave_is_deleted_by_the_next_build(scans, copy, quick):
+    left = [f".{'0a' * 8}.tmp", f"collection.sqlite.{'1b' * 8}.tmp-journal"]
+    for name in (*left, "collection.sqlite.bak", ".mine.tmp"):
+        (copy / name).touch()
+    es.collections.build_collection(scans, copy)
+    found = {path.name for path in copy.iterdir()}
+    assert not found & set(left)
+    assert found > {"collection.sqlite.bak", ".mine.tmp"}
 
 
 def test_landmarks_are_carried_with_their_errors(built):

@@ -42,8 +42,9 @@ def collection(
     The output has the mean shape (mean.ply), the landmarks of all specimens (landmarks.csv), their
     sizes, sides and what was noticed (specimens.csv) and a page that any browser opens
     (report.html). A specimen that fails is named, and the others go on.
-    After Ctrl-C or a crash the same command continues where it stopped. The exit code is 3 if some
-    specimens failed.
+    After Ctrl-C or a crash the same command continues where it stopped; until it has ended, the
+    output keeps the last collection that was finished (collection.sqlite). Where standard error is
+    a file, it gets a line for each step of a specimen. The exit code is 3 if some specimens failed.
 
     For instance: eigenshape collection skulls -o skulls-out
 
@@ -89,7 +90,7 @@ def collection(
             template=template,
             mirrored=not unmirrored and (labelled or True),
             workers=processes,
-            callback=batch_reporter(progress, "failed"),
+            callback=batch_reporter(progress, "failed", lines=True),
         )
     known = {name: points for name, points in labelled.items() if name in built.names}
     written = ["mean.ply", "specimens.csv", "report.html"]

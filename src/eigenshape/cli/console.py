@@ -145,11 +145,19 @@ def progress_bar(title: str) -> Iterator[Callable[[float, str], None]]:
         yield update
 
 
-def batch_reporter(progress: Callable[[float, str], None], failed: str = "not indexed") -> Callback:
-    """Return what a batch calls after each file: it moves the bar, and names a file that failed."""
+def batch_reporter(
+    progress: Callable[[float, str], None], failed: str = "not indexed", *, lines: bool = False
+) -> Callback:
+    """Return what a batch calls after each file: it moves the bar, and names a file that failed.
+
+    Where stderr is a file, there is no bar; a batch that takes hours prints `lines` in its place.
+    """
 
     def report(n_done: int, n_items: int, name: str, error: str | None) -> None:
-        progress(n_done / n_items, f"{n_done} of {n_items}, {name}")
+        step = f"{n_done} of {n_items}, {name}"
+        progress(n_done / n_items, step)
+        if lines and not err.is_terminal:
+            err.print(escape_text(step))
         if error is not None:
             err.print(f"[yellow]{failed}:[/] {escape_text(name)}: {escape_text(error)}")
 

@@ -1,33 +1,40 @@
 """Build a collection: fit a template to all specimens, then their mean."""
 
 import hashlib
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
+from urllib.parse import quote
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import EigenshapeError, InvalidParameterError, InvalidShapeError
-from eigenshape._files import as_path
+from eigenshape._files import as_path, content_digest
 from eigenshape._progress import Callback
+from eigenshape._sealed import explained
 from eigenshape._threads import one_blas_thread
 from eigenshape._workers import Item, Outcome, Workers, run_in_workers
 from eigenshape.collections.alignment import MIRROR, Side, Similarity, best_similarity
 from eigenshape.collections.collection import (
-    TABLE,
     Collection,
-    fit_file,
-    read_fit,
+    collection_of,
+    export_collection,
     read_specimen,
-    save_collection,
     unreflect,
-    write_fit,
+)
+from eigenshape.collections.parts import (
+    COLLECTION,
+    DATABASE,
+    SPECIMENS,
+    exporting,
+    keep_fit,
+    kept_fits,
+    write_state,
 )
 from eigenshape.collections.sides import sides_of_landmarks
 from eigenshape.collections.surface_fit import (
@@ -45,11 +52,11 @@ from eigenshape.io.folders import find_items
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.morphometrics.landmarks import Landmarks, require_same_names
 from eigenshape.morphometrics.procrustes import fit_procrustes
-from eigenshape.retrieval.building.batch import content_digest
 
 T = TypeVar("T")
 
 N_FACES = 20_000  # of the template
+DIGITS = 16  # of a digest in the name of a file
 # The second round starts in so many modes of the first, which smooths over what single fits did
 # wrong, and bends in the last three levels: in the last one with as many points as the template has
 # faces, and in more rounds. Landmarks of one skull are 0.176 mm off then; with 6,000 points and four
@@ -85,9 +92,10 @@ def build_collection(
        its first fit in the 8 largest modes of the collection. The last step compares as many points
        as the template has faces.
 
-    What is done is kept in the folder. After Ctrl-C or a crash the same call goes on where it
-    stopped; files that have not changed are not fitted again. A specimen that cannot be read or
-    placed is reported, and the others go on.
+    What is done is kept in one file of the folder, collection.sqlite. After Ctrl-C or a crash the
+    same call goes on where it stopped, and until it has ended, the folder holds the last collection
+    that was finished. Surfaces that have not changed are not fitted again. A specimen that cannot be
+    read or placed is reported, and the others go on.
 
     Parameters
     ----------
@@ -122,6 +130,8 @@ def build_collection(
         If there are fewer than two specimens, or none has the name of the template.
     InvalidShapeError
         If fewer than two specimens can be fitted.
+    StoreError
+        If the folder cannot be written, or its disk is full. What was done is kept.
     EigenshapeError
         If no worker can start. A script must call this under ``if __name__ == "__main__":``, since
         workers import the script.
@@ -157,6 +167,8 @@ def build_collection(
             f"The template must be a specimen; there is none named {template!r}."
         )
     labelled = _checked_landmarks(mirrored, names)
+    with explained(COLLECTION, folder / DATABASE):
+        folder.mkdir(parents=True, exist_ok=True)
     run = _Run(folder, workers, callback, len(items))
 
     found = run.over(items, _measure_file)
@@ -165,37 +177,38 @@ def build_collection(
     if template is None:
         order = sorted(items, key=lambda item: (found[item.name].area, item.name))
         # Another template would discard all fits when a specimen is added.
-        last = _last_template(folder)
-        template = last if last in found else order[len(order) // 2].name
+        template = run.template if run.template in found else order[len(order) // 2].name
     if template in run.failures:
         raise InvalidShapeError(f"The template must be readable. {run.failures[template]}")
-    digests = {name: measured.digest for name, measured in found.items()}
-    notes = {name: list(measured.report) for name, measured in found.items()}
 
-    paths = {item.name: item.path for item in items}
-    surface = _template_surface(paths[template])
-    key = _digest(surface.vertices, surface.faces)
+    digests = {measured.path: measured.digest for measured in found.values()}
+    surface, repairs = _template_surface(found[template].path, digests)
     readable = {name: points for name, points in labelled.items() if name in found}
     told = sides_of_landmarks(readable, template)
     known = False if mirrored is False else None
-    states = {name: f"{digest} {known} {told.get(name)}" for name, digest in digests.items()}
-    work = partial(_fit_file, surface, known, {paths[name]: told[name] for name in told})
-    fits = run.fit(items, work, "first", states, key)
+    keys = {
+        name: _key(surface.vertices, surface.faces, known, told.get(name), measured.surface)
+        for name, measured in found.items()
+    }
+    sides = {found[name].path: is_mirrored for name, is_mirrored in told.items()}
+    work = partial(_fit_file, digests, surface, known, sides)
+    fits = run.fit(items, work, "first", keys)
     run.require_two(fits)
 
     starts, modes = _starts_from_modes(fits)
-    key = _digest(surface.faces, modes, *(start.coefficients for start in starts.values()))
     # The modes of others do not span another pose: such a specimen keeps its first fit.
     posed = {name: fit for name, fit in fits.items() if fit.method == "intrinsic"}
     again = [item for item in items if item.name in fits.keys() - posed.keys()]
+    mean = _key(surface.faces, modes)
+    keys = {}
+    for name, start in starts.items():
+        place = vars(start.placing).values()
+        keys[name] = _key(mean, start.side, start.coefficients, *place, found[name].surface)
     by_path = {item.path: starts[item.name] for item in again}
-    work = partial(_fit_again, surface.faces, modes, by_path)
-    states = {item.name: f"{digests[item.name]} {fits[item.name].side}" for item in again}
-    fits = run.fit(again, work, "fits", states, key) | posed
-    for name, fit in posed.items():
-        write_fit(fit_file(folder, name), **asdict(fit))
+    work = partial(_fit_again, digests, surface.faces, modes, by_path)
+    fits = run.fit(again, work, "last", keys) | posed
     run.require_two(fits)
-    return _collect(run, template, surface.faces, fits, notes, paths)
+    return _collect(run, template, surface.faces, fits, found, repairs)
 
 
 def _collect(
@@ -203,8 +216,8 @@ def _collect(
     template: str,
     faces: Int[np.ndarray, "f 3"],
     fits: Mapping[str, SurfaceFit],
-    notes: dict[str, list[str]],
-    paths: Mapping[str, Path],
+    found: Mapping[str, "_Measured"],
+    repairs: Sequence[str],
 ) -> Collection:
     """Make a collection of the last fits, and write it to its folder."""
     ordered = {name: fits[name] for name in sorted(fits)}
@@ -214,31 +227,37 @@ def _collect(
     together = fit_procrustes(unreflect(points, reflected)[complete])
     size = float(np.median(together.sizes))
     mean = TriangleMesh(together.mean * size, faces)
+    rows = []
     for name, fit in ordered.items():
-        notes[name] += _noticed(fit, size)
-    collection = Collection(
-        folder=run.folder,
-        names=tuple(ordered),
-        mean=mean,
-        points=points,
-        gaps=np.stack([fit.gaps for fit in ordered.values()]),
-        confidence=np.stack([fit.confidence for fit in ordered.values()]),
-        sides=tuple(fit.side for fit in ordered.values()),
-        methods=tuple(fit.method for fit in ordered.values()),
-        sources=tuple(paths[name].absolute() for name in ordered),
-        template=template,
-        notes={name: tuple(notes[name]) for name in ordered},
-        failures=dict(sorted(run.failures.items())),
-    )
-    save_collection(collection)
+        notes = [*found[name].report, *_noticed(fit, size)]
+        if name == template:
+            notes += [f"as the template: {done}" for done in repairs]
+        rows.append(
+            {
+                "name": name,
+                "key": run.keys[name],
+                "source": str(found[name].path.absolute()),
+                "digest": found[name].digest,
+                "notes": notes,
+            }
+        )
+    failures = dict(sorted(run.failures.items()))
+    facts = {"template": template, "specimens": rows, "failures": failures}
+    write_state(run.folder, facts, mean, list(ordered.values()), run.used)
+    collection = collection_of(run.folder, facts, mean, list(ordered.values()))
+    with exporting(run.folder, facts) as is_last:
+        if is_last:  # of two builds at once
+            export_collection(collection)
     return collection
 
 
 @dataclass(frozen=True)
 class _Measured:
-    """What is known of a specimen before it is fitted."""
+    """What is known of a specimen before it is fitted, with digests of its file and its surface."""
 
+    path: Path
     digest: str
+    surface: str
     area: float
     report: tuple[str, ...]
 
@@ -262,6 +281,9 @@ class _Run:
         self.callback = callback or _ignore
         self.n_items, self.n_done, self.n_rounds = n_items, 0, 0
         self.failures: dict[str, str] = {}
+        self.kept, self.template = kept_fits(folder)
+        self.keys: dict[str, str] = {}  # of the last fit of each specimen
+        self.used: set[str] = set()  # keys of all fits of this run
 
     def over(self, items: Sequence[Item], work: Callable[[Path], T]) -> dict[str, T]:
         """Return what work makes of each item, by name, as far as it does not fail."""
@@ -272,28 +294,20 @@ class _Run:
         self,
         items: Sequence[Item],
         work: Callable[[Path], SurfaceFit],
-        room: str,
-        states: Mapping[str, str],
-        key: str,
+        kind: str,
+        keys: Mapping[str, str],
     ) -> dict[str, SurfaceFit]:
-        """Return the fit of each item, from the folder if it was made of the same input."""
+        """Return the fit of each item by its key, from the folder if it is there."""
         self._begin(len(items))
-        fits: dict[str, SurfaceFit] = {}
-        keys = {item.name: f"{RECIPE} {key} {states[item.name]}" for item in items}
-        for item in items:
-            try:
-                kept = read_fit(fit_file(self.folder, item.name, room))
-                if str(kept.pop("key")) == keys[item.name]:
-                    fits[item.name] = SurfaceFit(**{n: _plain(kept[n]) for n in kept})
-            except (OSError, ValueError, KeyError, TypeError):
-                continue  # there is none that is whole
-        for item in items:
-            if item.name in fits:
-                self._done(item.name, None)
-        for name, fit in self._results([i for i in items if i.name not in fits], work):
-            write_fit(fit_file(self.folder, name, room), **asdict(fit), key=keys[name])
+        self.keys |= {item.name: keys[item.name] for item in items}
+        self.used |= set(keys.values())
+        fits = {item.name: self.kept.get(keys[item.name]) for item in items}
+        for name in [name for name, fit in fits.items() if fit is not None]:
+            self._done(name, None)
+        for name, fit in self._results([item for item in items if fits[item.name] is None], work):
+            keep_fit(self.folder, keys[name], kind, name, fit)
             fits[name] = fit
-        return {item.name: fits[item.name] for item in items if item.name in fits}
+        return {name: fit for name, fit in fits.items() if fit is not None}
 
     def _results(self, items: Sequence[Item], work: Callable[[Path], T]) -> Iterator[tuple[str, T]]:
         if self.workers is None:
@@ -333,10 +347,6 @@ def _outcome(work: Callable[[Path], T], path: Path) -> Outcome[T]:
         return Outcome(error=str(err))
 
 
-def _plain(array: np.ndarray) -> Any:
-    return array.item() if array.ndim == 0 else array
-
-
 def _ignore(n_done: int, n_steps: int, name: str, error: str | None) -> None:
     """Do nothing after a step."""
 
@@ -354,9 +364,13 @@ def _find_specimens(
         if isinstance(value, str | Path):
             path = as_path(value)
         else:
-            path = fit_file(folder, str(name), "specimens")
+            mesh = as_mesh(value, f"specimens[{name!r}]")
+            # The surfaces of the finished collection stay, also if this build is stopped.
+            digest = _key(mesh.vertices, mesh.faces)[:DIGITS]
+            path = folder / SPECIMENS / f"{quote(str(name), safe=' ')} {digest}.ply"
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_mesh(as_mesh(value, f"specimens[{name!r}]"), path)
+            with explained(COLLECTION, folder / DATABASE):
+                write_mesh(mesh, path)
         items.append(Item(str(name), path))
     return items
 
@@ -375,30 +389,41 @@ def _checked_landmarks(
     return mirrored
 
 
-def _last_template(folder: Path) -> str | None:
-    try:
-        return str(json.loads((folder / TABLE).read_bytes())["template"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None  # there is no collection that is whole
-
-
 def _measure_file(path: Path) -> _Measured:
+    digest = content_digest(path)
     mesh, report = read_specimen(path)
-    return _Measured(content_digest(path), surface_area(mesh), report)
+    return _Measured(path, digest, _key(mesh.vertices, mesh.faces), surface_area(mesh), report)
 
 
-def _template_surface(path: Path) -> TriangleMesh:
-    """Return a sound surface of at most `N_FACES` faces."""
+def _read_measured(path: Path, digests: Mapping[Path, str]) -> TriangleMesh:
+    """Read a specimen that must be as it was measured."""
     mesh = read_specimen(path)[0]
-    mesh = repair(mesh, suggest_repairs(mesh)).mesh
-    return decimate(mesh, N_FACES).mesh if mesh.n_faces > N_FACES else mesh
+    if content_digest(path) != digests[path]:
+        raise InvalidShapeError(
+            f"A file must not change while it is fitted; {path} has. Build the collection again."
+        )
+    return mesh
+
+
+def _template_surface(
+    path: Path, digests: Mapping[Path, str]
+) -> tuple[TriangleMesh, tuple[str, ...]]:
+    """Return a sound surface of at most `N_FACES` faces, and what was repaired."""
+    mesh = _read_measured(path, digests)
+    done = repair(mesh, suggest_repairs(mesh))
+    mesh = done.mesh
+    return decimate(mesh, N_FACES).mesh if mesh.n_faces > N_FACES else mesh, done.report
 
 
 def _fit_file(
-    source: TriangleMesh, mirrored: bool | None, told: Mapping[Path, bool], path: Path
+    digests: Mapping[Path, str],
+    source: TriangleMesh,
+    mirrored: bool | None,
+    told: Mapping[Path, bool],
+    path: Path,
 ) -> SurfaceFit:
     """Fit the template to a file; where its surface tells no side, landmarks may have told it."""
-    target = read_specimen(path)[0]
+    target = _read_measured(path, digests)
     fit = fit_surface(source, target, mirrored=mirrored)
     if fit.side != "cannot be told" or path not in told:
         return fit
@@ -406,21 +431,27 @@ def _fit_file(
 
 
 def _fit_again(
-    faces: np.ndarray, modes: np.ndarray, starts: Mapping[Path, _Start], path: Path
+    digests: Mapping[Path, str],
+    faces: np.ndarray,
+    modes: np.ndarray,
+    starts: Mapping[Path, _Start],
+    path: Path,
 ) -> SurfaceFit:
     start = starts[path]
     source = TriangleMesh(np.tensordot(start.coefficients, modes, 1), faces)
-    target = read_specimen(path)[0]
+    target = _read_measured(path, digests)
     *coarse, fine = SECOND_LEVELS
     fine = fine._replace(n_points=max(fine.n_points, len(faces)))
     fit = bend_placed(source, start.placing.inverse(), target, (*coarse, fine))
     return replace(fit, side=start.side)
 
 
-def _digest(*arrays: np.ndarray) -> str:
-    found = hashlib.sha256()
-    for array in arrays:
-        found.update(array.tobytes())
+def _key(*inputs: object) -> str:
+    """Return a digest of what something is made of."""
+    found = hashlib.sha256(RECIPE.encode())
+    for value in inputs:
+        data = value.tobytes() if isinstance(value, np.ndarray) else repr(value).encode()
+        found.update(b"%d " % len(data) + data)
     return found.hexdigest()
 
 

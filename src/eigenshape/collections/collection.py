@@ -1,28 +1,27 @@
 """A collection of specimens in dense correspondence, and the folder that it is kept in."""
 
-import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
-from urllib.parse import quote
-from zipfile import BadZipFile
 
 import numpy as np
 from jaxtyping import Float
 
 from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError, InvalidShapeError, StoreError
-from eigenshape._files import as_path, replace_file, replacing
+from eigenshape._files import as_path, content_digest, replace_file
 from eigenshape.collections.alignment import MIRROR, Side
+from eigenshape.collections.parts import SPECIMENS, read_state
 from eigenshape.collections.spread_points import main_pieces
+from eigenshape.collections.surface_fit import SurfaceFit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward, outward_vote
 from eigenshape.geometry.repairs.repair import repair
-from eigenshape.io.mesh_files import read_mesh, write_mesh
+from eigenshape.io.mesh_files import write_mesh
 from eigenshape.io.surface_files import read_surface
 from eigenshape.morphometrics.landmark_files import csv_text
 
-VERSION = 2  # of the folder's layout
-TABLE, MEAN, SPECIMENS = "collection.json", "mean.ply", "specimens.csv"
+TABLE, MEAN = "specimens.csv", "mean.ply"
 
 
 @record
@@ -59,6 +58,8 @@ class Collection(ReadOnly):
         reflections, repairs.
     failures : dict of str to str
         By name, why a specimen is not in the collection.
+    digests : tuple of str
+        SHA-256 of each file when it was fitted; empty if it is not known.
 
     See Also
     --------
@@ -86,6 +87,7 @@ class Collection(ReadOnly):
     template: str
     notes: dict[str, tuple[str, ...]]
     failures: dict[str, str]
+    digests: tuple[str, ...] = ()
 
     @property
     def reflected(self) -> tuple[bool, ...]:
@@ -109,10 +111,19 @@ class Collection(ReadOnly):
         ------
         InvalidParameterError
             If no specimen has this name.
+        StoreError
+            If the file has changed since it was fitted.
         FileFormatError, InvalidShapeError, OSError
-            As `es.io.read_surface`, if the file has changed.
+            As `es.io.read_surface`, if it cannot be read.
         """
-        return read_specimen(self.sources[self.number(name)])[0]
+        row = self.number(name)
+        source = self.sources[row]
+        if self.digests and content_digest(source) != self.digests[row]:
+            raise StoreError(
+                f"The surface of a specimen must be the one that was fitted; {source}, of {name!r}, "
+                "has changed. Build the collection again."
+            )
+        return read_specimen(source)[0]
 
     def number(self, name: str) -> int:
         """Return the row of a specimen.
@@ -138,6 +149,9 @@ class Collection(ReadOnly):
 def open_collection(folder: str | Path) -> Collection:
     """Open a collection that `build_collection` has made in a folder.
 
+    While it is built again, and after a build that was stopped, this is the last one that was
+    finished.
+
     Parameters
     ----------
     folder : str or Path
@@ -149,7 +163,7 @@ def open_collection(folder: str | Path) -> Collection:
     Raises
     ------
     StoreError
-        If there is no finished collection, a file of it is damaged, or another version wrote it.
+        If there is no finished collection, its file is damaged, or another version wrote it.
 
     See Also
     --------
@@ -164,97 +178,44 @@ def open_collection(folder: str | Path) -> Collection:
     eigenshape...StoreError: A finished collection must be in the folder; ...
     """
     folder = as_path(folder)
-    try:
-        table = json.loads((folder / TABLE).read_bytes())
-        version, rows = table["version"], table["specimens"]
-        fits = [read_fit(fit_file(folder, row["name"])) for row in rows]
-        mean = read_mesh(folder / MEAN)
-    except FileNotFoundError as err:
-        raise StoreError(
-            f"A finished collection must be in the folder; {err.filename} is not there. Build it "
-            "again with the same folder: what is done is kept."
-        ) from err
-    except (ValueError, KeyError, TypeError) as err:
-        raise StoreError(
-            f"The files of a collection must be whole; one in {folder} is not: {err}. Build it "
-            "again with the same folder."
-        ) from err
-    if version != VERSION:
-        raise StoreError(
-            f"The version of a collection must be {VERSION}; that in {folder} has {version}."
-        )
+    return collection_of(folder, *read_state(folder))
+
+
+def collection_of(
+    folder: Path, facts: dict[str, Any], mean: TriangleMesh, fits: Sequence[SurfaceFit]
+) -> Collection:
+    """Return the collection of a state, as `write_state` takes it."""
+    rows = facts["specimens"]
     return Collection(
         folder=folder,
         names=tuple(row["name"] for row in rows),
         mean=mean,
-        points=np.stack([fit["vertices"] for fit in fits]),
-        gaps=np.stack([fit["gaps"] for fit in fits]),
-        confidence=np.stack([fit["confidence"] for fit in fits]),
-        sides=tuple(row["side"] for row in rows),
-        methods=tuple(row["method"] for row in rows),
+        points=np.stack([fit.vertices for fit in fits]),
+        gaps=np.stack([fit.gaps for fit in fits]),
+        confidence=np.stack([fit.confidence for fit in fits]),
+        sides=tuple(fit.side for fit in fits),
+        methods=tuple(fit.method for fit in fits),
         sources=tuple(Path(row["source"]) for row in rows),
-        template=table["template"],
+        digests=tuple(row["digest"] for row in rows),
+        template=facts["template"],
         notes={row["name"]: tuple(row["notes"]) for row in rows},
-        failures=table["failures"],
+        failures=facts["failures"],
     )
 
 
-def save_collection(collection: Collection) -> None:
-    """Write all but the fits, which are there already; collection.json comes last."""
+def export_collection(collection: Collection) -> None:
+    """Write the mean and a table of the specimens for others, and delete what they do not need."""
+    rows: list[list[object]] = [["specimen", "side", "method", "size", "notes"]]
+    columns = (collection.names, collection.sides, collection.methods, collection.points)
+    for name, side, method, points in zip(*columns, strict=True):
+        size = float(np.linalg.norm(points - points.mean(axis=0)))
+        rows.append([name, side, method, size, "; ".join(collection.notes[name])])
+    rows += [[name, "", "failed", "", reason] for name, reason in collection.failures.items()]
+    replace_file(collection.folder / TABLE, csv_text(rows).encode())
     write_mesh(collection.mean, collection.folder / MEAN)
-    rows: list[dict[str, Any]] = [
-        {
-            "name": name,
-            "source": str(source),
-            "side": side,
-            "method": method,
-            "size": float(np.linalg.norm(points - points.mean(axis=0))),
-            "notes": collection.notes[name],
-        }
-        for name, source, side, method, points in zip(
-            collection.names,
-            collection.sources,
-            collection.sides,
-            collection.methods,
-            collection.points,
-            strict=True,
-        )
-    ]
-    header = ["specimen", "side", "method", "size", "notes"]
-    lines = [
-        [row["name"], row["side"], row["method"], row["size"], "; ".join(row["notes"])]
-        for row in rows
-    ]
-    lines += [[name, "", "failed", "", reason] for name, reason in collection.failures.items()]
-    replace_file(collection.folder / SPECIMENS, csv_text([header, *lines]).encode())
-    table = {
-        "version": VERSION,
-        "template": collection.template,
-        "specimens": rows,
-        "failures": collection.failures,
-    }
-    replace_file(collection.folder / TABLE, json.dumps(table, indent=1).encode())
-
-
-def fit_file(folder: Path, name: str, room: str = "fits") -> Path:
-    """Return the file of a specimen's fit; names may hold what names of files must not."""
-    return folder / room / f"{quote(name, safe=' ')}.npz"
-
-
-def write_fit(path: Path, **arrays: Any) -> None:
-    """Write the arrays of a fit, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as file:
-        np.savez(file, **arrays)
-
-
-def read_fit(path: Path) -> dict[str, np.ndarray]:
-    """Read the arrays of a fit; raise ValueError if the file is damaged."""
-    try:
-        with np.load(path) as arrays:
-            return dict(arrays)
-    except (BadZipFile, EOFError) as err:
-        raise ValueError(f"{path}: {err}") from err
+    for path in (collection.folder / SPECIMENS).glob("*"):
+        if path.absolute() not in collection.sources:
+            path.unlink()
 
 
 def read_specimen(path: Path) -> tuple[TriangleMesh, tuple[str, ...]]:

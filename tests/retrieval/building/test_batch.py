@@ -17,7 +17,7 @@ from filelock import FileLock
 
 import eigenshape
 from eigenshape._errors import InvalidParameterError
-from eigenshape._workers import Item, Outcome, Workers
+from eigenshape._workers import Item, Outcome, Workers, run_in_workers
 from eigenshape.retrieval.building.batch import (
     build_index,
     content_digest,
@@ -333,6 +333,15 @@ def test_few_tasks_are_submitted_ahead_so_that_results_do_not_pile_up(index, tmp
     )
     assert len(report.failed) == 9
     assert submitted == [4, 5, 6, 7, 8, 9, 9, 9, 9]
+
+
+@pytest.mark.parametrize(("n_files", "n_tasks"), [(1, 1), (27, 27), (63, 63), (200, 67), (4096, 128)])
+def test_few_files_go_to_many_workers_and_many_files_in_few_tasks(n_files, n_tasks, tmp_path):
+    executor = CountingExecutor()
+    todo = [Item(str(number), tmp_path / str(number)) for number in range(n_files)]
+    found = run_in_workers(read_by_content, todo, Workers(executor=executor))
+    assert sorted(item.name for item, _ in found) == sorted(item.name for item in todo)
+    assert executor.n_tasks == n_tasks
 
 
 @pytest.mark.long

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from hashlib import file_digest, sha256
+from hashlib import sha256
 from itertools import chain
 from pathlib import Path
 from time import monotonic, time
@@ -16,6 +16,7 @@ from typing_extensions import TypeAliasType
 
 from eigenshape._arguments import require_each, require_type
 from eigenshape._errors import InvalidParameterError
+from eigenshape._files import content_digest
 from eigenshape._progress import Callback
 from eigenshape._text import Shown
 from eigenshape._typing import Integer
@@ -356,12 +357,6 @@ def _learn_from(outcomes: Iterable[Outcome[_ReadFile]]) -> PatchCodebook:
     return train_codebook(
         [patches for file in files for patches in file.found[: 1 + N_TRAINING_VIEWS]]
     )
-
-
-def content_digest(path: Path) -> str:
-    """Return the SHA-256 of a file."""
-    with path.open("rb") as file:
-        return file_digest(file, "sha256").hexdigest()
 
 
 def _read_repaired(

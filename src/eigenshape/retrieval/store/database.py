@@ -1,8 +1,7 @@
 """The one file of an index: its tables, and reading their rows; see `_sealed` for how they are kept."""
 
 import sqlite3
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -12,15 +11,13 @@ from jaxtyping import Int64
 
 from eigenshape import _sealed
 from eigenshape._errors import StoreError
-from eigenshape._sealed import DAMAGE, Seal, checksum, n_changes
+from eigenshape._sealed import CHANGES as CHANGES  # noqa: PLC0414 - beside the database
+from eigenshape._sealed import DAMAGE, Seal, checksum
 from eigenshape.retrieval.kinds import AnyRecipe, recipe_from_text
 from eigenshape.retrieval.store.damage import Damage
 
 DATABASE = "index.sqlite"
 ROWS_AT_ONCE = 20_000  # rows of integers in memory at a time, as Python objects: 10 MB
-# The number of changes, as text. SQLite ignores all of its log that follows a damaged bit; by this
-# file a reader notices that changes are lost. It may be deleted at any time.
-CHANGES = "changes.txt"
 
 # The integers of a descriptor; those that search needs are read for all shapes at once.
 INTEGERS = (
@@ -129,27 +126,13 @@ def _not_empty(folder: Path) -> StoreError:
     )
 
 
-@contextmanager
-def writing(folder: Path) -> Iterator[sqlite3.Connection]:
+def writing(folder: Path) -> AbstractContextManager[sqlite3.Connection]:
     """Open an index to change it. At the end of the block all changes are committed, or none.
 
     Raise StoreError if the folder is not an index of this format, changes were lost, another
     process is writing, or the disk is full.
     """
-    path = folder / DATABASE
-    with _sealed.writing(INDEX, path) as database:
-        before = _sealed.read_seals(INDEX, path, database)
-        for lost in lost_changes(committed_changes(folder), before):
-            raise StoreError(
-                f"An index must be whole to be changed; {lost}. Copy all files, or merge the index "
-                "into a new one to keep what is whole."
-            )
-        yield database
-        now = n_changes(_sealed.read_seals(INDEX, path, database))
-    if now != n_changes(before):
-        # Not forced to disk: if power fails, a number that is too low misses a lost log at worst.
-        with suppress(OSError):
-            (folder / CHANGES).write_text(f"{now}\n")
+    return _sealed.writing(INDEX, folder / DATABASE)
 
 
 def open_to_read(folder: Path) -> sqlite3.Connection:
@@ -171,27 +154,10 @@ def read_seals(
     return seals
 
 
-def committed_changes(folder: Path) -> int:
-    """Return the number of changes that an index must hold at least; 0 if it is not known.
-
-    Read it before a transaction begins, so that the state is not older.
-    """
-    try:
-        return int((folder / CHANGES).read_text())
-    except (OSError, ValueError):
-        return 0
-
-
 def lost_changes(committed: int, seals: dict[str, Seal]) -> list[Damage]:
     """Return a damage if an index holds fewer changes than were committed."""
-    found = n_changes(seals)
-    if committed <= found:  # it is less if a writer was stopped just after it committed
-        return []
-    what = (
-        f"{committed - found} of {committed} changes that were committed are lost: the file is "
-        "damaged, or was not copied with the others"
-    )
-    return [Damage(f"{DATABASE}-wal", what)]
+    lost = _sealed.lost_changes(committed, seals)
+    return [] if lost is None else [Damage(f"{DATABASE}-wal", lost)]
 
 
 def read_integers(

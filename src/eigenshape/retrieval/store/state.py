@@ -17,7 +17,15 @@ from jaxtyping import Int
 
 from eigenshape._arrays import record
 from eigenshape._errors import StoreError
-from eigenshape._sealed import DAMAGE, Seal, checksum, closed_on_error, explained, read_rows
+from eigenshape._sealed import (
+    DAMAGE,
+    Seal,
+    checksum,
+    closed_on_error,
+    committed_changes,
+    explained,
+    read_rows,
+)
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, restore, row_type
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
@@ -25,7 +33,6 @@ from eigenshape.retrieval.store.database import (
     INDEX,
     INTEGERS,
     Facts,
-    committed_changes,
     integer_checksums,
     lost_changes,
     open_to_read,
@@ -406,7 +413,7 @@ def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
         Of the same index at an earlier moment: only what was added since is read, and nothing if
         all is the same.
     """
-    place, committed = str(folder / DATABASE), committed_changes(folder)
+    place, committed = str(folder / DATABASE), committed_changes(INDEX, folder / DATABASE)
     with explained(INDEX, folder / DATABASE):
         database = open_to_read(folder)
         with closed_on_error(database):

@@ -84,5 +84,5 @@ class Specimens:
 
 
 def is_collection(folder: Path) -> bool:
-    """Say whether a folder holds a collection."""
-    return (folder / "collection.json").is_file()
+    """Say whether a folder holds a collection, also one of an earlier version, which is named as such."""
+    return any((folder / f"collection.{suffix}").is_file() for suffix in ("sqlite", "json"))
