@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import require_type, require_unicode
 from eigenshape._errors import EigenshapeError, InvalidParameterError, InvalidShapeError
 from eigenshape._files import as_path
 from eigenshape._progress import Callback
@@ -351,13 +351,14 @@ def _find_specimens(
         return [item for item in found if own not in item.path.absolute().parents]
     items = []
     for name, value in specimens.items():
+        require_unicode(name, "Names of specimens")
         if isinstance(value, str | Path):
             path = as_path(value)
         else:
-            path = fit_file(folder, str(name), "specimens")
+            path = fit_file(folder, name, "specimens")
             path.parent.mkdir(parents=True, exist_ok=True)
             write_mesh(as_mesh(value, f"specimens[{name!r}]"), path)
-        items.append(Item(str(name), path))
+        items.append(Item(name, path))
     return items
 
 
