@@ -69,7 +69,9 @@ def test_a_buffer_with_a_backslash_in_its_path_is_found(uri, tmp_path):
 @pytest.mark.parametrize("uri", ["..\\b.bin", "C:\\b.bin", "x" * 300, "a\\", "x" * 5000])
 def test_a_buffer_that_is_nowhere_is_named(uri, tmp_path):
     _write_gltf(tmp_path / "a.gltf", uri)
-    with pytest.raises(es.FileFormatError, match="Buffers of a .gltf file must lie in its folder"):
+    with pytest.raises(
+        es.FileFormatError, match=r"Buffers of a \.gltf file must lie in its folder"
+    ):
         es.read_mesh(tmp_path / "a.gltf")
 
 
