@@ -59,6 +59,7 @@ def test_a_surface_without_area_is_refused():
         es.collections.align_surfaces(flat, es.icosphere(1))
 
 
+@pytest.mark.long
 def test_turns_of_a_form_into_itself_are_counted():
     ball = es.icosphere(3)
     forms = {
