@@ -96,6 +96,12 @@ def require_type(value: object, kind: type | UnionType, name: str) -> None:
         )
 
 
+def require_unicode(value: object, what: str) -> None:
+    """Raise an error if a name or another text is none, or could not be stored."""
+    if not isinstance(value, str) or value != value.encode(errors="replace").decode():
+        raise InvalidParameterError(f"{what} must be Unicode text; {value!r} is not.")
+
+
 def require_choice(value: object, choice: Any, name: str) -> None:
     """Raise an error if an option is none of the names that a Literal lists."""
     *names, last = get_args(choice)

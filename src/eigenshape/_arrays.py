@@ -126,7 +126,7 @@ def finite_rows(value: ArrayLike, name: str, columns: int | None = None) -> NDAr
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
         raise InvalidShapeError(
-            f"{name} must be finite; {SINGULAR[name]} {bad[0]} is {rows[bad[0]].tolist()} "
+            f"{name} must be finite; {SINGULAR.get(name, 'row')} {bad[0]} is {rows[bad[0]].tolist()} "
             f"({bad.size} such)."
         )
     return rows

@@ -14,6 +14,8 @@ from typing import BinaryIO
 from eigenshape._arguments import describe_value
 from eigenshape._errors import FileFormatError, InvalidParameterError
 
+LONGEST_LINE = 2**22  # bytes: a polygon of 200,000 corners in an OBJ file
+
 
 def as_path(value: object, name: str = "path") -> Path:
     """Return a path that the system can open.
@@ -30,6 +32,23 @@ def as_path(value: object, name: str = "path") -> Path:
             f"{name} must not hold the character NUL; {text!r} does, at place {text.index(chr(0))}."
         )
     return Path(text)
+
+
+def require_lines(data: bytes) -> None:
+    """Raise an error for a line that no real file has, before memory is taken to split it."""
+    start = 0
+    while len(data) - start > LONGEST_LINE:
+        ends = (data.rfind(end, start, start + LONGEST_LINE) for end in (b"\n", b"\r"))
+        last = max(ends)
+        if last < 0:
+            end = data.find(b"\n", start)
+            length = (len(data) if end < 0 else end) - start
+            number = data.count(b"\n", 0, start) + 1
+            raise FileFormatError(
+                f"A line of text must have at most {LONGEST_LINE} bytes; line "
+                f"{number} has {length}. Save the file again, with line breaks."
+            )
+        start = last + 1
 
 
 def read_regular(path: Path, what: str = "a mesh") -> bytes:

@@ -131,6 +131,9 @@ class Item:
     tags: tuple[str, ...] = ()
     attributes: Mapping[str, float | str] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        require_type(self.name, str, "name")
+
     __repr__ = repr_of_changes
     _repr_html_ = html_repr
 

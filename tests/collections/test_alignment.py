@@ -57,3 +57,18 @@ def test_a_surface_without_area_is_refused():
     flat = es.TriangleMesh(np.zeros((3, 3)), [[0, 1, 2]])
     with pytest.raises(es.InvalidShapeError, match="A surface must have area"):
         es.collections.align_surfaces(flat, es.icosphere(1))
+
+
+@pytest.mark.long
+def test_turns_of_a_form_into_itself_are_counted():
+    ball = es.icosphere(3)
+    forms = {
+        np.inf: ball.vertices,
+        4.0: ball.vertices * [1, 1.3, 0.8],
+        1.0: es.make_creature("hand", n_vertices=600),
+    }
+    for n_ways, form in forms.items():
+        mesh = form if n_ways == 1 else es.TriangleMesh(form, ball.faces)
+        turned = es.TriangleMesh(2 * mesh.vertices[:, [1, 2, 0]] + 1, mesh.faces)
+        found = es.collections.align_surfaces(turned, mesh)
+        assert found.n_ways == found.inverse().n_ways == n_ways

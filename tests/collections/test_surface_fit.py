@@ -76,3 +76,13 @@ def test_a_biped_that_is_placed_back_to_front_is_turned(monkeypatch):
 def test_a_form_of_another_kind_is_refused():
     with pytest.raises(es.InvalidShapeError, match="must have about the form of the source"):
         es.collections.fit_surface(make_specimen(0), es.make_creature("octopus", n_vertices=500))
+
+
+@pytest.mark.long
+def test_a_ball_is_bent_onto_an_ellipsoid_without_a_search_for_poses(monkeypatch):
+    ball = es.icosphere(3)
+    ellipsoid = es.TriangleMesh(ball.vertices * [1, 1.6, 0.7], ball.faces)
+    monkeypatch.setattr(surface_fit, "match_shapes", None)  # each call of it would fail
+    fit = es.collections.fit_surface(ball, ellipsoid)
+    assert (fit.n_ways, fit.side, fit.method) == (np.inf, "cannot be told", "position")
+    assert np.median(fit.gaps) < 0.01

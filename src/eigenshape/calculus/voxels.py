@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from eigenshape._arrays import finite_rows, real_numbers
+from eigenshape._arrays import real_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 from eigenshape.calculus.flows import taubin_smooth
@@ -102,7 +102,7 @@ def voxel_surface(inside: ArrayLike, to_space: ArrayLike | None = None) -> Trian
     # The normals of a level set point to larger values, and those of a surface outward.
     surface = level_set(solid, -heights.ravel()[used], -0.5).surface()
     smooth = taubin_smooth(surface, N_SMOOTHING_STEPS)
-    mirrored = np.linalg.det(affine[:3, :3]) < 0
+    mirrored = np.linalg.slogdet(affine[:3, :3])[0] < 0
     faces = surface.faces[:, ::-1] if mirrored else surface.faces
     return TriangleMesh(smooth.points @ affine[:3, :3].T + affine[:3, 3], faces)
 
@@ -114,15 +114,17 @@ def as_affine(to_space: ArrayLike | None) -> np.ndarray:
     """
     if to_space is None:
         return np.eye(4)
-    matrix = finite_rows(to_space, "to_space", 4)
+    matrix = real_numbers(to_space, "to_space").astype(np.float64)
     if (
         matrix.shape != (4, 4)
+        or not np.isfinite(matrix).all()
         or not np.array_equal(matrix[3], [0, 0, 0, 1])
         or np.linalg.matrix_rank(matrix[:3, :3]) < 3
     ):
+        given = matrix.tolist() if matrix.size <= 16 else "larger"
         raise InvalidParameterError(
-            "to_space must be an affine map that can be inverted, a matrix of shape (4, 4) whose last row is "
-            f"0, 0, 0, 1; it is {matrix.tolist()} of shape {matrix.shape}."
+            "to_space must be an affine map that can be inverted, finite numbers of shape (4, 4) whose "
+            f"last row is 0, 0, 0, 1; it is {given}, of shape {matrix.shape}."
         )
     return matrix
 

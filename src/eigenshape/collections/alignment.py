@@ -44,6 +44,13 @@ PLACED = 0.35
 # the other way round. On the tuning half of experiments/ch7_collection, skulls of others, whole or
 # cut, have 0.98 to 1.03, since their two sides are alike; hands of other individuals 0.55 to 0.67.
 CLEAR_SIDE = 0.85
+# Angle of a turn, in radians: few regular prisms come near to themselves by it, so what lies on itself
+# after it can be turned by any angle.
+GOLDEN = np.pi * (3 - 5**0.5)
+# Least gap of a surface on itself, as a share of that of a turn that counts as well: boxes, prisms of
+# four and six sides and ellipsoids have 0.8 or more, creatures less than 0.7.
+ON_ITSELF = 0.75
+SAME_TURN = 1 + 2 * np.cos(np.radians(10))  # trace of the turn between two turns that count as one
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 Side: TypeAlias = Literal["same", "mirrored", "cannot be told"]
 
@@ -66,6 +73,9 @@ class Similarity(ReadOnly):
         surface that faces the same way, in units of the root mean square radius.
     mirror_gap : float
         The least gap of the mirror image of the surface; infinite if it was not tried.
+    n_ways : float
+        How many turns place the surface equally well, since it or the other one can be turned into
+        itself: 4 for boxes of three different sides, infinite for forms of revolution.
 
     See Also
     --------
@@ -87,6 +97,7 @@ class Similarity(ReadOnly):
     translation: Float[np.ndarray, " 3"]
     gap: float = 0.0
     mirror_gap: float = np.inf
+    n_ways: float = 1.0
 
     @property
     def reflected(self) -> bool:
@@ -118,7 +129,7 @@ class Similarity(ReadOnly):
         back = self.rotation.T / self.scale
         away = -back @ self.translation
         turn = self.rotation.T.copy()
-        return Similarity(1 / self.scale, turn, away, self.gap, self.mirror_gap)
+        return Similarity(1 / self.scale, turn, away, self.gap, self.mirror_gap, self.n_ways)
 
 
 @one_blas_thread()
@@ -170,8 +181,9 @@ def align_surfaces(
     >>> round(found.scale, 1), found.gap < 0.2, found.reflected
     (10.0, True, False)
     """
-    ours, our_middle, our_size = _points_in_own_size(as_mesh(surface, "surface"), N_POINTS)
-    theirs, middle, size = _points_in_own_size(as_mesh(whole, "whole"), N_WHOLE[0])
+    surface, whole = as_mesh(surface, "surface"), as_mesh(whole, "whole")
+    ours, our_middle, our_size = _points_in_own_size(surface, N_POINTS)
+    theirs, middle, size = _points_in_own_size(whole, N_WHOLE[0])
     tree, rough_tree = cKDTree(theirs, LEAF), cKDTree(theirs[:: N_WHOLE[0] // N_WHOLE[1]], LEAF)
 
     def search(points: Float[np.ndarray, "k 6"]) -> _Places:
@@ -218,7 +230,8 @@ def align_surfaces(
     turn = best.rotation @ MIRROR if mirrored else best.rotation
     scale = best.scale * size / our_size
     away = middle + size * best.translation - scale * turn @ our_middle
-    return Similarity(scale, turn, away, best.gap, mirror_gap)
+    n_ways = max(_count_turns_into_itself(mesh) for mesh in (surface, whole))
+    return Similarity(scale, turn, away, best.gap, mirror_gap, n_ways)
 
 
 def best_similarity(
@@ -232,6 +245,29 @@ def best_similarity(
     scales, turns = _best_turns((starts - middle)[None], (ends - target)[None], shares[None])
     scale, turn = float(scales[0]), turns[0]
     return Similarity(scale, turn, target - scale * turn @ middle)
+
+
+def _count_turns_into_itself(mesh: TriangleMesh) -> float:
+    """Return how many turns lay a surface on itself; infinite for a form of revolution."""
+    points, whole = (_points_in_own_size(mesh, n)[0] for n in (N_POINTS, N_WHOLE[0]))
+    axes = np.linalg.svd(whole[:, :3], full_matrices=False)[2]
+    half_turns = _axis_turns(whole[:, :3], whole[:, :3])
+    revolving = axes.T @ Rotation.from_rotvec(GOLDEN * np.eye(3)).as_matrix() @ axes
+    random = Rotation.random(N_TURNS, rng=np.random.default_rng(0)).as_matrix()
+    turns = np.concatenate([revolving, half_turns, random])
+    starts = _Places(np.ones(len(turns)), turns, np.zeros((len(turns), 3)), np.zeros(len(turns)))
+    few, tree = points[:: N_POINTS // N_ROUGH], cKDTree(whole, LEAF)
+    found = _refine(few, tree, starts, np.append(ROUGH_REACH, FINE_REACH[:N_EARLY]))
+    fits = found.gaps < found.gaps.min() / ON_ITSELF
+    stays = np.einsum("qij,qij->q", turns, found.rotations) > SAME_TURN
+    if (fits & stays)[:3].any():
+        return np.inf
+    group = found.rotations[fits]
+    for _ in range(2):  # products of turns into itself are others
+        group = (group[:, None] @ group).reshape(-1, 3, 3)
+        traces = np.einsum("qij,pij->qp", group, group)
+        group = group[(traces > SAME_TURN).argmax(axis=1) == np.arange(len(group))]
+    return float(len(group))
 
 
 def _points_in_own_size(

@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import require_type, require_unicode
 from eigenshape._errors import EigenshapeError, InvalidParameterError, InvalidShapeError
 from eigenshape._files import as_path, content_digest
 from eigenshape._progress import Callback
@@ -361,17 +361,18 @@ def _find_specimens(
         return [item for item in found if own not in item.path.absolute().parents]
     items = []
     for name, value in specimens.items():
+        require_unicode(name, "Names of specimens")
         if isinstance(value, str | Path):
             path = as_path(value)
         else:
             mesh = as_mesh(value, f"specimens[{name!r}]")
             # The surfaces of the finished collection stay, also if this build is stopped.
             digest = _key(mesh.vertices, mesh.faces)[:DIGITS]
-            path = folder / SPECIMENS / f"{quote(str(name), safe=' ')} {digest}.ply"
+            path = folder / SPECIMENS / f"{quote(name, safe=' ')} {digest}.ply"
             path.parent.mkdir(parents=True, exist_ok=True)
             with explained(COLLECTION, folder / DATABASE):
                 write_mesh(mesh, path)
-        items.append(Item(str(name), path))
+        items.append(Item(name, path))
     return items
 
 

@@ -108,6 +108,9 @@ class SurfaceFit(ReadOnly):
         of the form are alike; the source is not mirrored then.
     method : "position" or "intrinsic"
         Whether a similarity was the start, or `match_shapes`, since the poses differ.
+    n_ways : float
+        How many fits are equally good, since the source or the target can be turned into itself, as
+        of `Similarity`: the points that correspond are those of one of these fits.
 
     See Also
     --------
@@ -133,6 +136,7 @@ class SurfaceFit(ReadOnly):
     excess: float
     side: Side
     method: Literal["position", "intrinsic"]
+    n_ways: float = 1.0
 
     @property
     def misfit(self) -> float:
@@ -197,18 +201,23 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
     source, target = as_mesh(source, "source"), as_mesh(target, "target")
     placing = align_surfaces(target, source, mirrored=mirrored)
     fit = replace(bend_placed(source, placing, target, LEVELS), side=placing.side)
-    if fit.misfit > POSES_DIFFER or fit.strain > STRAINED:
-        sides = (False, True) if mirrored is None else (mirrored,)
+    # No placing of a form of revolution is back to front, and its strain is that of the forms.
+    doubtful = fit.misfit > POSES_DIFFER or fit.strain > STRAINED
+    if np.isinf(placing.n_ways):
+        doubtful = fit.gap > POSES_DIFFER
+    if doubtful:
+        # The mirror image of a form that can be turned into itself and into it is the form again.
+        is_even = placing.n_ways > 1 and placing.side == "cannot be told"
+        sides = (False, True) if mirrored is None and not is_even else (bool(mirrored),)
         posed = _posed_fits(source, target, sides)
         if len(posed) == 2:
             upright, reflected = (each.misfit for each in posed)
             is_clear = min(upright, reflected) < CLEAR_MISFIT * max(upright, reflected)
             # Of two that fit as well, the one that is not mirrored
-            posed = (
-                [min(posed, key=lambda each: each.misfit)]
-                if is_clear
-                else [replace(posed[0], side="cannot be told")]
-            )
+            posed = [min(posed, key=lambda each: each.misfit)] if is_clear else posed[:1]
+            is_even = not is_clear
+        if is_even and mirrored is None:
+            posed = [replace(each, side="cannot be told") for each in posed]
         fit = min([fit, *posed], key=lambda each: each.misfit)
     if fit.misfit > NOT_ALIKE or fit.missing > MOST_MISSING:
         raise InvalidShapeError(
@@ -217,7 +226,7 @@ def fit_surface(source: MeshLike, target: MeshLike, *, mirrored: bool | None = N
             f"bending the misfit is {fit.misfit:.3f}, the most is {NOT_ALIKE}, and {fit.missing:.0%} "
             f"of the source is missing, the most is {MOST_MISSING:.0%}."
         )
-    return fit
+    return replace(fit, n_ways=placing.n_ways)
 
 
 def _posed_fits(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from eigenshape._arguments import require_unicode
 from eigenshape._arrays import freeze
 from eigenshape._errors import FileFormatError, InvalidParameterError
 from eigenshape._files import as_path, replace_file
@@ -111,6 +112,7 @@ def format_fields(
     of_vertices: Fields = {}
     of_faces: Fields = {}
     for name, values in fields.items():
+        require_unicode(name, "Names of fields")
         array = np.asarray(values)
         if array.dtype.kind not in "buif" or array.ndim not in (1, 2):
             raise InvalidParameterError(

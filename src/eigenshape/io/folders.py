@@ -4,7 +4,7 @@ import csv
 import os
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from math import isfinite
@@ -13,6 +13,7 @@ from typing import Any
 
 from eigenshape._arrays import whole_number
 from eigenshape._errors import FileFormatError, InvalidParameterError
+from eigenshape._files import as_path, read_regular, require_lines
 from eigenshape._typing import Integer
 from eigenshape._workers import Item
 from eigenshape.io.formats.registry import (
@@ -90,8 +91,9 @@ def find_items(
     >>> item.name, item.label
     ('cats/felix', 'cats')
     """
-    folders = [sources] if isinstance(sources, str | Path) else list(sources)
-    items = [item for source in folders for item in _items_of(Path(source))]
+    is_one = isinstance(sources, str) or not isinstance(sources, Iterable)
+    folders = [sources] if is_one else list(sources)
+    items = [item for source in folders for item in _items_of(as_path(source, "sources"))]
     if not items:
         raise InvalidParameterError(
             f"There must be meshes or points ({', '.join(SHAPE_FORMATS)}) to index; "
@@ -211,6 +213,7 @@ def _labeled(items: Sequence[Item], table: Path) -> list[Item]:
 
 def _read_table(table: Path) -> list[tuple[int, dict[str, str]]]:
     """Return the lines of a table by their numbers, each as its cells that are not empty."""
+    require_lines(read_regular(table, "a table"))
     try:
         with table.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)

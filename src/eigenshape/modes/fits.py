@@ -2,13 +2,14 @@
 
 import numpy as np
 import scipy.linalg as sl
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import point_functions, real_numbers, vertex_values
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
+from eigenshape.geometry.simplices import size_one
 from eigenshape.spectral.spectrum import Spectrum
 
 # Least eigenvalue of ΦᵀDΦ, relative to the largest, at which weighted points still tell modes apart.
@@ -119,14 +120,14 @@ def accuracy_curve(
     modes, mass = spectrum.eigenvectors, spectrum.mass
     ones = np.ones(len(modes))
     if weights is None:
-        maps = point_functions(values, "values", len(modes))
+        maps = size_one_maps(point_functions(values, "values", len(modes)))[0]
         # In the mass, modes are orthonormal: what follows with a factor of 1.
         shares = mass @ ones
         weighted = mass @ maps
         inner, of_ones = modes.T @ weighted, modes.T @ shares
     else:
         shares = _point_weights(weights, spectrum)
-        maps = _known_maps(values, shares)
+        maps = size_one_maps(_known_maps(values, shares))[0]
         weighted = (shares * maps.T).T
         triangle, inner = _normal_equations(maps, spectrum, shares)
         of_ones = sl.solve_triangular(triangle, modes.T @ shares, lower=True)
@@ -146,6 +147,14 @@ def accuracy_curve(
     return np.where(varies, shared, 0.0 * own) / root
 
 
+def size_one_maps(
+    maps: Float[np.ndarray, "n ..."],
+) -> tuple[Float[np.ndarray, "n ..."], Int[np.ndarray, "..."]]:
+    """Return maps divided by powers of two, so that squares do not overflow, and the exponents."""
+    exponents = np.frexp(np.abs(maps).max(axis=0, keepdims=True))[1]
+    return np.ldexp(maps, -exponents), exponents
+
+
 def _point_weights(weights: ArrayLike, spectrum: Spectrum) -> Float[np.ndarray, " n"]:
     """Return w_i b_i."""
     mass = spectrum.mass.sum(axis=1)
@@ -155,7 +164,7 @@ def _point_weights(weights: ArrayLike, spectrum: Spectrum) -> Float[np.ndarray, 
         raise InvalidParameterError(
             f"weights must not be negative; entry {bad[0]} is {given[bad[0]]} ({bad.size} such)."
         )
-    return np.asarray(given * mass)
+    return np.asarray(size_one(given)[0] * mass)  # only their ratios count
 
 
 def _known_maps(values: ArrayLike, shares: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n ..."]:

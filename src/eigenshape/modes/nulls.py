@@ -11,6 +11,7 @@ from eigenshape._errors import InvalidParameterError
 from eigenshape._memory import require_memory
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
+from eigenshape.modes.fits import size_one_maps
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
 from eigenshape.spectral.tools.filters import project
 
@@ -88,7 +89,7 @@ def rotation_nulls(
     require_choice(resample, Resample, "resample")
     n = len(spectrum.eigenvectors)
     maps = point_functions(values, "values", n)
-    columns = maps.reshape(n, -1)
+    columns, exponents = size_one_maps(maps.reshape(n, -1))
     degrees = int(len(spectrum.eigenvalues) ** 0.5)
     if degrees < 2:
         raise InvalidParameterError(
@@ -131,6 +132,7 @@ def rotation_nulls(
             null = nulls[:, index]
             own_mean, own_square = _moments(null, spectrum)
             null[:] = mean + (null - own_mean) * np.sqrt(square / own_square)
+    np.ldexp(nulls, exponents, out=nulls)
     return nulls if maps.ndim == 2 else nulls[:, :, 0]
 
 

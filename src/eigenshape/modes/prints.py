@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import require_type, require_unicode
 from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._typing import Integer
@@ -135,8 +135,9 @@ def brain_print(surfaces: Mapping[str, MeshLike], n_values: Integer = 50) -> Bra
         raise InvalidParameterError("surfaces must hold a structure; there is none.")
     rows = []
     for name, surface in surfaces.items():
+        require_unicode(name, "Names of structures")
         try:
-            rows.append(shape_dna(as_mesh(surface, str(name)), n_values))
+            rows.append(shape_dna(as_mesh(surface, name), n_values))
         except InvalidShapeError as err:
             raise InvalidShapeError(f"Structure {name}: {err}") from err
-    return BrainPrint(tuple(map(str, surfaces)), np.array(rows))
+    return BrainPrint(tuple(surfaces), np.array(rows))

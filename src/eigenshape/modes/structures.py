@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from eigenshape._arguments import require_type
+from eigenshape._arguments import require_type, require_unicode
 from eigenshape._arrays import real_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
@@ -104,6 +104,7 @@ def structure_surfaces(
     wanted = FREESURFER_STRUCTURES if structures is None else structures
     surfaces = {}
     for name, numbers in wanted.items():
+        require_unicode(name, "Names of structures")
         of_structure = np.atleast_1d(real_numbers(np.asarray(numbers), f"labels of {name!r}"))
         inside = np.isin(volume, of_structure)
         if inside.any():

@@ -5,7 +5,12 @@ import scipy.linalg as sl
 from jaxtyping import Float
 
 from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, real_numbers, require_finite_rows
+from eigenshape._arrays import (
+    MOST_STEPS,
+    positive_values,
+    real_numbers,
+    require_finite_rows,
+)
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
@@ -55,8 +60,8 @@ def wave_response(
     Raises
     ------
     InvalidParameterError
-        If the drive is no table of finite numbers with at most one row per mode, or a parameter is
-        not positive.
+        If the drive is no table of finite numbers with at most one row per mode, a parameter is not
+        positive, or floats cannot represent the response.
 
     See Also
     --------
@@ -76,7 +81,8 @@ def wave_response(
     inputs = _time_series(drive, "drive", len(spectrum.eigenvalues))
     scale, rate = positive_values([length_scale, damping], "length_scale and damping")
     # In units of 1/γ for time, so that velocities are of the size of values.
-    stretch = 1 + scale**2 * spectrum.eigenvalues[: len(inputs)]
+    with np.errstate(over="ignore"):
+        stretch = 1 + scale**2 * spectrum.eigenvalues[: len(inputs)]
     system = np.zeros((len(inputs), 2, 2))
     system[:, 0, 1] = 1.0
     system[:, 1, 0] = -stretch
@@ -117,8 +123,8 @@ def blood_response(
     Raises
     ------
     InvalidParameterError
-        If the activity is no table of finite numbers, dt is not positive, or flow or volume of the
-        nonlinear model fall to 0.
+        If the activity is no table of finite numbers, dt is not positive, floats cannot represent the
+        signal, or of the nonlinear model dt is above 50,000 s, or flow or volume fall to 0.
 
     Examples
     --------
@@ -151,6 +157,11 @@ def blood_response(
 
 def _balloon(inputs: Float[np.ndarray, "rows times"], dt: float) -> Float[np.ndarray, "rows times"]:
     """Solve the nonlinear model from rest, by steps of Runge and Kutta of order 4."""
+    if dt > MOST_STEPS * LONGEST_STEP:
+        raise InvalidParameterError(
+            f"dt must be at most {MOST_STEPS * LONGEST_STEP:g} s in the nonlinear model, which takes "
+            f"steps of {LONGEST_STEP} s; it is {dt:g}. Give a shorter dt, or linear=True."
+        )
     n_steps = int(np.ceil(dt / LONGEST_STEP))
     h = dt / n_steps
     state = np.ones((4, len(inputs)))  # change of flow, flow, volume, deoxyhemoglobin
@@ -218,8 +229,9 @@ def _respond(
     """
     size = len(entry)
     joint = np.zeros((len(system), size + 2, size + 2))
-    joint[:, :size, :size] = step * system
-    joint[:, :size, size] = step * entry
+    with np.errstate(over="ignore"):
+        joint[:, :size, :size] = step * system
+        joint[:, :size, size] = step * entry
     joint[:, size, size + 1] = 1.0
     power = np.broadcast_to(sl.expm(joint), (len(inputs), size + 2, size + 2))
     advance, constant, ramp = power[:, :size, :size], power[:, :size, size], power[:, :size, -1]
@@ -230,4 +242,12 @@ def _respond(
     )
     for time in range(1, len(states)):
         states[time] += np.einsum("rij,rj->ri", advance, states[time - 1])
+    # The exponential of a matrix above about 1e36 has no number that floats can represent.
+    bad = np.argwhere(~np.isfinite(states))
+    if len(bad):
+        raise InvalidParameterError(
+            f"The response must be finite; that of row {bad[0, 1]} at time {bad[0, 0]} is not, with dt = "
+            f"{step:g} s and rates up to {np.abs(system).max():g} 1/s. Give a shorter dt, lower rates, or "
+            "a smaller input."
+        )
     return states.transpose(1, 2, 0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from eigenshape._arguments import require_type
 from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape._files import as_path, read_regular, replace_file
+from eigenshape._files import as_path, read_regular, replace_file, require_lines
 from eigenshape.morphometrics.landmark_parsers import (
     Parsed,
     Table,
@@ -211,6 +211,8 @@ def _read_file(path: Path, unit: str, stacklevel: int) -> Table:
     wanted = nanometers(unit)
     suffix = _suffix(path, PARSERS)
     data = read_regular(path, "landmarks")
+    if not suffix.endswith(".json"):  # which may stand in one line
+        require_lines(data)
     try:
         text = data.decode("utf-8-sig")
         specimens, notes, units = PARSERS[suffix](text, path.name[: -len(suffix)])
@@ -218,7 +220,7 @@ def _read_file(path: Path, unit: str, stacklevel: int) -> Table:
         named = next(iter(units), unit)
         ratio = nanometers(named) / wanted
     except (ValueError, csv.Error, SyntaxError) as err:  # the last one of XML
-        raise FileFormatError(f"{path} must hold landmarks: {err}") from err
+        raise FileFormatError(f"{path} must hold landmarks: {str(err)[:MOST_QUOTED]}") from err
     # JSON, or sections of Morphologika, of another structure fail in any of these ways.
     except (LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as err:
         raise FileFormatError(
@@ -521,4 +523,5 @@ WRITERS = {
 OF_ONE = (".mrk.json", ".fcsv")
 # Files that a folder of landmarks may hold; other things end in .txt, .csv, .json and .dta, too.
 IN_FOLDERS = (*OF_ONE, ".tps", ".nts", ".pts", ".pp", ".landmarkascii")
+MOST_QUOTED = 500  # characters of a sentence that quotes a line of a file
 ENDED = (*OF_ONE, ".json", ".pp")  # by a mark, or in lines of many cells

@@ -13,6 +13,11 @@ from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_numbers
 from eigenshape._errors import InvalidParameterError
 from eigenshape._typing import ArrayLike
 
+SMALLEST, LARGEST = (
+    1e-120,
+    1e120,
+)  # extents of specimens: products of squares stay in the range of floats
+
 
 @dataclass(frozen=True, eq=False, init=False)
 class Landmarks(ReadOnly):
@@ -134,6 +139,33 @@ def as_configurations(specimens: Specimens) -> Float[np.ndarray, "n k 3"]:
         raise InvalidParameterError(
             f"specimens must have shape (n, k, 3), k points of n specimens; the shape is "
             f"{points.shape}."
+        )
+    return points
+
+
+def complete_points(specimens: Specimens) -> Float[np.ndarray, "n k 3"]:
+    """Return points; raise an error if one is missing, or those of a specimen have no shape."""
+    points = as_configurations(specimens)
+    bad = np.argwhere(~np.isfinite(points).all(axis=2))
+    if len(bad):
+        specimen, row = bad[0].tolist()
+        raise InvalidParameterError(
+            f"Points of specimens must be finite; point {row} of specimen {specimen} is "
+            f"{points[specimen, row].tolist()}. Try estimate_missing, or leave it out everywhere."
+        )
+    with np.errstate(over="ignore"):
+        extents = np.ptp(points, axis=1).max(axis=1)
+    if points.shape[1] < 3 or not extents.all():
+        raise InvalidParameterError(
+            f"A specimen must have 3 points or more that differ; specimen {int(np.argmax(extents == 0))} "
+            f"has {points.shape[1] if extents.all() else 1}."
+        )
+    # The products of many lengths must not leave the range of floats.
+    odd = np.flatnonzero(~((extents > SMALLEST) & (extents < LARGEST)))
+    if len(odd):
+        raise InvalidParameterError(
+            f"The extent of a specimen must lie within {SMALLEST:g}..{LARGEST:g}; that of specimen "
+            f"{odd[0]} is {extents[odd[0]]:.3g}. Give its points in another unit."
         )
     return points
 

@@ -12,7 +12,7 @@ from eigenshape._errors import ConvergenceError, InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.measure import nearest_rotations, rotations_and_stretches
-from eigenshape.morphometrics.landmarks import Specimens, as_configurations, as_curves
+from eigenshape.morphometrics.landmarks import Specimens, as_curves, complete_points
 from eigenshape.morphometrics.splines import bending_matrix
 
 TOLERANCE, MOST_ROUNDS = 1e-10, 200  # 31 skulls of mice rest after 6 rounds
@@ -160,25 +160,6 @@ def fit_procrustes(
         f"{np.linalg.norm(mean - last):.1g} of its size. The specimens are not alike: "
         "landmarks may be exchanged."
     )
-
-
-def complete_points(specimens: Specimens) -> Float[np.ndarray, "n k 3"]:
-    """Return points; raise an error if one is missing, or those of a specimen have no shape."""
-    points = as_configurations(specimens)
-    bad = np.argwhere(~np.isfinite(points).all(axis=2))
-    if len(bad):
-        specimen, row = bad[0].tolist()
-        raise InvalidParameterError(
-            f"Points of specimens must be finite; point {row} of specimen {specimen} is "
-            f"{points[specimen, row].tolist()}. Try estimate_missing, or leave it out everywhere."
-        )
-    same = np.ptp(points, axis=1).max(axis=1) == 0
-    if points.shape[1] < 3 or same.any():
-        raise InvalidParameterError(
-            f"A specimen must have 3 points or more that differ; specimen {int(np.argmax(same))} "
-            f"has {1 if same.any() else points.shape[1]}."
-        )
-    return points
 
 
 def _tangents(

@@ -12,6 +12,7 @@ from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.morphometrics.landmarks import complete_points
 
 
 def bending_matrix(points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k k"]:
@@ -83,4 +84,6 @@ def warp_mesh(mesh: MeshLike, starts: ArrayLike, ends: ArrayLike) -> TriangleMes
         raise InvalidParameterError(
             f"There must be as many ends as starts; there are {len(goals)} and {len(places)}."
         )
+    if len(places) > 3:  # what fewer lack, `fit_spline` says
+        complete_points(places[None])
     return TriangleMesh(fit_spline(places, goals, "starts")(mesh.vertices), mesh.faces)

@@ -12,13 +12,14 @@ from eigenshape._arrays import (
     positive_values,
     real_numbers,
     record,
+    require_finite_rows,
     whole_numbers,
 )
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike
-from eigenshape.morphometrics.landmarks import Specimens, as_configurations
-from eigenshape.morphometrics.procrustes import complete_points, fit_procrustes
+from eigenshape.morphometrics.landmarks import Specimens, as_configurations, complete_points
+from eigenshape.morphometrics.procrustes import fit_procrustes
 from eigenshape.morphometrics.splines import fit_spline
 
 NO_VARIANCE = 1e-12  # singular values below this share of the largest are rounding errors
@@ -80,6 +81,7 @@ class PrincipalComponents(ReadOnly):
                 f"scores must be a list of at most {len(self.modes)} numbers; the shape is "
                 f"{values.shape}."
             )
+        require_finite_rows(values, "scores", "mode")
         return self.mean + np.tensordot(values, self.modes[: len(values)], axes=1)
 
 

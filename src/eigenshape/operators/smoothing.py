@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import positive_number
-from eigenshape._errors import InvalidShapeError
+from eigenshape._errors import InvalidParameterError, InvalidShapeError
 from eigenshape._threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
@@ -86,7 +86,7 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
     Raises
     ------
     InvalidParameterError
-        If reach is not positive.
+        If reach is not positive, or larger than the number of vertices.
     InvalidShapeError
         If a face has no area or angles too close to 0, or a vertex belongs to no face.
 
@@ -112,6 +112,10 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
     )
     if edges == 0:
         return mesh
+    if edges > mesh.n_vertices:
+        raise InvalidParameterError(
+            f"reach must be at most the number of vertices, {mesh.n_vertices}; it is {edges:g}."
+        )
     points, scale = size_one(mesh.vertices)
     unit = TriangleMesh(points, mesh.faces)
     laplacian, time = cotangent_laplacian(unit), (edges * mean_side_length(unit)) ** 2

@@ -245,6 +245,7 @@ def admissible_times(
     positive_values([spacing, eigenvalue], "spacing and eigenvalue")
     if delta:
         positive_values(delta, "delta")
-    reach = (EDGE_FACTOR * spacing / 2) ** 2
+    radius = EDGE_FACTOR * spacing / 2
+    reach = radius * radius  # infinite if it overflows, where a power raises an error
     high = (LAST if corrected else 0.5) / eigenvalue
-    return TimeRange(max(delta**2, reach), high, reach)
+    return TimeRange(max(delta * delta, reach), high, reach)

@@ -34,7 +34,18 @@ def as_tensor(array: Any) -> Tensor:
                 "Numbers must be in a tensor or an array; the value is "
                 f"{describe_value(array)}.{remedy}"
             ) from err
-    return array.to(torch.float64)
+    return require_numbers(array).to(torch.float64)
+
+
+def require_numbers(tensor: Tensor) -> Tensor:
+    """Return a tensor; raise an error unless it is dense, real and holds numbers."""
+    if tensor.is_meta or tensor.is_complex() or tensor.layout != torch.strided or tensor.is_nested:
+        raise InvalidParameterError(
+            "A tensor must be dense, of real numbers, and on a device that keeps them; this one is of "
+            f"{tensor.dtype} and layout {tensor.layout}, on {tensor.device}. Call its method to_dense(), "
+            "take its real part, or make it on the CPU."
+        )
+    return tensor
 
 
 def to_numpy(tensor: Tensor) -> np.ndarray:
@@ -51,7 +62,7 @@ def checked_mesh(vertices: Tensor, faces: Tensor) -> TriangleMesh:
 
 def as_faces(faces: Any) -> Tensor:
     """Return faces as a tensor of int64; raise InvalidShapeError if they are not whole numbers."""
-    numbers = to_numpy(faces) if isinstance(faces, Tensor) else np.asarray(faces)
+    numbers = to_numpy(require_numbers(faces)) if isinstance(faces, Tensor) else np.asarray(faces)
     if numbers.dtype.kind not in "iuf" or not np.equal(numbers, np.trunc(numbers)).all():
         raise InvalidShapeError(
             f"faces must be whole numbers in a tensor or an array; the value is {describe_value(faces)} "

@@ -159,7 +159,7 @@ def solve_operator(stiffness: Tensor, mass: Tensor, k: Integer) -> TensorSpectru
     0.5
     """
     W = _coalesced(stiffness, "stiffness")
-    if mass.layout == torch.strided and mass.ndim == 1:
+    if isinstance(mass, Tensor) and mass.layout == torch.strided and mass.ndim == 1:
         diagonal = as_tensor(mass)
         given = W.indices(), W.values(), diagonal, _diagonal_places(diagonal)
         return _solve(*given, diagonal, k)
@@ -172,6 +172,10 @@ def _coalesced(matrix: Tensor, name: str) -> Tensor:
         raise InvalidParameterError(
             f"{name} must be a sparse COO tensor; it is {type(matrix).__name__} of layout "
             f"{getattr(matrix, 'layout', None)}. Call its method to_sparse() first."
+        )
+    if matrix.is_meta or matrix.is_complex():
+        raise InvalidParameterError(
+            f"{name} must hold real numbers; it is of {matrix.dtype} on {matrix.device}."
         )
     return matrix.to(torch.float64).coalesce()
 

@@ -30,6 +30,7 @@ from eigenshape._errors import FileFormatError
 from eigenshape._files import read_regular
 from eigenshape.io.formats.cells import NO_TRIANGLES
 from eigenshape.io.formats.numbers import quote_line
+from eigenshape.io.formats.obj_attributes import find_beside
 
 Entry = dict[str, Any]  # an object of the JSON tree
 Column = tuple[np.ndarray, bool]  # numbers, and whether whole ones mean shares of one
@@ -47,6 +48,7 @@ SAME_SUM = 0.02
 # and nodes that stand for another one from afar.
 INSTANCES, VISIBILITY, LEVELS = "EXT_mesh_gpu_instancing", "KHR_node_visibility", "MSFT_lod"
 # Compressed copies of geometry. Where they are not required, the file holds it plainly, too.
+LONGEST_PATH = 4096  # characters of a path that a system opens
 DRACO = "KHR_draco_mesh_compression"
 COMPRESSED = (
     "A glTF file must hold its geometry plainly; it is compressed by the extension {!r}. The command "
@@ -228,13 +230,9 @@ def decode_buffer(index: int, entry: Any, binary: bytes, folder: Path | None) ->
 
 def read_beside(index: int, uri: str, folder: Path) -> bytes:
     """Read the file of a relative URI; links resolved, it must be in or below the folder."""
-    try:
-        root = folder.resolve()
-        path = (root / unquote(uri, errors="strict")).resolve()
-    except (ValueError, OSError, RuntimeError):  # undecodable text, a zero byte, a loop of links
-        path = root.parent
+    path = None if ":" in uri or len(uri) > LONGEST_PATH else find_beside(unquote(uri), folder)
     # A service must not tell where its folder is, as an error of the system would.
-    if ":" in uri or not path.is_relative_to(root) or not path.exists():
+    if path is None:
         raise FileFormatError(
             f"Buffers of a .gltf file must lie in its folder; buffers[{index}], {uri[:80]!r}, is not there. "
             "Give the file with its folder, or save it as .glb, which holds all."

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from eigenshape._errors import FileFormatError
+from eigenshape._files import require_lines
 
 Line = tuple[int, bytes]  # its number in the file, and its text
 PLAIN = b"+-.0123456789eE \t\n"
@@ -22,6 +23,7 @@ INT64 = 2**63  # whole numbers from -INT64 to below INT64 fit into 64 bits
 
 def lines_of(data: bytes, first: int = 1) -> list[Line]:
     """Split text into lines without comments and blank lines; names and comments may be in any encoding."""
+    require_lines(data)
     texts = data.removeprefix(codecs.BOM_UTF8).splitlines()
     bare = ((number, text.partition(b"#")[0].strip()) for number, text in enumerate(texts, first))
     return [line for line in bare if line[1]]

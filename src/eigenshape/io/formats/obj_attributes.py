@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -112,9 +113,12 @@ def find_beside(name: str, folder: Path) -> Path | None:
     """Return the file that a line names: in or below the folder, or there by its name alone."""
     root = folder.resolve()
     for wanted in (name.replace("\\", "/"), re.split(r"[\\/]", name)[-1]):
-        path = (root / wanted).resolve()
-        if path.is_relative_to(root) and path.is_file():
-            return path
+        with suppress(
+            ValueError, OSError, RuntimeError
+        ):  # a zero byte, a long name, a loop of links
+            path = (root / wanted).resolve()
+            if path.is_relative_to(root) and path.exists() and not path.is_dir():
+                return path
     return None
 
 

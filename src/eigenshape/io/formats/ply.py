@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Int
 
 from eigenshape._errors import FileFormatError
+from eigenshape._files import LONGEST_LINE
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import (
     list_corners,
@@ -119,9 +120,12 @@ def parse_header(data: bytes) -> Header:
         raise FileFormatError(
             f"A PLY file must begin with ply; it begins with {quote_line((1, data[:10]))}."
         )
-    mark = END.search(data)
+    mark = END.search(data, 0, LONGEST_LINE)
     if mark is None:
-        raise FileFormatError("A PLY header must end with end_header; the file has no such line.")
+        raise FileFormatError(
+            "A PLY header must end with end_header; there is no such line in the first "
+            f"{LONGEST_LINE} bytes."
+        )
     lines = data[: mark.start()].splitlines()
     order, elements = _declarations(lines)
     if not order:

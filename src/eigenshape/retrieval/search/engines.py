@@ -9,6 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float32, Int, Int8
 
+from eigenshape._errors import InvalidParameterError
 from eigenshape._extras import import_extra
 from eigenshape._text import html_repr
 from eigenshape.retrieval.search.candidates import Supplier, smallest
@@ -47,7 +48,18 @@ def supply_from(engine: Engine, coarse: CoarseRows) -> Supplier:
     n_rows, n_sizes, _ = coarse.numbers.shape
 
     def supplied(codes: Int8[np.ndarray, "b s v"], count: int) -> Int[np.ndarray, " k"]:
-        found = engine.nearest(coarse.axes.project_query(codes), VECTORS_ASKED_FOR * count)
+        queries = coarse.axes.project_query(codes)
+        found = np.asarray(engine.nearest(queries, VECTORS_ASKED_FOR * count))
+        if found.dtype.kind not in "iu" or found.ndim != 2 or len(found) != len(queries):
+            raise InvalidParameterError(
+                f"nearest of an engine must return integers of shape ({len(queries)}, c); they are of "
+                f"{found.dtype} and shape {found.shape}."
+            )
+        if found.size and found.max() >= n_rows * n_sizes:
+            raise InvalidParameterError(
+                f"nearest of an engine must return numbers of vectors, below {n_rows * n_sizes}; one is "
+                f"{found.max()}."
+            )
         numbers = np.concatenate([found[0], found[1:][found[1:] % n_sizes == 0]])
         chosen = np.zeros(len(coarse.checksums), dtype=bool)
         chosen[numbers[numbers >= 0] // n_sizes] = True

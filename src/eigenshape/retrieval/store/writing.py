@@ -11,7 +11,7 @@ from zlib import crc32
 
 import numpy as np
 
-from eigenshape._arguments import require_each, require_type
+from eigenshape._arguments import require_each, require_type, require_unicode
 from eigenshape._arrays import record
 from eigenshape._errors import InvalidParameterError, StoreError
 from eigenshape._sealed import checksum
@@ -132,7 +132,7 @@ class DescribedShape(Shown):
 def require_name(name: str) -> None:
     """Raise an error if a shape cannot have a name: in a path or an address it must say something."""
     require_text(name)
-    if not name.strip() or "\0" in name:
+    if not (name or "").strip() or "\0" in name:
         raise InvalidParameterError(
             f"The name of a shape must have a character that shows, and no NUL; it is {name!r}."
         )
@@ -141,13 +141,8 @@ def require_name(name: str) -> None:
 def require_text(*texts: str | None) -> None:
     """Raise an error if a name, label, source or digest is not Unicode text."""
     for text in texts:
-        if text is not None and (
-            not isinstance(text, str) or text != text.encode(errors="replace").decode()
-        ):
-            raise InvalidParameterError(
-                "Names, labels, sources and digests in an index must be Unicode text; "
-                f"{text!r} is not."
-            )
+        if text is not None:
+            require_unicode(text, "Names, labels, sources and digests in an index")
 
 
 def facts_text(tags: Sequence[str], attributes: Mapping[str, Any]) -> tuple[str, str]:

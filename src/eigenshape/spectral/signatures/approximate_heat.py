@@ -5,6 +5,7 @@ from jaxtyping import Float
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import ReadOnly, positive_values, record, whole_number
+from eigenshape._errors import InvalidParameterError
 from eigenshape._progress import Progress, silent
 from eigenshape._threads import one_blas_thread
 from eigenshape._typing import ArrayLike, Integer
@@ -129,7 +130,8 @@ def approximate_heat_signature(
     Raises
     ------
     InvalidParameterError
-        If k is not in 1..n, a time is not positive and finite, the accuracy is out of range, the
+        If k is not in 1..n, a time is not positive and finite, or so long that rounding errors of
+        eigenvalues count, the accuracy is out of range, the
         mass is not diagonal, the memory is too small, or `solve_spectrum` refuses the operator.
     ConvergenceError
         If the accuracy is not reached.
@@ -187,13 +189,20 @@ def approximate_heat_signature(
 
     change_rows(start.tower, fill)
     sizes = np.sqrt(pencil.mass_diagonal[start.order] @ heat**2)
+    with np.errstate(invalid="ignore"):
+        errors = estimate.errors / sizes
+    if np.isnan(errors).any():
+        raise InvalidParameterError(
+            f"times must be so short that rounding errors of eigenvalues do not count; "
+            f"{clock[np.isnan(errors)].min():g} is too long. Leave it out: so late all heat is constant."
+        )
     values = np.empty_like(heat)
     values[start.order] = np.ldexp(heat, 2 * pencil.vector_exponent)
     report(1.0, "heat")
     return ApproximateSignature(
         values=values,
         times=clock,
-        errors=estimate.errors / sizes + SINGLE_ROUNDING,
+        errors=errors + SINGLE_ROUNDING,
         eigenvalues=estimate.eigenvalues,
         complete=False,
     )
@@ -239,7 +248,7 @@ def _estimate(
     values = pencil.values_out(ritz)
     require_readable(pencil.kernel, values)
     values = from_pencil(pencil.kernel, values)
-    decay = exponential_decay(values, times)
+    decay = exponential_decay(np.maximum(values, 0), times)
     k, root = len(ritz), np.sqrt(columns.tower.levels[0].weights.sum())
     sample = np.unique(np.linspace(0, k - 1, min(k, SAMPLED_PAIRS)).round().astype(np.int64))
     # What these Ritz vectors become with their corrections: the norms of φ'² - φ² in M, and the fall

@@ -128,11 +128,14 @@ def wave_bands(
     Raise InvalidParameterError if an energy is not finite, sigma is not positive, or no eigenvalue
     is above 0.
     """
-    values = positive_eigenvalues(spectrum)
+    logs = np.log(positive_eigenvalues(spectrum))
     levels = finite_values(energies, "energies")
     width = positive_values(sigma, "sigma")[0]
-    exponents = -((np.log(values)[:, None] - levels) ** 2) / (2 * width**2)
-    # Far from all eigenvalues every exponential is 0; relative to the largest, the nearest one is
-    # 1.
-    bands = np.exp(exponents - exponents.max(axis=0))
+    # Far from all eigenvalues every exponential is 0, so they are taken relative to the nearest one,
+    # n: (e - log λ)² - (e - n)² = (log λ - n) (log λ + n - 2e), whose factors do not overflow.
+    nearest = logs[np.searchsorted((logs[1:] + logs[:-1]) / 2, levels)]
+    logs = logs[:, None]
+    with np.errstate(over="ignore", under="ignore"):
+        exponents = (nearest - logs) * ((logs + nearest) / 2 - levels) / width / width
+        bands = np.exp(exponents)
     return bands / bands.sum(axis=0)
