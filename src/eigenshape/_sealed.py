@@ -115,11 +115,10 @@ def read_seals(
         The table of a seal that is damaged is noted there, and the seal is made of the rows that are
         found.
     """
-    seals = {}
-    for name, *numbers, guard in database.execute("SELECT * FROM seal NOT INDEXED").fetchall():
-        n_rows, total, changes = numbers
-        if guard == total + PER_ROW * n_rows + PER_CHANGE * changes:
-            seals[name] = Seal(n_rows, total, changes)
+    # By SQLite, because damage may have put a text or nothing in place of a number
+    query = f"""SELECT name, n_rows, total, n_changes FROM seal NOT INDEXED
+        WHERE guard = total + {PER_ROW} * n_rows + {PER_CHANGE} * n_changes"""
+    seals = {name: Seal(*numbers) for name, *numbers in database.execute(query)}
     for name in kind.tables:
         if name in seals:
             continue

@@ -67,7 +67,7 @@ def test_a_thousand_actions_are_undone_to_the_first_state_and_done_again(first, 
             history.bend((edit,), bent, "Bend")
         seen.append((history.mesh(history.now.pose).vertices, history.owners(history.now)))
         history.save()
-    file.close()
+
     again = History(
         [shape.fork() for shape in first.history.shapes.values()], SessionFile(file.path)
     )

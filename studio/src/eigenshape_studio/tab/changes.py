@@ -80,7 +80,7 @@ class Changes:
         shape = self._of.listed_shape(meta.get("shape"))
         is_new = not shape.loaded
         self._history.choose(shape)
-        self._of.warnings += shape.report if is_new else ()
+        self._of.warnings += shape.found.report if is_new else ()
 
     def _reset(self, _meta: Meta, _arrays: Arrays) -> None:
         self._history.did("All undone", pose=self._history.now.shape.rest)
