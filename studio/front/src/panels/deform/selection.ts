@@ -199,7 +199,7 @@ export class Selection {
       .change({ kind: "select", text: `${text}: ${place}` }, "", { regions: this.regions.owners })
       .then((done) => {
         this.sending -= 1;
-        if (done) this.known = app.state.selected;
+        this.known = done ? app.state.selected : -1; // if refused, those of the server are shown again
         return this.takeRegions(app.state);
       })
       .catch((error) => app.fail(error));
