@@ -83,7 +83,7 @@ def sessions_folder(port: int) -> Path:
     return platformdirs.user_cache_path("eigenshape") / "studio" / str(port)
 
 
-def own(folder: Path, address: str) -> sqlite3.Connection:
+def own(folder: Path, address: str, patience: float = 2.0) -> sqlite3.Connection:
     """Own a folder of sessions until the returned connection is closed, or the process ends.
 
     Parameters
@@ -91,6 +91,8 @@ def own(folder: Path, address: str) -> sqlite3.Connection:
     folder : Path
     address : str
         Of the server, for the errors of others.
+    patience : float
+        Seconds to wait for another server that is just ending.
 
     Raises
     ------
@@ -101,7 +103,7 @@ def own(folder: Path, address: str) -> sqlite3.Connection:
     path = folder / "owner"
     database = _sealed.connect(path, "mode=rwc")
     with explained(SESSION, path), closed_on_error(database):
-        database.execute("PRAGMA busy_timeout = 0")
+        database.execute(f"PRAGMA busy_timeout = {1000 * patience:.0f}")
         try:
             database.execute("BEGIN IMMEDIATE")
             database.execute("CREATE TABLE IF NOT EXISTS owner (name TEXT)")
@@ -322,7 +324,7 @@ def remove_old_of_others(ours: Path) -> None:
     """Remove old sessions from the folders beside one, as far as no server owns them."""
     for folder in ours.parent.iterdir():
         if folder != ours and folder.is_dir():
-            with suppress(es.StoreError, OSError), closing(own(folder, "cleaning up")):
+            with suppress(es.StoreError, OSError), closing(own(folder, "cleaning up", 0)):
                 remove_old(folder)
 
 
