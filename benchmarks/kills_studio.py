@@ -223,7 +223,8 @@ def try_flips(n_flips, folder, random):
         turned[place] ^= 1 << bit
         path.write_bytes(turned)
         found = look_at(studio, path, wanted)
-        if found in ("silent", "bare errors"): print(found, place, bit)
+        if found in ("silent", "bare errors"):
+            print(found, place, bit)
         seen[found] += 1
     return seen
 
@@ -237,7 +238,9 @@ def look_at(studio, path, wanted):
             return "harmless" if found == wanted else "silent"
         # What is still there must be as it was, but for a lost second shape and the text of the step
         # that is now the first; and the tab must go on, now and after a restart.
-        if not {step[0:1] + step[4:] for step in found} <= {step[0:1] + step[4:] for step in wanted}:
+        if not {step[0:1] + step[4:] for step in found} <= {
+            step[0:1] + step[4:] for step in wanted
+        }:
             return "silent"
         owners = np.zeros(tab.mesh.n_vertices, dtype=np.uint8)
         call_of(tab)("finish", {"kind": "select", "text": "On"}, {"regions": owners})

@@ -29,13 +29,8 @@ from eigenshape_studio.listening import (
 from eigenshape_studio.memory import share_one_arena, trim_memory
 from eigenshape_studio.opening import open_workspace
 from eigenshape_studio.others.folders import Folders
-from eigenshape_studio.tab.sessions import (
-    SessionFile,
-    own,
-    remove_old,
-    remove_old_of_others,
-    sessions_folder,
-)
+from eigenshape_studio.owner import own, remove_old_of_others, sessions_folder
+from eigenshape_studio.tab.sessions import SessionFile, remove_old
 from eigenshape_studio.tab.workspace import Answer, Workspace, error_message
 
 FILES = {"index.html": "text/html; charset=utf-8", "studio.js": "text/javascript; charset=utf-8"}
@@ -117,7 +112,7 @@ def make_app(first: Workspace, rules: Rules, folder: Path | None = None) -> App:
     def answer(tab: str, name: str, body: bytes) -> Answer:
         try:
             return tabs.workspace(tab).answer(name, body)
-        except es.StoreError as error:  # its file cannot be read now
+        except (es.StoreError, OSError) as error:  # its file cannot be read now
             return Answer(error_message("StoreError", str(error)), 507)
         finally:
             if name in LARGE_CALLS:

@@ -129,7 +129,7 @@ class Company:
             return None
         pair = part_and_whole(mesh, second.mesh)
         try:
-            row = file.row("map", map_number(*pair))
+            row = file.row("maps", map_number(*pair))
         except es.StoreError:  # none was kept; if it was lost, the page says so
             return None
         return map_of_match(*pair, unpack(row[1]))
@@ -143,7 +143,7 @@ class Company:
             if history.file is not None:
                 history.save()  # the meshes, if nothing was changed yet
                 row = map_number(part, whole), pickle.dumps(match)
-                history.file.write({"map": [row]})
+                history.file.write({"maps": [row]})
 
     def _require_beside(self) -> Beside:
         if self.beside is None:

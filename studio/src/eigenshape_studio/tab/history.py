@@ -346,7 +346,7 @@ class History:
             return pose.shape.analysis.mesh
         if pose.mesh is None:
             assert self.file is not None  # noqa: S101  only what is in a file leaves the memory
-            vertices = np.frombuffer(self.file.row("pose", pose.number)[4]).reshape(-1, 3)
+            vertices = np.frombuffer(self.file.row("poses", pose.number)[4]).reshape(-1, 3)
             pose.mesh = es.TriangleMesh(vertices, pose.shape.mesh.faces)
         return pose.mesh
 
@@ -367,10 +367,10 @@ class History:
         poses = {moment.pose for moment in moments if moment.pose.number} - self._kept
         self.file.write(
             {
-                "page": [(1, self.now.number, self.last, self.index, self.collection)],
-                "shape": [_shape_row(shape) for shape in shapes],
-                "pose": [_pose_row(pose) for pose in poses],
-                "moment": [_moment_row(moment) for moment in moments],
+                "places": [(1, self.now.number, self.last, self.index, self.collection)],
+                "shapes": [_shape_row(shape) for shape in shapes],
+                "poses": [_pose_row(pose) for pose in poses],
+                "steps": [_moment_row(moment) for moment in moments],
             },
             [moment.number for moment in self.moments],
             begin=not self._kept,
@@ -386,12 +386,12 @@ class History:
     def _restore(self, file: SessionFile) -> bool:
         """Continue the session of a file; return False if there is none."""
         tables = file.read()
-        if not tables.get("moment"):
+        if not tables.get("steps"):
             return False
-        place = max(tables["moment"])
-        if 1 in tables["page"]:
-            _, place, self.last, self.index, self.collection = tables["page"][1]
-        for number, name, path, digest in tables["shape"].values():
+        place = max(tables["steps"])
+        if 1 in tables["places"]:
+            _, place, self.last, self.index, self.collection = tables["places"][1]
+        for number, name, path, digest in tables["shapes"].values():
             # What the server shows to all tabs is analyzed once.
             shared = self.shapes.get(number)
             if shared is None or (shared.path, shared.digest) != (path, digest):
@@ -399,10 +399,10 @@ class History:
                 shared = self.shapes[number] = Shape(number, name, load, path=path)
             self._kept |= {(shared, False), (shared, bool(digest))}
         poses: dict[int, Pose] = {}
-        for number, shape, parent, edits in tables["pose"].values():
+        for number, shape, parent, edits in tables["poses"].values():
             owner = self.shapes[shape]
             poses[number] = Pose(number, owner, poses.get(parent), unpack(edits))
-        for number, text, shape, pose, *others in tables["moment"].values():
+        for number, text, shape, pose, *others in tables["steps"].values():
             owner = self.shapes[shape]
             there = poses[pose] if pose else owner.rest
             self.moments.append(Moment(number, text, owner, there, *others))
@@ -417,7 +417,7 @@ class History:
 
 def _load(file: SessionFile, number: int) -> Loaded:
     """Read a shape from the file of a tab."""
-    found: Loaded = unpack(file.row("shape", number)[4])
+    found: Loaded = unpack(file.row("shapes", number)[4])
     return found
 
 

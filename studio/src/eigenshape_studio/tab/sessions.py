@@ -4,9 +4,8 @@ The files lie in a folder that nobody else may read, and that one server owns at
 """
 
 import json
-import os
 import pickle
-import socket
+import shutil
 import sqlite3
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
@@ -14,8 +13,6 @@ from hashlib import sha256
 from pathlib import Path
 from time import time
 from typing import Any
-
-import platformdirs
 
 import eigenshape as es
 from eigenshape import _sealed
@@ -25,7 +22,6 @@ from eigenshape._sealed import (
     NO_SPACE,
     NOT_WRITABLE,
     checksum,
-    closed_on_error,
     explained,
 )
 from eigenshape.deformation.edits import mesh_fingerprint
@@ -34,20 +30,19 @@ MOST_BYTES = 2 << 30  # of the files of a folder; the oldest are removed
 MOST_DAYS = 30  # without a change, after which a file is removed
 YOUNG = 3600.0  # seconds since the last change within which a file is not removed for its size
 # Of each row of a table these columns are read with the session; what follows is large.
-N_READ = {"page": 5, "shape": 4, "pose": 4, "moment": 9, "map": 1}
-NOUNS = {"moment": "steps", "pose": "poses", "shape": "shapes", "map": "maps"}
+N_READ = {"places": 5, "shapes": 4, "poses": 4, "steps": 9, "maps": 1}
 SESSION = _sealed.Kind(
     noun="A session",
     format=2,
     tables={
         name: f"CREATE TABLE {name} (id INTEGER PRIMARY KEY, {columns}, checksum INTEGER NOT NULL)"
         for name, columns in {
-            "page": "place INTEGER, last TEXT, shelf TEXT, collection TEXT",
-            "shape": "name TEXT, path TEXT, digest TEXT, found BLOB",
-            "pose": "shape INTEGER, parent INTEGER, edits BLOB, vertices BLOB",
-            "moment": "text TEXT, shape INTEGER, pose INTEGER, regions BLOB, selected INTEGER, "
+            "places": "place INTEGER, last TEXT, shelf TEXT, collection TEXT",
+            "shapes": "name TEXT, path TEXT, digest TEXT, found BLOB",
+            "poses": "shape INTEGER, parent INTEGER, edits BLOB, vertices BLOB",
+            "steps": "text TEXT, shape INTEGER, pose INTEGER, regions BLOB, selected INTEGER, "
             "landmarks TEXT, beside INTEGER, pairs BLOB",
-            "map": "found BLOB",
+            "maps": "found BLOB",
         }.items()
     },
     missing="It was removed: save the shape as a file, and open it in a new tab.",
@@ -57,15 +52,15 @@ SESSION = _sealed.Kind(
 # What needs a row that is lost is lost with it.
 DANGLING = (
     """WITH RECURSIVE whole (id) AS (
-        SELECT id FROM pose WHERE parent IS NULL UNION
-        SELECT pose.id FROM pose JOIN whole ON pose.parent = whole.id)
-    DELETE FROM pose WHERE id NOT IN whole OR shape NOT IN (SELECT id FROM shape)""",
-    "DELETE FROM moment WHERE shape NOT IN (SELECT id FROM shape)",
-    "DELETE FROM moment WHERE pose <> 0 AND pose NOT IN (SELECT id FROM pose)",
+        SELECT id FROM poses WHERE parent IS NULL UNION
+        SELECT poses.id FROM poses JOIN whole ON poses.parent = whole.id)
+    DELETE FROM poses WHERE id NOT IN whole OR shape NOT IN (SELECT id FROM shapes)""",
+    "DELETE FROM steps WHERE shape NOT IN (SELECT id FROM shapes)",
+    "DELETE FROM steps WHERE pose <> 0 AND pose NOT IN (SELECT id FROM poses)",
 )
 # Nothing returns to these poses, but later ones count on their edits.
-LEFT = """SELECT id, shape, parent, edits FROM pose
-    WHERE vertices IS NOT NULL AND id NOT IN (SELECT pose FROM moment)"""
+LEFT = """SELECT id, shape, parent, edits FROM poses
+    WHERE vertices IS NOT NULL AND id NOT IN (SELECT pose FROM steps)"""
 
 Row = tuple[Any, ...]
 Rows = dict[int, Row]  # by their numbers
@@ -73,55 +68,6 @@ Rows = dict[int, Row]  # by their numbers
 
 class NotKeptError(es.StoreError):
     """A change could not be written, and was undone."""
-
-
-def sessions_folder(port: int) -> Path:
-    """Return the folder of the sessions of this user whose pages know a port.
-
-    A browser keeps the name of a tab for the port of its server, so no other server needs them.
-    """
-    return platformdirs.user_cache_path("eigenshape") / "studio" / str(port)
-
-
-def own(folder: Path, address: str, patience: float = 2.0) -> sqlite3.Connection:
-    """Own a folder of sessions until the returned connection is closed, or the process ends.
-
-    Parameters
-    ----------
-    folder : Path
-    address : str
-        Of the server, for the errors of others.
-    patience : float
-        Seconds to wait for another server that is just ending.
-
-    Raises
-    ------
-    StoreError
-        If another server has the folder, whose name it gives.
-    """
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    path = folder / "owner"
-    database = _sealed.connect(path, "mode=rwc")
-    with explained(SESSION, path), closed_on_error(database):
-        database.execute(f"PRAGMA busy_timeout = {1000 * patience:.0f}")
-        try:
-            database.execute("BEGIN IMMEDIATE")
-            database.execute("CREATE TABLE IF NOT EXISTS owner (name TEXT)")
-            database.execute("DELETE FROM owner")
-            name = f"process {os.getpid()} on {socket.gethostname()}, {address}"
-            database.execute("INSERT INTO owner VALUES (?)", (name,))
-            database.execute("COMMIT")
-            # Others can read the name beside this lock, which the system takes from a process that dies.
-            database.execute("BEGIN IMMEDIATE")
-        except sqlite3.OperationalError as error:
-            if error.sqlite_errorcode & 0xFF not in BUSY:
-                raise
-            (owner,) = database.execute("SELECT name FROM owner").fetchone()
-            raise es.StoreError(
-                f"A folder of sessions must have one server; {folder} has {owner}. End "
-                "that server, or choose another port: each has a folder of its own."
-            ) from error
-    return database
 
 
 class SessionFile:
@@ -187,20 +133,21 @@ class SessionFile:
                     database.execute(statement)
                 before = _sealed.read_seals(SESSION, self.path, source, [])
                 after = _sealed.read_seals(SESSION, fresh, database)
-                pairs = [
-                    (noun, before[table].n_rows, after[table].n_rows)
-                    for table, noun in NOUNS.items()
-                ]
-                lost = [f"{n - m} of {n} {noun}" for noun, n, m in pairs if m < n]
+                counts = {table: (before[table].n_rows, after[table].n_rows) for table in N_READ}
+                lost = [f"{n - m} of {n} {table}" for table, (n, m) in counts.items() if m < n]
         except es.StoreError as error:  # as a whole
             require_damage(error)
-        for ending in ("-wal", "-shm", ""):  # what SQLite keeps beside a file goes with it
+        shutil.copyfile(self.path, aside)  # so that there is a session at any time
+        for ending in (
+            "-wal",
+            "-shm",
+        ):  # what SQLite keeps beside a file belongs to the damaged one
             with suppress(FileNotFoundError):
                 Path(f"{self.path}{ending}").replace(f"{aside}{ending}")
         fresh.replace(self.path)
-        gone = ", ".join(lost) or "at most the place in the history"
         self.losses = [
-            f"The work of this tab was damaged on the disk. Gone: {gone}. The damaged file is kept as "
+            "The work of this tab was damaged on the disk. Gone: "
+            f"{', '.join(lost) or 'nothing'}. The damaged file is kept as "
             f"{aside}. ({damage.__cause__ or damage})"
         ]
 
@@ -236,10 +183,10 @@ class SessionFile:
                     for row in some:
                         _put(database, table, row)
                 if moments is not None:
-                    query = "DELETE FROM moment WHERE id NOT IN (SELECT value FROM json_each(?))"
+                    query = "DELETE FROM steps WHERE id NOT IN (SELECT value FROM json_each(?))"
                     database.execute(query, (json.dumps(moments),))
                 for row in database.execute(LEFT).fetchall():
-                    _put(database, "pose", (*row, None))
+                    _put(database, "poses", (*row, None))
         except (es.StoreError, OSError) as error:
             raise NotKeptError(str(error)) from error
 
@@ -318,14 +265,6 @@ def map_number(part: es.TriangleMesh, whole: es.TriangleMesh) -> int:
     """Return the number of the row that holds the match of two meshes, and of no others."""
     digests = mesh_fingerprint(part).digest + mesh_fingerprint(whole).digest
     return int(sha256(digests.encode()).hexdigest()[:15], 16)  # SQLite has integers of 63 bits
-
-
-def remove_old_of_others(ours: Path) -> None:
-    """Remove old sessions from the folders beside one, as far as no server owns them."""
-    for folder in ours.parent.iterdir():
-        if folder != ours and folder.is_dir():
-            with suppress(es.StoreError, OSError), closing(own(folder, "cleaning up", 0)):
-                remove_old(folder)
 
 
 def remove_old(folder: Path, in_use: Collection[Path] = ()) -> None:
