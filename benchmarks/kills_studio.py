@@ -52,6 +52,12 @@ for line in sys.stdin:
 """
 
 
+def require(held, what):
+    """Raise an error that says what does not hold."""
+    if not held:
+        raise AssertionError(what)
+
+
 class Dying:
     """A studio that is killed again and again, and a page that sends its calls until each is answered."""
 
@@ -75,6 +81,7 @@ class Dying:
         self.timer.start()
 
     def kill(self):
+        """Kill the present server."""
         with suppress(ProcessLookupError):  # it has just been killed
             os.kill(self.child, signal.SIGKILL)
 
@@ -96,11 +103,12 @@ class Dying:
                 continue
             if answer.status_code != 503:  # otherwise the shape is being prepared
                 facts, found = decode(answer.content)
-                assert answer.status_code == 200, facts
+                require(answer.status_code == 200, facts)
                 return facts, found
             time.sleep(0.01)
 
     def close(self):
+        """End the last server, and what starts them."""
         self.timer.cancel()
         self.kill()
         self.client.close()
@@ -115,7 +123,7 @@ def call_of(workspace):
         facts, found = decode(answer.message)
         if answer.status == 200:
             return facts, found
-        assert answer.status in (400, 507), facts
+        require(answer.status in (400, 507), facts)
         raise es.StoreError(facts["error"]["message"])
 
     return call
@@ -181,7 +189,7 @@ def make_studio(folder):
     es.write_mesh(es.icosphere(2), folder / "ball.ply")
     mesh = es.read_mesh(folder / "ball.ply")
     studio = Workspace(mesh, "ball.ply", shared=True)
-    assert studio.analysis.rig.wait(600)
+    studio.analysis.rig.wait()
     return mesh, studio
 
 
@@ -193,7 +201,7 @@ def try_kills(n_kills, folder, random):
 
     def compare(number):
         now = shown(dying.call)
-        assert now in steps[number : number + 2], f"change {number}: {now[0]}"
+        require(now in steps[number : number + 2], f"change {number} was lost: {now[0]}")
         seen["killed before a change" if now == steps[number] else "killed before its answer"] += 1
 
     try:
@@ -202,7 +210,7 @@ def try_kills(n_kills, folder, random):
             for number, (meta, arrays) in enumerate(changes(mesh)):
                 change = {**meta, "id": f"change {number}"}
                 dying.call("finish", change, arrays, partial(compare, number))
-            assert all_shown(dying.call) == wanted
+            require(all_shown(dying.call) == wanted, "The states are others than without kills.")
             if dying.n_kills >= n_kills:
                 return seen | {"kills": dying.n_kills, "lost": 0}
     finally:
@@ -224,7 +232,7 @@ def try_flips(n_flips, folder, random):
         path.write_bytes(turned)
         found = look_at(studio, path, wanted)
         if found in ("silent", "bare errors"):
-            print(found, place, bit)
+            print(f"{found}: bit {bit} of byte {place}", flush=True)
         seen[found] += 1
     return seen
 
@@ -245,8 +253,8 @@ def look_at(studio, path, wanted):
         owners = np.zeros(tab.mesh.n_vertices, dtype=np.uint8)
         call_of(tab)("finish", {"kind": "select", "text": "On"}, {"regions": owners})
         again = studio.fork(SessionFile(path))
-        assert not again.losses
-        assert shown(call_of(again)) == shown(call_of(tab))
+        require(not again.losses, again.losses)
+        require(shown(call_of(again)) == shown(call_of(tab)), "The change was not kept.")
     except es.StoreError:
         return "named error"
     except Exception as error:  # noqa: BLE001  that there is none is what is shown

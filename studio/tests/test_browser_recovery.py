@@ -103,7 +103,7 @@ def test_a_map_and_its_colors_are_kept_or_said_to_be_gone(browser, tmp_path):
         mesh = es.make_creature("quadruped", pose, n_vertices=N_VERTICES)
         es.write_mesh(mesh, tmp_path / f"{pose}.ply")
     sessions = tmp_path / "sessions"
-    with start_server(tmp_path / "0.ply", sessions=sessions) as (url, number):
+    with start_server(tmp_path / "0.ply", sessions=sessions) as (url, first):
         port = int(url.split(":")[2].split("/")[0])
         with open_page(browser, url, expected=("403", "ERR_CONNECTION")) as page:
             find(page, "tab-compare").click()
@@ -111,9 +111,9 @@ def test_a_map_and_its_colors_are_kept_or_said_to_be_gone(browser, tmp_path):
             wait_until(page, f"{MAP} !== null")
             marks = [attribute(page, "mark", side) for side in (0, 1)]
             assert all(each.any() for each in marks)
-            os.kill(number, signal.SIGKILL)
+            os.kill(first, signal.SIGKILL)
             page.evaluate("void eigenshape.refresh()")
-            with start_server(tmp_path / "0.ply", port=port, sessions=sessions) as (anew, number):
+            with start_server(tmp_path / "0.ply", port=port, sessions=sessions) as (anew, second):
                 page.context.new_page().goto(anew)
                 wait_until(page, f"{STATUS}.includes('nothing was lost')")
                 wait_until(page, "eigenshape.state.beside.map.status === 'ready'")
@@ -123,7 +123,7 @@ def test_a_map_and_its_colors_are_kept_or_said_to_be_gone(browser, tmp_path):
                 page.reload()
                 wait_until(page, f"window.eigenshape?.panels && {MAP} !== null")
                 np.testing.assert_array_equal(attribute(page, "mark", 1), marks[1])
-                os.kill(number, signal.SIGKILL)
+                os.kill(second, signal.SIGKILL)
             (session,) = sessions.glob("*.sqlite")
             with closing(sqlite3.connect(session)) as database:
                 database.execute("DELETE FROM maps")
