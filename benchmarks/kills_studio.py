@@ -31,7 +31,9 @@ from eigenshape_studio.tab.sessions import SessionFile
 from eigenshape_studio.tab.workspace import Workspace
 from eigenshape_studio.wire import decode, encode
 
-LONGEST = 1.2  # seconds from the start of a server to its end
+# A server lives for a random part of some seconds. They grow with each kill and shrink with each answer,
+# so that there is more than one answer a kill on any machine.
+LEAST, GROWN, SHRUNK = 0.3, 1.15, 0.9
 TURN = {"type": "rotation", "pivot": [0, 0.9, 0], "axis": [0, 0, 2], "angle": 0.6}
 PULL = {"type": "translation", "vector": [0, 0.4, 0.1]}
 # Starts a studio for each line it reads. A child has all that the parent has imported and compiled, so
@@ -65,7 +67,8 @@ class Dying:
         command = [sys.executable, "-c", SERVERS, str(mesh), str(sessions)]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         self.parent = subprocess.Popen(command, text=True, **pipes)
-        self.random, self.port, self.n_kills, self.tab = random, 0, -1, ""
+        self.random, self.longest = random, LEAST
+        self.port, self.n_kills, self.tab = 0, -1, ""
         self.start()
 
     def start(self):
@@ -77,7 +80,7 @@ class Dying:
         self.port = parts.port
         self.token = parts.query.removeprefix("token=")
         self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=60)
-        self.timer = Timer(LONGEST * self.random.random() ** 2, self.kill)
+        self.timer = Timer(self.longest * self.random.random(), self.kill)
         self.timer.start()
 
     def kill(self):
@@ -97,6 +100,7 @@ class Dying:
             try:
                 answer = self.client.post(f"/api/{name}", headers=headers, content=body)
             except httpx.TransportError:  # it was killed
+                self.longest *= GROWN
                 self.client.close()
                 self.start()
                 started()
@@ -104,6 +108,7 @@ class Dying:
             if answer.status_code != 503:  # otherwise the shape is being prepared
                 facts, found = decode(answer.content)
                 require(answer.status_code == 200, facts)
+                self.longest = max(LEAST, SHRUNK * self.longest)
                 return facts, found
             time.sleep(0.01)
 
@@ -211,6 +216,7 @@ def try_kills(n_kills, folder, random):
                 change = {**meta, "id": f"change {number}"}
                 dying.call("finish", change, arrays, partial(compare, number))
             require(all_shown(dying.call) == wanted, "The states are others than without kills.")
+            print(f"{dying.n_kills} kills", flush=True)
             if dying.n_kills >= n_kills:
                 return seen | {"kills": dying.n_kills, "lost": 0}
     finally:
