@@ -2,6 +2,8 @@
 
 import os
 import signal
+import sqlite3
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from browser import (
     start_server,
     wait_until,
 )
+from test_browser_company import MAP, attribute
 from test_browser_edits import READY, REGION, choose_above, open_file, turn
 
 import eigenshape as es
@@ -93,3 +96,42 @@ def test_two_browsers_with_two_shapes_do_not_meet(browser, url, path, tmp_path):
             wait_until(page, f"{REGION}.length > 0")
             np.testing.assert_array_equal(region(page), chosen)
         assert [page.evaluate(DONE) for page in (one, two)] == done
+
+
+def test_a_map_and_its_colors_are_kept_or_said_to_be_gone(browser, tmp_path):
+    for pose in (0, 1):
+        mesh = es.make_creature("quadruped", pose, n_vertices=N_VERTICES)
+        es.write_mesh(mesh, tmp_path / f"{pose}.ply")
+    sessions = tmp_path / "sessions"
+    with start_server(tmp_path / "0.ply", sessions=sessions) as (url, first):
+        port = int(url.split(":")[2].split("/")[0])
+        with open_page(browser, url, expected=("403", "ERR_CONNECTION")) as page:
+            find(page, "tab-compare").click()
+            open_file(page, "second-file", tmp_path / "1.ply")
+            wait_until(page, f"{MAP} !== null")
+            marks = [attribute(page, "mark", side) for side in (0, 1)]
+            assert all(each.any() for each in marks)
+            os.kill(first, signal.SIGKILL)
+            page.evaluate("void eigenshape.refresh()")
+            with start_server(tmp_path / "0.ply", port=port, sessions=sessions) as (anew, second):
+                page.context.new_page().goto(anew)
+                wait_until(page, f"{STATUS}.includes('nothing was lost')")
+                wait_until(page, "eigenshape.state.beside.map.status === 'ready'")
+                wait_until(page, READY)
+                for side in (0, 1):
+                    np.testing.assert_array_equal(attribute(page, "mark", side), marks[side])
+                page.reload()
+                wait_until(page, f"window.eigenshape?.panels && {MAP} !== null")
+                np.testing.assert_array_equal(attribute(page, "mark", 1), marks[1])
+                os.kill(second, signal.SIGKILL)
+            (session,) = sessions.glob("*.sqlite")
+            with closing(sqlite3.connect(session)) as database:
+                database.execute("DELETE FROM maps")
+                database.commit()
+            page.evaluate("void eigenshape.refresh()")
+            with start_server(tmp_path / "0.ply", port=port, sessions=sessions) as (anew, _):
+                page.context.new_page().goto(anew)
+                wait_until(page, f"{STATUS}.includes('The map to 1.ply is gone')")
+                assert page.evaluate(MAP) is None
+                assert not any(attribute(page, "mark", side).any() for side in (0, 1))
+                assert find(page, "find-map").is_visible()

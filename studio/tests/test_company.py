@@ -8,6 +8,7 @@ from balls import collection_of_balls
 from conftest import stretched_ball
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+from test_sessions import full_disk
 from test_workspace import Page, file_of
 
 import eigenshape as es
@@ -174,6 +175,61 @@ def test_a_correction_is_made_and_taken_back(poses):
     assert posed.job.wait(600)
     np.testing.assert_array_equal(posed.array("partners/0"), beside.array("partners/0"))
     assert posed.check_pairs(np.array([7, near], "<u4")).tolist() == [[7, near]]
+
+
+def test_a_map_and_what_it_carries_are_kept_over_a_restart(poses, tmp_path, monkeypatch):
+    """Also that of a pose that was taken over; on a full disk it is not found, and the page says why."""
+    shape, other = poses
+    first = Workspace(shape, "a", shared=True)
+    path = tmp_path / "tab.sqlite"
+
+    def find(part, whole, progress):
+        return match_of(whole, np.arange(part.n_vertices))
+
+    monkeypatch.setattr(es, "match_shapes", find)
+    page = Page(first.fork(SessionFile(path)))
+    points = {"points": shape.vertices[[3, 70]].ravel()}
+    page.call("finish", kind="landmarks", names=["nose", "tail"], _arrays=points)
+    page.call("finish", kind="beside", name="b.ply", _arrays={"file": file_of(other)})
+    before = page.workspace.company.beside
+    with full_disk():
+        page.call("finish", kind="map")
+        assert before.job.wait(60)
+    assert before.facts()["map"]["status"] == "failed"
+    assert "needs space on its disk" in before.facts()["map"]["message"]
+    for _ in range(2):
+        page.call("finish", kind="map")
+        assert page.workspace.company.beside.job.wait(60)
+        names = ["beside/partners/0", "beside/colors/1", "landmarks/1/vertices", "landmarks/1/csv"]
+        found = [page.array(name) for name in names]
+        again = Page(first.fork(SessionFile(path)))
+        assert again.workspace.company.beside.job.wait(60)
+        state = again.call("meta")[0]
+        assert state["losses"] == []
+        assert state["beside"] == page.call("meta")[0]["beside"]
+        for name, array in zip(names, found, strict=True):
+            np.testing.assert_array_equal(again.array(name), array)
+        page.call("finish", kind="pose")
+        page.call("finish", kind="landmarks", names=["nose", "tail"], _arrays=points)
+
+
+def test_a_second_shape_of_a_file_is_kept_when_the_file_has_gone(tmp_path):
+    files = [tmp_path / "a.ply", tmp_path / "b.ply"]
+    for number, path in enumerate(files, 1):
+        es.write_mesh(es.icosphere(number), path)
+    first = open_workspace(files)
+    page = Page(first.fork(SessionFile(tmp_path / "tab.sqlite")))
+    assert page.call("meta")[0]["beside"]["n_vertices"] == 162
+    regions = {"regions": np.zeros(42, np.uint8)}
+    page.call("finish", kind="select", _arrays=regions)
+    files[1].unlink()
+    state = Page(first.fork(SessionFile(tmp_path / "tab.sqlite"))).call("meta")[0]
+    assert (state["beside"]["n_vertices"], state["losses"]) == (162, [])
+    # Another tab did not read it before.
+    state = Page(first.fork(SessionFile(tmp_path / "other.sqlite"))).call("meta")[0]
+    state = Page(first.fork(SessionFile(tmp_path / "other.sqlite"))).call("meta")[0]
+    assert state["beside"] is None
+    assert "b.ply cannot stand beside the shape any more" in state["losses"][0]
 
 
 def test_landmarks_are_placed_saved_and_loaded():

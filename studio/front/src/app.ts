@@ -186,11 +186,19 @@ export class Studio {
   /** Say why calls wait for the server; once it is there again, show what it has. */
   private showTrouble(why: string | null): void {
     if (why) return this.fail(why);
-    const { shape, digest } = this.state;
+    const { shape, digest, beside, losses, history } = this.state;
     this.refresh()
       .then(() => {
+        const now = this.state;
         // Another server shows another shape to a tab of which no work is kept.
-        if (this.state.shape === shape && this.state.digest !== digest) location.reload();
+        if (now.shape === shape && now.digest !== digest) return location.reload();
+        const gone = now.losses.filter((loss) => !losses.includes(loss));
+        const fewer = history.length - now.history.length;
+        if (fewer > 0 && !gone.length) gone.push(`${fewer} steps are gone.`);
+        const mapped = ["running", "ready"].includes(beside?.map.status ?? "");
+        if (mapped && now.beside?.map.status === "none")
+          gone.push(`The map to ${now.beside.name} is gone: find it again in Compare.`);
+        if (gone.length) this.fail(`The studio answers again. ${gone.join(" ")}`);
         else this.say("The studio answers again; nothing was lost.");
       })
       .catch((error) => this.fail(error));

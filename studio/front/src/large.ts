@@ -18,9 +18,10 @@ export class LargeNote {
     app.main.querySelector("[data-test=panels]")!.before(this.form.root);
   }
 
-  refresh({ large, notes, place, health, deformation, capabilities }: State): void {
+  refresh({ large, notes, losses, place, health, deformation, capabilities }: State): void {
     const { form } = this;
-    const lines = [...(place ? [] : notes), large].filter(Boolean); // notes: until something is done
+    // Notes: until something is done
+    const lines = [...losses, ...(place ? [] : notes), large].filter(Boolean);
     form.root.hidden = !lines.length || !capabilities.includes("finish");
     form.text("large-text", lines.join(" "));
     form.get("asking").hidden = !large;

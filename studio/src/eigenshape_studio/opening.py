@@ -54,7 +54,7 @@ def open_workspace(paths: Sequence[str | Path] = (), index: str | Path | None = 
         for number, (name, path) in enumerate(found[1 : folders.MOST_LISTED], 1)
     ]
     workspace = Workspace([first, *listed], index=index, shared=True)
-    workspace.notes = [*notes, *first.report]
+    workspace.notes = [*notes, *first.found.report]
     return workspace
 
 

@@ -6,7 +6,7 @@ import socket
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import anyio.to_thread
@@ -15,6 +15,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 
+import eigenshape as es
 from eigenshape.plot.camera import Up, View
 from eigenshape_studio.bundle import NotBuiltError, read_static
 from eigenshape_studio.guard import App, Guard, Rules
@@ -28,7 +29,8 @@ from eigenshape_studio.listening import (
 from eigenshape_studio.memory import share_one_arena, trim_memory
 from eigenshape_studio.opening import open_workspace
 from eigenshape_studio.others.folders import Folders
-from eigenshape_studio.tab.sessions import SessionFile, remove_old, sessions_folder
+from eigenshape_studio.owner import own, remove_old_of_others, sessions_folder
+from eigenshape_studio.tab.sessions import SessionFile, remove_old
 from eigenshape_studio.tab.workspace import Answer, Workspace, error_message
 
 FILES = {"index.html": "text/html; charset=utf-8", "studio.js": "text/javascript; charset=utf-8"}
@@ -92,10 +94,10 @@ def make_app(first: Workspace, rules: Rules, folder: Path | None = None) -> App:
         What new tabs show.
     rules : Rules
     folder : Path, optional
-        Where the sessions are kept; by default in the user's cache.
+        Where the sessions are kept, which the caller owns; by default in the user's cache.
     """
     first.most_bytes = rules.most_bytes
-    tabs = Tabs(first, folder or sessions_folder())
+    tabs = Tabs(first, folder or sessions_folder(rules.port))
     limiter = anyio.CapacityLimiter(N_THREADS)
 
     async def show_file(request: Request) -> Response:
@@ -110,6 +112,8 @@ def make_app(first: Workspace, rules: Rules, folder: Path | None = None) -> App:
     def answer(tab: str, name: str, body: bytes) -> Answer:
         try:
             return tabs.workspace(tab).answer(name, body)
+        except (es.StoreError, OSError) as error:  # its file cannot be read now
+            return Answer(error_message("StoreError", str(error)), 507)
         finally:
             if name in LARGE_CALLS:
                 trim_memory()
@@ -179,7 +183,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
     browse : bool
         Whether to open the address in a browser.
     sessions : Path, optional
-        The folder in which the work of each tab is kept; by default one in the user's cache.
+        The folder in which the work of each tab is kept; by default that of the port in the user's
+        cache. One server owns it.
 
     Raises
     ------
@@ -188,6 +193,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
         `up` is neither a name nor a direction.
     OSError
         If the port is taken.
+    StoreError
+        If another server owns the folder of sessions.
     """
     require_permission(host, "studio", allow_remote=allow_remote)
     share_one_arena()
@@ -204,10 +211,14 @@ def serve(  # noqa: PLR0913  one for each option of the command
     token = secrets.token_urlsafe(32)
     hosts = own_hosts(host, port, allow_remote=allow_remote)
     rules = Rules(token, hosts, port, any_address=allow_remote)
-    url = f"{shown_address(host, port)}/?token={token}"
-    app = make_app(first, rules, sessions)
-    run_app(app, listening, lambda: announce(url), url if browse else None)
-    first.close()
+    address = shown_address(host, port)
+    url = f"{address}/?token={token}"
+    folder = sessions or sessions_folder(port)
+    with closing(listening), closing(first), closing(own(folder, address)):
+        if sessions is None:
+            remove_old_of_others(folder)
+        app = make_app(first, rules, folder)
+        run_app(app, listening, lambda: announce(url), url if browse else None)
 
 
 def _listen(host: str, port: int | None) -> socket.socket:

@@ -25,6 +25,7 @@ export interface State {
   suffixes: string; // of the files that can be opened, as a file dialog takes them
   most_bytes: number; // of a file
   notes: string[]; // what could not be opened, and what was repaired
+  losses: string[]; // what was there before the server began, and is gone
   large: string; // what to say of a large shape of which nothing is computed unasked; or ""
   health: {
     status: Progress["status"]; // all else is null or empty until it is ready

@@ -70,6 +70,7 @@ export class ComparePanel implements Panel {
     this.listShapes(state);
     if (beside) {
       const { status } = beside.map;
+      if (this.map && (status === "none" || status === "failed")) this.forget();
       form.progress("map-progress", beside.map);
       form.get("pose-part").hidden = !beside.can_pose;
       form.get("correct-part").hidden = !beside.can_correct && status !== "running";
@@ -170,6 +171,13 @@ export class ComparePanel implements Panel {
     this.form.get("map-results").hidden = false;
     const { similarity } = this.app.state.beside ?? {};
     if (similarity) this.app.second?.layOn(similarity);
+    this.paint();
+  }
+
+  /** Show no longer what belongs to a map that is gone. */
+  private forget(): void {
+    [this.map, this.version] = [null, ""];
+    this.choose(null);
     this.paint();
   }
 

@@ -170,7 +170,8 @@ export class LandmarksPanel implements Panel {
       colors,
     );
     const second = app.second;
-    if (!second?.viewer.vertices.length || app.state.beside?.map.status !== "ready") return;
+    if (!second?.viewer.vertices.length) return;
+    if (app.state.beside?.map.status !== "ready") return second.viewer.setPoints([], "#000000");
     const carried = landmarks.length
       ? await app.backend.array<Int32Array>("landmarks/1/vertices")
       : new Int32Array();

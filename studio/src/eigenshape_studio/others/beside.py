@@ -1,5 +1,6 @@
 """A second shape beside that of a tab: the map between them, and what it carries across."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,17 @@ from eigenshape_studio.shape.jobs import NO_JOB, Job, Progress
 
 MOST_PAIRS = 100  # corrections by hand
 SURE = 0.5  # confidence from which a vertex counts as mapped
+
+
+Keep = Callable[[es.TriangleMesh, es.TriangleMesh, es.matching.ShapeMatch], None]
+
+
+def part_and_whole(
+    mesh: es.TriangleMesh, other: es.TriangleMesh
+) -> tuple[es.TriangleMesh, es.TriangleMesh]:
+    """Return two shapes, the part first: the second one if it alone is open, as a scan is."""
+    flipped = es.geometry.is_closed(mesh) and not es.geometry.is_closed(other)
+    return (other, mesh) if flipped else (mesh, other)
 
 
 class Beside:
@@ -30,7 +42,9 @@ class Beside:
     number : int
         Tells this second shape from others.
     known : DenseMap, optional
-        From the shape of the tab to the other one.
+        Between the two, the part first.
+    keep : callable, optional
+        Called with part, whole and match when a match is found, before the page hears of it.
     """
 
     def __init__(
@@ -40,13 +54,13 @@ class Beside:
         name: str,
         number: int,
         known: DenseMap | None = None,
+        keep: Keep = lambda *_: None,
     ) -> None:
         self.meshes = (mesh, other)
         self.name, self.number = name, number
         self.pairs = np.empty((0, 2), dtype=np.int64)  # given by hand: ours, theirs
-        self._flipped = (
-            known is None and es.geometry.is_closed(mesh) and not es.geometry.is_closed(other)
-        )
+        part, _ = known.meshes if known else part_and_whole(mesh, other)
+        self._flipped, self._keep = part is not mesh, keep
         self._view = frame_shape(other)
         self._brush = Brush()
         self._first = known  # the map before corrections
@@ -74,8 +88,10 @@ class Beside:
         first = self._first
         assert first is not None  # noqa: S101  a pose is taken by a map
         assert first.match is not None  # noqa: S101
-        known = map_of_match(mesh, self.meshes[1], first.match)
-        return Beside(mesh, self.meshes[1], self.name, self.number, known)
+        other = self.meshes[1]
+        known = map_of_match(mesh, other, first.match)
+        self._keep(mesh, other, first.match)
+        return Beside(mesh, other, self.name, self.number, known, self._keep)
 
     def check_pairs(self, pairs: np.ndarray) -> np.ndarray:
         """Return pairs of vertices, ours and theirs, as a table.
@@ -197,6 +213,7 @@ class Beside:
     def _match(self, progress: Progress) -> DenseMap:
         part, whole = self.meshes[::-1] if self._flipped else self.meshes
         match = es.match_shapes(part, whole, progress=progress)
+        self._keep(part, whole, match)
         self._first = map_of_match(part, whole, match)
         return self._correct(progress)
 

@@ -59,7 +59,7 @@ class ShapeArrays:
         return np.empty(0, np.uint8) if found is None else found
 
     def _points(self, _meta: Meta) -> np.ndarray:
-        points = self._of.history.now.shape.points
+        points = self._of.history.now.shape.found.points
         if points is None:
             raise RequestError("There must be points that the surface was made of; there are none.")
         return points.astype("<f4")

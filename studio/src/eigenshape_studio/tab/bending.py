@@ -96,7 +96,8 @@ class Bending:
         with self._of.changing:
             now = self._of.history.now
             pose, session = self._dragged
-            if session is None or pose is not now.pose:
+            # A session with an edit is of a commit that could not be written.
+            if session is None or pose is not now.pose or session.edits:
                 rig = self._rig_at_rest()
                 if now.pose.number:
                     rig = pose_rig(rig, self._of.mesh.vertices)
@@ -230,7 +231,7 @@ class Bending:
                     "over, choose its file together with the edits."
                 ) from error
         session = es.deformation.replay(rig, edits, source=source)
-        self._of.history.replace_edits(session.edits, session.mesh, "Load edits")
+        self._of.history.bend(session.edits, session.mesh, "Load edits", at_rest=True)
 
 
 def handle_from(entry: Any) -> es.types.Handle:

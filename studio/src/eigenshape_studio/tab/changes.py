@@ -37,8 +37,8 @@ class Changes:
     def __init__(self, scene: Scene, searching: Searching) -> None:
         self._of, self._history, self._searching = scene, scene.history, searching
         self.works: Works = {
-            "undo": self._undo,
-            "redo": self._redo,
+            "undo": lambda *_: self._step(-1, "edit to undo"),
+            "redo": lambda *_: self._step(1, "undone edit to redo"),
             "go": self._go,
             "select": self._select,
             "reset": self._reset,
@@ -55,15 +55,11 @@ class Changes:
             "face": self._face,
         }
 
-    def _undo(self, _meta: Meta, _arrays: Arrays) -> None:
-        if not self._history.place:
-            raise RequestError("There must be an edit to undo; there is none.")
-        self._history.go(self._history.place - 1)
-
-    def _redo(self, _meta: Meta, _arrays: Arrays) -> None:
-        if self._history.place == len(self._history.moments) - 1:
-            raise RequestError("There must be an undone edit to redo; there is none.")
-        self._history.go(self._history.place + 1)
+    def _step(self, by: int, what: str) -> None:
+        place = self._history.place + by
+        if not 0 <= place < len(self._history.moments):
+            raise RequestError(f"There must be an {what}; there is none.")
+        self._history.go(place)
 
     def _go(self, meta: Meta, _arrays: Arrays) -> None:
         """Go to a place of the history."""
@@ -80,7 +76,7 @@ class Changes:
         shape = self._of.listed_shape(meta.get("shape"))
         is_new = not shape.loaded
         self._history.choose(shape)
-        self._of.warnings += shape.report if is_new else ()
+        self._of.warnings += shape.found.report if is_new else ()
 
     def _reset(self, _meta: Meta, _arrays: Arrays) -> None:
         self._history.did("All undone", pose=self._history.now.shape.rest)

@@ -1,21 +1,23 @@
 """What stands beside the shape of a tab: a second shape with a map, landmarks, a collection."""
 
+import pickle
 import threading
 import warnings
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 import eigenshape as es
 from eigenshape_studio.calls import Arrays, Families, Meta, RequestError, Works, file_bytes
-from eigenshape_studio.others.beside import Beside
+from eigenshape_studio.others.beside import Beside, part_and_whole
 from eigenshape_studio.others.landmarks import (
     SurfaceLandmarks,
     landmark_file,
     parse_landmarks,
     place_landmarks,
 )
-from eigenshape_studio.others.mapping import DenseMap
+from eigenshape_studio.others.mapping import DenseMap, map_of_match
 from eigenshape_studio.others.specimens import Specimens
 from eigenshape_studio.shape.loading import Loaded
 from eigenshape_studio.shape.parse import display_name
@@ -23,6 +25,7 @@ from eigenshape_studio.tab.bending import LISTENING
 from eigenshape_studio.tab.history import Shape
 from eigenshape_studio.tab.scene import Scene
 from eigenshape_studio.tab.searching import Searching
+from eigenshape_studio.tab.sessions import map_number, unpack
 
 MOST_KEPT = 4  # second shapes whose maps are kept, so that undo finds them again
 SAMPLE_POSE = 1  # of a sample beside the shape; the one that opens as the shape has pose 0
@@ -91,20 +94,22 @@ class Company:
         """The second shape of the present moment, with the corrections of its map."""
         now, shapes = self._of.history.now, self._of.history.shapes
         with self._lock:
-            if now.beside < 0:
+            if now.beside not in shapes:  # -1 is none; a damaged file may have lost one
                 self._leave()
                 return None
             mesh, second = now.shape.mesh, shapes[now.beside]
             try:
                 other = second.mesh
-            except (es.EigenshapeError, OSError):  # its file has gone, or changed
+            except (es.EigenshapeError, OSError) as error:  # its file has gone, or changed
+                loss = f"{second.name} cannot stand beside the shape any more: {error}"
+                self._of.losses += [loss] if loss not in self._of.losses else []
                 return None
             pair = mesh, second.number
             kept = next((each for each in self._kept if each.is_of(*pair)), None)
             if kept is None:
                 self._leave()
                 known = self._known_map(mesh, second)
-                kept = Beside(mesh, other, second.name, second.number, known)
+                kept = Beside(mesh, other, second.name, second.number, known, self._keep_match)
                 self._kept = [*self._kept, kept][-MOST_KEPT:]
             kept.correct(np.frombuffer(now.pairs, dtype=np.int64).reshape(-1, 2))
             return kept
@@ -115,12 +120,30 @@ class Company:
         self._kept = [kept for kept in self._kept if kept.has_map]
 
     def _known_map(self, mesh: es.TriangleMesh, second: Shape) -> DenseMap | None:
-        """Return the map from the mean of the collection to one of its specimens."""
-        specimens = self._of.specimens
-        if specimens is None or not specimens.is_mean(mesh):
+        """Return the map of a collection from its mean to a specimen, or that of an earlier server."""
+        specimens, file = self._of.specimens, self._of.history.file
+        is_known = specimens is not None and second.name in specimens.collection.names
+        if specimens is not None and is_known and specimens.is_mean(mesh):
+            return specimens.map_to(second.name, second.mesh)
+        if file is None:
             return None
-        is_specimen = second.name in specimens.collection.names
-        return specimens.map_to(second.name, second.mesh) if is_specimen else None
+        pair = part_and_whole(mesh, second.mesh)
+        try:
+            row = file.row("maps", map_number(*pair))
+        except es.StoreError:  # none was kept; if it was lost, the page says so
+            return None
+        return map_of_match(*pair, unpack(row[1]))
+
+    def _keep_match(
+        self, part: es.TriangleMesh, whole: es.TriangleMesh, match: es.matching.ShapeMatch
+    ) -> None:
+        """Write a match of two meshes to the file of the tab, if it has one."""
+        history = self._of.history
+        with self._of.changing:
+            if history.file is not None:
+                history.save()  # the meshes, if nothing was changed yet
+                row = map_number(part, whole), pickle.dumps(match)
+                history.file.write({"maps": [row]})
 
     def _require_beside(self) -> Beside:
         if self.beside is None:
@@ -142,7 +165,7 @@ class Company:
             second = self._of.listed_shape(meta["shape"])
         else:
             mesh, name = self._read(meta, arrays)
-            second = history.add(Loaded(mesh), name)
+            second = history.add(name, partial(Loaded, mesh))
         second.mesh  # noqa: B018  a file that cannot be read must not stand beside
         history.did(f"{second.name} beside", beside=second.number, pairs=b"")
 

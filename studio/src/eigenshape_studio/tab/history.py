@@ -3,9 +3,11 @@
 import pickle
 import threading
 import zlib
+from bisect import bisect_right
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +18,9 @@ from eigenshape.deformation.edits import mesh_fingerprint
 from eigenshape_studio.calls import RequestError
 from eigenshape_studio.others.folders import MOST_LISTED
 from eigenshape_studio.shape.analysis import Analysis
-from eigenshape_studio.shape.loading import Field, Loaded, load_file
+from eigenshape_studio.shape.loading import Loaded, load_file
 from eigenshape_studio.shape.look import Skin, count_images, find_skin
-from eigenshape_studio.tab.sessions import Row, SessionFile, edits_text
-from eigenshape_studio.wire import decode, encode
+from eigenshape_studio.tab.sessions import Row, SessionFile, unpack
 
 MOST_MOMENTS = 2000  # of one tab; the oldest are forgotten
 N_IN_MEMORY = 16  # poses that stay in memory where a file has all of them
@@ -54,65 +55,55 @@ class Shape:
         shared: bool = False,
     ) -> None:
         self.number, self.name, self.path = number, name, path
-        self.attributes: es.io.MeshAttributes | None = None
-        self.fields: dict[str, Field] = {}
         self.rest = Pose(0, self)
-        self.stored = False  # whether the file of the tab has it
         self._load, self._make = load, partial(make, shared=True) if shared else make
-        self._found: Loaded | None = None  # what was read
+        self._found: Loaded | None = None
         self._analysis: Analysis | None = None
         self._digest = ""
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
 
     @property
     def analysis(self) -> Analysis:
         """What is computed of the mesh; it begins now if the shape was not shown yet."""
         with self._lock:
             if self._analysis is None:
-                found = self._read()
-                self.attributes, self.fields = found.attributes, dict(found.fields)
-                self._analysis = self._make(found.mesh, self.name)
-                if found.side != ("auto", "auto"):
-                    self._analysis.look_from(*found.side)
-                self.stored = False  # where the file has the path alone
+                self._analysis = self._make(self.found.mesh, self.name)
+                if self.found.side != ("auto", "auto"):
+                    self._analysis.look_from(*self.found.side)
             return self._analysis
 
-    def _read(self) -> Loaded:
-        if self._found is None:
-            self._found = self._load()
-        return self._found
+    @property
+    def found(self) -> Loaded:
+        """What is read of the shape, now if it was not yet."""
+        with self._lock:
+            if self._found is None:
+                self._found = self._load()
+            return self._found
+
+    @property
+    def is_read(self) -> bool:
+        """Whether the shape was read already; otherwise its file may still change."""
+        return self._found is not None
 
     @property
     def mesh(self) -> es.TriangleMesh:
         """The mesh at rest, of which nothing else needs to be computed."""
-        with self._lock:
-            return self._read().mesh if self._analysis is None else self._analysis.mesh
-
-    @property
-    def points(self) -> np.ndarray | None:
-        """The points that the surface was made of, if it was."""
-        with self._lock:
-            return self._read().points
-
-    @property
-    def report(self) -> tuple[str, ...]:
-        """What was done to the file's shape when it was read, in sentences."""
-        with self._lock:
-            return self._read().report
+        return self.found.mesh
 
     @cached_property
     def skin(self) -> Skin | None:
         """How the shape looks, if its file says so."""
-        if count_images(self.attributes) < 0:
+        attributes = self.found.attributes
+        if count_images(attributes) < 0:
             return None
-        assert self.attributes is not None  # noqa: S101  they are counted
-        return find_skin(self.attributes)
+        assert attributes is not None  # noqa: S101  they are counted
+        return find_skin(attributes)
 
     @property
     def digest(self) -> str:
         """Text that two shapes share only if their meshes are equal; empty before it is read."""
-        if self.loaded and not self._digest:
-            self._digest = mesh_fingerprint(self.analysis.mesh).digest
+        if self.is_read and not self._digest:
+            self._digest = mesh_fingerprint(self.mesh).digest
         return self._digest
 
     @property
@@ -123,8 +114,7 @@ class Shape:
     def fork(self) -> "Shape":
         """Return the shape for another tab; what is computed already is shared."""
         twin = Shape(self.number, self.name, self._load, self._make, self.path)
-        twin.attributes, twin.fields = self.attributes, dict(self.fields)
-        twin._digest = self._digest
+        twin._digest, twin._found = self._digest, self._found
         with self._lock:
             twin._analysis = self._analysis and self._analysis.fork()
         return twin
@@ -151,21 +141,23 @@ class Pose:
     shape : Shape
     parent : Pose, optional
         The pose before, unless it is the shape at rest.
-    n_edits : int
-        All that lead here from the shape at rest.
-    edits : tuple of Edit, optional
-        Those since the pose before. None: the file of the tab has them.
+    edits : tuple of Edit
+        Those since the pose before.
     mesh : TriangleMesh, optional
         None: the file of the tab has it.
+    n_edits : int
+        All that lead here from the shape at rest.
     """
 
     number: int
     shape: Shape
     parent: "Pose | None" = None
-    n_edits: int = 0
-    edits: tuple[es.deformation.Edit, ...] | None = ()
+    edits: tuple[es.deformation.Edit, ...] = ()
     mesh: es.TriangleMesh | None = None
-    stored: bool = False
+    n_edits: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.n_edits = len(self.edits) + (0 if self.parent is None else self.parent.n_edits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,8 +215,10 @@ class History:
         self.place = 0
         self.index = self.collection = ""  # folders that the page has opened
         self.last = ""  # the page's own name for its last change, which it may send again
-        self._n_poses = 0
-        self._n_written = 0  # of the moments; later ones are new to the file
+        # No number is used twice, also of what was undone because it could not be written.
+        self._pose_numbers, self._moment_numbers = count(1), count(1)
+        # Moments and poses that the file has, and shapes, with whether it has more than their paths
+        self._kept: set[object] = set()
         if file is None or not self._restore(file):
             first = next(iter(self.shapes.values()))
             # Who opens two shapes wants to compare them.
@@ -245,7 +239,7 @@ class History:
 
         `changed` has further entries of the moment.
         """
-        now, number = self.now, self.moments[-1].number + 1
+        now, number = self.now, next(self._moment_numbers)
         changed |= {"number": number, "text": text}
         if pose is not None:
             changed |= {"pose": pose, "shape": pose.shape}
@@ -255,19 +249,12 @@ class History:
                 changed |= {"landmarks": before.landmarks, "pairs": b""}
         if regions is not None:
             changed |= {"regions": regions, "selected": number}
-        del self.moments[self.place + 1 :]
-        self._n_written = min(self._n_written, len(self.moments))
-        self.moments.append(replace(now, **changed))
-        surplus = max(0, len(self.moments) - MOST_MOMENTS)
-        del self.moments[:surplus]
-        self._n_written = max(0, self._n_written - surplus)
-        self._enter(len(self.moments) - 1)
+        done = [*self.moments[: self.place + 1], replace(now, **changed)]
+        self.moments = done[-MOST_MOMENTS:]
+        self.go(len(self.moments) - 1)
 
     def go(self, place: int) -> None:
         """Return to a state, or on to one that was undone."""
-        self._enter(place)
-
-    def _enter(self, place: int) -> None:
         before, self.place = self.now, place
         if self.moments[place].shape is not before.shape:
             before.shape.leave()
@@ -289,14 +276,14 @@ class History:
 
     def show(self, loaded: Loaded, name: str, text: str) -> Shape:
         """Add a shape to the list, and show it."""
-        shape = self.add(loaded, name)
+        shape = self.add(name, lambda: loaded)
         self.did(text, pose=shape.rest)
         return shape
 
-    def add(self, loaded: Loaded, name: str) -> Shape:
+    def add(self, name: str, load: Callable[[], Loaded], path: str | None = None) -> Shape:
         """Add a shape to the list."""
-        shape = Shape(max(self.shapes) + 1, name, lambda: loaded)
-        self.shapes[shape.number] = shape
+        shape = Shape(max(self.shapes) + 1, name, load, path=path)
+        self.shapes = {**self.shapes, shape.number: shape}
         return shape
 
     def open_files(self, files: list[tuple[str, Path]]) -> list[str]:
@@ -315,9 +302,7 @@ class History:
         listed = {shape.path: shape for shape in self.shapes.values() if shape.path}
         for name, path in files[: max(0, MOST_LISTED - len(self.shapes))]:
             if str(path) not in listed:
-                number = max(self.shapes) + 1
-                shape = Shape(number, name, partial(load_file, path), path=str(path))
-                self.shapes[number] = listed[str(path)] = shape
+                listed[str(path)] = self.add(name, partial(load_file, path), str(path))
         notes: list[str] = []
         for name, path in files:
             try:
@@ -329,25 +314,17 @@ class History:
         raise RequestError(" ".join(["No shape of the folder can be opened.", *notes[:1]]))
 
     def bend(
-        self, edits: tuple[es.deformation.Edit, ...], mesh: es.TriangleMesh, text: str
+        self,
+        edits: tuple[es.deformation.Edit, ...],
+        mesh: es.TriangleMesh,
+        text: str,
+        *,
+        at_rest: bool = False,
     ) -> None:
-        """Enter the pose after some more edits."""
+        """Enter the pose after some more edits, or after edits of the shape at rest."""
         before = self.now.pose
-        parent = before if before.number else None
-        self.did(text, pose=self._add_pose(edits, mesh, parent))
-
-    def replace_edits(
-        self, edits: tuple[es.deformation.Edit, ...], mesh: es.TriangleMesh, text: str
-    ) -> None:
-        """Enter the pose after edits of the shape at rest."""
-        self.did(text, pose=self._add_pose(edits, mesh, None))
-
-    def _add_pose(
-        self, edits: tuple[es.deformation.Edit, ...], mesh: es.TriangleMesh, parent: Pose | None
-    ) -> Pose:
-        self._n_poses += 1
-        n_edits = len(edits) + (0 if parent is None else parent.n_edits)
-        return Pose(self._n_poses, self.now.shape, parent, n_edits, edits, mesh)
+        parent = None if at_rest or not before.number else before
+        self.did(text, pose=Pose(next(self._pose_numbers), before.shape, parent, edits, mesh))
 
     def select(self, owners: np.ndarray, text: str) -> None:
         """Take the region of each vertex."""
@@ -367,125 +344,96 @@ class History:
         """Return the shape in a pose."""
         if not pose.number:
             return pose.shape.analysis.mesh
-        mesh = pose.mesh
-        if mesh is None:
-            vertices = self._require_file().vertices(pose.number)
-            mesh = pose.mesh = es.TriangleMesh(vertices, pose.shape.analysis.mesh.faces)
-        return mesh
+        if pose.mesh is None:
+            assert self.file is not None  # noqa: S101  only what is in a file leaves the memory
+            vertices = np.frombuffer(self.file.row("poses", pose.number)[4]).reshape(-1, 3)
+            pose.mesh = es.TriangleMesh(vertices, pose.shape.mesh.faces)
+        return pose.mesh
 
     def edits(self, pose: Pose | None) -> tuple[es.deformation.Edit, ...]:
         """Return the edits that lead from the shape at rest to a pose."""
         found: list[tuple[es.deformation.Edit, ...]] = []
         while pose is not None:
-            if pose.edits is None:
-                rest = pose.shape.analysis.mesh
-                pose.edits = self._require_file().edits(pose.number, rest)
             found.append(pose.edits)
             pose = pose.parent
         return tuple(edit for edits in reversed(found) for edit in edits)
-
-    def _require_file(self) -> SessionFile:
-        assert self.file is not None  # noqa: S101  only what is in a file leaves the memory
-        return self.file
 
     def save(self) -> None:
         """Write what is new to the file of the tab, if it has one."""
         if self.file is None:
             return
-        written, new = self.moments[: self._n_written], self.moments[self._n_written :]
-        shapes = [shape for shape in self.shapes.values() if not shape.stored]
-        poses = {moment.pose for moment in new if moment.pose.number and not moment.pose.stored}
+        shapes = [each for each in self.shapes.values() if (each, each.is_read) not in self._kept]
+        moments = [moment for moment in self.moments if moment not in self._kept]
+        poses = {moment.pose for moment in moments if moment.pose.number} - self._kept
         self.file.write(
             {
-                "place": self.now.number,
-                "last": self.last,
-                "n_poses": self._n_poses,
-                "index": self.index,
-                "collection": self.collection,
+                "places": [(1, self.now.number, self.last, self.index, self.collection)],
+                "shapes": [_shape_row(shape) for shape in shapes],
+                "poses": [_pose_row(pose) for pose in poses],
+                "steps": [_moment_row(moment) for moment in moments],
             },
-            map(_shape_row, shapes),
-            [_pose_row(pose) for pose in poses],
-            [_moment_row(moment) for moment in new],
-            (written[0].number, written[-1].number) if written else (0, -1),
+            [moment.number for moment in self.moments],
+            begin=not self._kept,
         )
-        for shape in shapes:
-            shape.stored = True
-        for pose in poses:
-            pose.stored = True
-        self._n_written = len(self.moments)
+        self._kept = {*self.moments, *poses, *(moment.pose for moment in self.moments)}
+        self._kept |= {(shape, shape.is_read) for shape in self.shapes.values()}
         # Of the poses in the file, those near the present one stay in memory, too.
         near = {moment.pose for moment in self.moments[-N_IN_MEMORY:]} | {self.now.pose}
         for moment in self.moments:
-            if moment.pose.stored and moment.pose not in near:
+            if moment.pose not in near:
                 moment.pose.mesh = None
 
     def _restore(self, file: SessionFile) -> bool:
         """Continue the session of a file; return False if there is none."""
         tables = file.read()
-        if tables is None:
+        if not tables.get("steps"):
             return False
-        facts: dict[str, str] = dict(tables["fact"])
-        self.last, self._n_poses = facts["last"], int(facts["n_poses"])
-        self.index, self.collection = facts.get("index", ""), facts.get("collection", "")
-        for number, name, path, digest in tables["shape"]:
+        place = max(tables["steps"])
+        if 1 in tables["places"]:
+            _, place, self.last, self.index, self.collection = tables["places"][1]
+        for number, name, path, digest in tables["shapes"].values():
             # What the server shows to all tabs is analyzed once.
             shared = self.shapes.get(number)
             if shared is None or (shared.path, shared.digest) != (path, digest):
-                load = partial(_load, file, number, path)
-                self.shapes[number] = Shape(number, name, load, path=path)
-            self.shapes[number].stored = True
+                load = partial(_load, file, number) if digest else partial(load_file, path)
+                shared = self.shapes[number] = Shape(number, name, load, path=path)
+            self._kept |= {(shared, False), (shared, bool(digest))}
         poses: dict[int, Pose] = {}
-        for number, shape, parent, n_edits in tables["pose"]:
+        for number, shape, parent, edits in tables["poses"].values():
             owner = self.shapes[shape]
-            poses[number] = Pose(number, owner, poses.get(parent), n_edits, None, None, True)
-        for number, text, shape, pose, *others in tables["moment"]:
+            poses[number] = Pose(number, owner, poses.get(parent), unpack(edits))
+        for number, text, shape, pose, *others in tables["steps"].values():
             owner = self.shapes[shape]
-            place = poses[pose] if pose else owner.rest
-            self.moments.append(Moment(number, text, owner, place, *others))
-        self._n_written = len(self.moments)
+            there = poses[pose] if pose else owner.rest
+            self.moments.append(Moment(number, text, owner, there, *others))
+        self._kept |= {*self.moments, *poses.values()}
         numbers = [moment.number for moment in self.moments]
-        self.place = numbers.index(int(facts["place"]))
+        self._pose_numbers = count(max(poses, default=0) + 1)
+        self._moment_numbers = count(numbers[-1] + 1)
+        # Where the present state was damaged, the one before it is shown.
+        self.place = max(0, bisect_right(numbers, place) - 1)
         return True
 
 
-def _load(file: SessionFile, number: int, path: str | None) -> Loaded:
-    """Read a shape from the file of a tab, or from its own if it was not shown yet."""
-    message, pickled = file.shape(number)
-    if message is None:
-        return load_file(str(path))
-    meta, arrays = decode(message)
-    mesh = es.TriangleMesh(arrays["vertices"], arrays["faces"].astype(np.int64))
-    fields = {
-        name: Field(arrays[f"field {place}"], title, unit)
-        for place, (name, title, unit) in enumerate(meta["fields"])
-    }
-    # The file is the user's own: who could change it could change this program.
-    attributes = None if pickled is None else pickle.loads(pickled)
-    return Loaded(mesh, attributes, fields, tuple(meta["side"]), arrays.get("points"))
+def _load(file: SessionFile, number: int) -> Loaded:
+    """Read a shape from the file of a tab."""
+    found: Loaded = unpack(file.row("shapes", number)[4])
+    return found
 
 
 def _shape_row(shape: Shape) -> Row:
-    if shape.path is not None and not shape.loaded:
-        return shape.number, shape.name, shape.path, "", None, None
-    mesh = shape.mesh
-    arrays = {"vertices": mesh.vertices.astype("<f8"), "faces": mesh.faces.astype("<u4")}
-    for place, one in enumerate(shape.fields.values()):
-        arrays[f"field {place}"] = one.values.astype("<f8")
-    if shape.points is not None:
-        arrays["points"] = shape.points.astype("<f8")
-    names = [(name, one.title, one.unit) for name, one in shape.fields.items()]
-    pickled = None if shape.attributes is None else pickle.dumps(shape.attributes)
-    side = shape.analysis.side if shape.loaded else ("auto", "auto")
-    message = encode({"fields": names, "side": side}, arrays)
-    return shape.number, shape.name, shape.path, shape.digest, message, pickled
+    packed = None
+    if shape.path is None or shape.is_read:
+        side = shape.analysis.side if shape.loaded else shape.found.side
+        packed = pickle.dumps(replace(shape.found, side=side, report=()))
+    return shape.number, shape.name, shape.path, shape.digest, packed
 
 
 def _pose_row(pose: Pose) -> Row:
-    assert pose.edits is not None and pose.mesh is not None  # noqa: PT018, S101  it is new
+    assert pose.mesh is not None  # noqa: S101  it is new
     parent = None if pose.parent is None else pose.parent.number
-    text = edits_text(pose.edits, pose.shape.analysis.mesh)
-    vertices = pose.mesh.vertices.astype("<f8").tobytes()
-    return pose.number, pose.shape.number, parent, pose.n_edits, text, vertices
+    packed = pickle.dumps(pose.edits), pose.mesh.vertices.tobytes()
+    return pose.number, pose.shape.number, parent, *packed
 
 
 def _moment_row(moment: Moment) -> Row:

@@ -1,6 +1,7 @@
 """The present shape of one tab, as all that reads and changes it sees it."""
 
 import threading
+from collections.abc import Mapping
 from typing import Any
 
 import eigenshape as es
@@ -28,6 +29,8 @@ class Scene:
     ----------
     warnings : list of str
         They go with the answer to the present call.
+    losses : list of str
+        What was there before the server began, and is gone, in sentences.
     changing : RLock
         Whoever changes something holds it.
     """
@@ -40,6 +43,7 @@ class Scene:
     ) -> None:
         self.history, self.specimens, self.folders = history, specimens, folders
         self.warnings: list[str] = []
+        self.losses = [] if history.file is None else [*history.file.losses]
         self.changing = threading.RLock()
 
     @property
@@ -48,16 +52,14 @@ class Scene:
         return self.history.now.shape.analysis
 
     @property
-    def fields(self) -> dict[str, Field]:
+    def fields(self) -> Mapping[str, Field]:
         """Functions on the vertices of the shape."""
-        self.analysis  # noqa: B018  they are read with the mesh
-        return self.history.now.shape.fields
+        return self.history.now.shape.found.fields
 
     @property
     def attributes(self) -> es.io.MeshAttributes | None:
         """What the file of the shape holds besides."""
-        self.analysis  # noqa: B018  they are read with the mesh
-        return self.history.now.shape.attributes
+        return self.history.now.shape.found.attributes
 
     @property
     def mesh(self) -> es.TriangleMesh:

@@ -1,46 +1,73 @@
-"""Sessions on disk: one file for each tab, so that nothing is lost when the server ends.
+"""Sessions on disk: one sealed file for each tab, so that nothing is lost when the server ends.
 
-A file is a database of SQLite: a change is written as a whole or not at all, also if the server is
-killed meanwhile. The files lie in a folder of the user's cache, which nobody else may read.
+The files lie in a folder that nobody else may read, and that one server owns at a time.
 """
 
 import json
+import pickle
+import shutil
 import sqlite3
-import threading
-from collections.abc import Collection, Iterable
-from contextlib import suppress
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 from time import time
 from typing import Any
 
-import numpy as np
-import platformdirs
-
 import eigenshape as es
-from eigenshape.deformation.edits import edits_from_json, edits_to_json
+from eigenshape import _sealed
+from eigenshape._sealed import (
+    BUSY,
+    DAMAGE,
+    NO_SPACE,
+    NOT_WRITABLE,
+    checksum,
+    explained,
+)
+from eigenshape.deformation.edits import mesh_fingerprint
 
-VERSION = 1  # of the tables; a file of another version is put aside
-MOST_BYTES = 2 << 30  # of all files; the oldest are removed
+MOST_BYTES = 2 << 30  # of the files of a folder; the oldest are removed
 MOST_DAYS = 30  # without a change, after which a file is removed
 YOUNG = 3600.0  # seconds since the last change within which a file is not removed for its size
-TABLES = """
-create table if not exists fact (name text primary key, value text);
-create table if not exists shape
-    (number integer primary key, name text, path text, digest text, message blob, attributes blob);
-create table if not exists pose
-    (number integer primary key, shape integer, parent integer, n_edits integer, edits text,
-     vertices blob);
-create table if not exists moment
-    (number integer primary key, text text, shape integer, pose integer, regions blob,
-     selected integer, landmarks text, beside integer, pairs blob);
-"""
+# Of each row of a table these columns are read with the session; what follows is large.
+N_READ = {"places": 5, "shapes": 4, "poses": 4, "steps": 9, "maps": 1}
+SESSION = _sealed.Kind(
+    noun="A session",
+    format=2,
+    tables={
+        name: f"CREATE TABLE {name} (id INTEGER PRIMARY KEY, {columns}, checksum INTEGER NOT NULL)"
+        for name, columns in {
+            "places": "place INTEGER, last TEXT, shelf TEXT, collection TEXT",
+            "shapes": "name TEXT, path TEXT, digest TEXT, found BLOB",
+            "poses": "shape INTEGER, parent INTEGER, edits BLOB, vertices BLOB",
+            "steps": "text TEXT, shape INTEGER, pose INTEGER, regions BLOB, selected INTEGER, "
+            "landmarks TEXT, beside INTEGER, pairs BLOB",
+            "maps": "found BLOB",
+        }.items()
+    },
+    missing="It was removed: save the shape as a file, and open it in a new tab.",
+    rescue="Start the studio again: the tab then begins with what is whole.",
+    renew="start the studio again: the tab then begins with what is whole",
+)
+# What needs a row that is lost is lost with it.
+DANGLING = (
+    """WITH RECURSIVE whole (id) AS (
+        SELECT id FROM poses WHERE parent IS NULL UNION
+        SELECT poses.id FROM poses JOIN whole ON poses.parent = whole.id)
+    DELETE FROM poses WHERE id NOT IN whole OR shape NOT IN (SELECT id FROM shapes)""",
+    "DELETE FROM steps WHERE shape NOT IN (SELECT id FROM shapes)",
+    "DELETE FROM steps WHERE pose <> 0 AND pose NOT IN (SELECT id FROM poses)",
+)
+# Nothing returns to these poses, but later ones count on their edits.
+LEFT = """SELECT id, shape, parent, edits FROM poses
+    WHERE vertices IS NOT NULL AND id NOT IN (SELECT pose FROM steps)"""
 
 Row = tuple[Any, ...]
+Rows = dict[int, Row]  # by their numbers
 
 
-def sessions_folder() -> Path:
-    """Return the folder of the sessions of this user."""
-    return platformdirs.user_cache_path("eigenshape") / "studio"
+class NotKeptError(es.StoreError):
+    """A change could not be written, and was undone."""
 
 
 class SessionFile:
@@ -49,122 +76,213 @@ class SessionFile:
     Parameters
     ----------
     path : Path
+
+    Attributes
+    ----------
+    losses : list of str
+        What a damaged file has lost, in sentences.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._database: sqlite3.Connection | None = None
-        self._lock = threading.Lock()
+        self.losses: list[str] = []
 
-    def close(self) -> None:
-        """Let go of the file; the next call opens it again."""
-        with self._lock:
-            if self._database is not None:
-                self._database.close()
-            self._database = None
+    def read(self) -> dict[str, Rows]:
+        """Return the rows of each table, without what is large; nothing if there is no session.
 
-    def read(self) -> dict[str, list[Row]] | None:
-        """Return the rows of each table, without what is large; None if there is no session.
+        If the file is damaged, it is put aside with the suffix ".broken", and what is whole of it
+        becomes the session.
 
-        A file that cannot be read is put aside, with the suffix ".broken".
+        Raises
+        ------
+        StoreError
+            If the file cannot be read now: the disk is full, or another process is writing.
         """
         if not self.path.exists():
-            return None
+            return {}
         try:
             return self._read_all()
-        except sqlite3.DatabaseError:
-            self.close()
-            self.path.replace(self.path.with_suffix(".broken"))
-            return None
+        except es.StoreError as error:
+            self._rescue(error)
+        return self.read()
 
-    def _read_all(self) -> dict[str, list[Row]]:
-        with self._lock, self._open() as database:
-            (version,) = database.execute("pragma user_version").fetchone()
-            if version != VERSION:
-                raise sqlite3.DatabaseError(f"Version {version} is not {VERSION}.")
-            wanted = {
-                "fact": "name, value",
-                "shape": "number, name, path, digest",
-                "pose": "number, shape, parent, n_edits",
-                "moment": "number, text, shape, pose, regions, selected, landmarks, beside, pairs",
-            }
-            return {
-                table: database.execute(f"select {columns} from {table} order by rowid").fetchall()
-                for table, columns in wanted.items()
-            }
+    def _read_all(self) -> dict[str, Rows]:
+        tables = {}
+        with self._reading() as database:
+            seals = _sealed.read_seals(SESSION, self.path, database)
+            for table, n_read in N_READ.items():
+                rows = [(*row[:n_read], row[-1]) for row in _whole_rows(database, table)]
+                if (len(rows), sum(row[-1] for row in rows)) != seals[table][:2]:
+                    raise es.StoreError(f"Rows of {table} are lost or differ from their checksums.")
+                tables[table] = {row[0]: row[:-1] for row in rows}
+        return tables
+
+    def _rescue(self, damage: es.StoreError) -> None:
+        """Put a damaged file aside, and make one of its whole rows."""
+        fresh, aside = self.path.with_suffix(".fresh"), self.path.with_suffix(".broken")
+        fresh.unlink(missing_ok=True)
+        require_damage(damage)
+        lost = ["everything"]
+        _sealed.create(SESSION, fresh)
+        try:
+            with self._reading() as source, _sealed.writing(SESSION, fresh) as database:
+                for table in N_READ:
+                    for row in _whole_rows(source, table):
+                        _put(database, table, row[:-1])
+                for statement in DANGLING:
+                    database.execute(statement)
+                before = _sealed.read_seals(SESSION, self.path, source, [])
+                after = _sealed.read_seals(SESSION, fresh, database)
+                counts = {table: (before[table].n_rows, after[table].n_rows) for table in N_READ}
+                lost = [f"{n - m} of {n} {table}" for table, (n, m) in counts.items() if m < n]
+        except es.StoreError as error:  # as a whole
+            require_damage(error)
+        shutil.copyfile(self.path, aside)  # so that there is a session at any time
+        for ending in (
+            "-wal",
+            "-shm",
+        ):  # what SQLite keeps beside a file belongs to the damaged one
+            with suppress(FileNotFoundError):
+                Path(f"{self.path}{ending}").replace(f"{aside}{ending}")
+        fresh.replace(self.path)
+        self.losses = [
+            "The work of this tab was damaged on the disk. Gone: "
+            f"{', '.join(lost) or 'nothing'}. The damaged file is kept as "
+            f"{aside}. ({damage.__cause__ or damage})"
+        ]
 
     def write(
         self,
-        facts: dict[str, Any],
-        shapes: Iterable[Row],
-        poses: Iterable[Row],
-        moments: Iterable[Row],
-        kept: tuple[int, int],
+        rows: dict[str, list[Row]],
+        moments: Sequence[int] | None = None,
+        *,
+        begin: bool = False,
     ) -> None:
-        """Write what is new, at once; moments in the file stay from the first to the last number `kept`."""
-        with self._lock, self._open() as database:
-            database.executemany("insert or replace into fact values (?, ?)", facts.items())
-            database.executemany("insert or replace into shape values (?, ?, ?, ?, ?, ?)", shapes)
-            database.executemany("insert or replace into pose values (?, ?, ?, ?, ?, ?)", poses)
-            database.execute("delete from moment where not number between ? and ?", kept)
-            holes = ", ".join("?" * 9)
-            database.executemany(f"insert or replace into moment values ({holes})", moments)
-            # Nothing returns to these poses, but later ones count on their edits.
-            database.execute(
-                "update pose set vertices = null "
-                "where vertices is not null and number not in (select pose from moment)"
-            )
+        """Write rows of some tables, at once.
 
-    def shape(self, number: int) -> Row:
-        """Return the message of a mesh and the attributes of its file, as they were written."""
-        return self._one("select message, attributes from shape", number)
+        Parameters
+        ----------
+        rows : {table: rows}
+        moments : sequence of int, optional
+            The numbers of all that stay.
+        begin : bool
+            Whether the file may be made; otherwise one that is missing has been removed.
 
-    def vertices(self, number: int) -> np.ndarray:
-        """Return the vertices of a pose."""
-        (data,) = self._one("select vertices from pose", number)
-        return np.frombuffer(data, "<f8").reshape(-1, 3)
-
-    def edits(self, number: int, mesh: es.TriangleMesh) -> tuple[es.deformation.Edit, ...]:
-        """Return the edits of a mesh that lead to a pose from the one before."""
-        (text,) = self._one("select edits from pose", number)
-        return tuple(edits_from_json(json.loads(text), mesh))
-
-    def _one(self, query: str, number: int) -> Row:
-        with self._lock, self._open() as database:
-            row: Row = database.execute(f"{query} where number = ?", (number,)).fetchone()
-            return row
-
-    def _open(self) -> sqlite3.Connection:
-        """Return the database, whose block is one transaction."""
-        if self._database is None:
-            self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            new = not self.path.exists()
-            self._database = sqlite3.connect(self.path, check_same_thread=False)
-            # A killed process loses nothing so; only a machine without power does.
-            self._database.execute("pragma synchronous = off")
-            if new:
+        Raises
+        ------
+        NotKeptError
+            If they cannot be written; then none of them is.
+        """
+        try:
+            if begin and not self.path.exists():
+                self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                _sealed.create(SESSION, self.path)
                 self.path.chmod(0o600)
-                self._database.executescript(TABLES)
-                self._database.execute(f"pragma user_version = {VERSION}")
-        return self._database
+            with _sealed.writing(SESSION, self.path) as database:
+                for table, some in rows.items():
+                    for row in some:
+                        _put(database, table, row)
+                if moments is not None:
+                    query = "DELETE FROM steps WHERE id NOT IN (SELECT value FROM json_each(?))"
+                    database.execute(query, (json.dumps(moments),))
+                for row in database.execute(LEFT).fetchall():
+                    _put(database, "poses", (*row, None))
+        except (es.StoreError, OSError) as error:
+            raise NotKeptError(str(error)) from error
+
+    def row(self, table: str, number: int) -> Row:
+        """Return a row of a table, as it was written.
+
+        Raises
+        ------
+        StoreError
+            If it is damaged.
+        """
+        with self._reading() as database:
+            for row in _whole_rows(database, table, [number]):
+                return row[:-1]
+        raise es.StoreError(
+            f"{self.path} must hold what was written; row {number} of {table} differs from its "
+            f"checksum. {SESSION.rescue}"
+        )
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        with (
+            explained(SESSION, self.path),
+            closing(_sealed.open_to_read(SESSION, self.path)) as database,
+        ):
+            yield database
 
 
-def edits_text(edits: tuple[es.deformation.Edit, ...], mesh: es.TriangleMesh) -> str:
-    """Return edits as a file holds them."""
-    return json.dumps(edits_to_json(edits, mesh))
+def _whole_rows(
+    database: sqlite3.Connection, table: str, numbers: Iterable[int] | None = None
+) -> Iterator[Row]:
+    """Yield those rows of a table, by default of all, that agree with their checksums, which stand last."""
+    if numbers is None:
+        found: list[int] = []
+        with suppress(*DAMAGE):  # rows behind a page that cannot be read are lost
+            for (number,) in database.execute(f"SELECT id FROM {table} NOT INDEXED"):
+                found.append(number)
+        numbers = found
+    for number in numbers:
+        with suppress(*DAMAGE):
+            query = f"SELECT * FROM {table} WHERE id = ?"
+            row = database.execute(query, (number,)).fetchone()
+            if row is not None and checksum(*row[:-1]) == row[-1]:
+                yield row
+
+
+def _put(database: sqlite3.Connection, table: str, row: Row) -> None:
+    """Write a row in place of that of its number, if there is one."""
+    database.execute(f"DELETE FROM {table} WHERE id = ?", row[:1])
+    holes = ", ".join("?" * (len(row) + 1))
+    database.execute(f"INSERT INTO {table} VALUES ({holes})", (*row, checksum(*row)))
+
+
+def require_damage(error: es.StoreError) -> None:
+    """Raise an error again that a later call may not meet: the disk is full, or a file is in use."""
+    code = getattr(error.__cause__, "sqlite_errorcode", 0) & 0xFF
+    if code in (*BUSY, *NO_SPACE, *NOT_WRITABLE):
+        raise error
+
+
+def unpack(packed: bytes) -> Any:
+    """Return what was pickled in a file, which only its owner can change.
+
+    Raise StoreError if another version of the library has written it.
+    """
+    try:
+        return pickle.loads(packed)
+    except Exception as error:
+        raise es.StoreError(
+            f"A session must be read by the version of eigenshape that wrote it: {error}. Install "
+            "that version."
+        ) from error
+
+
+def map_number(part: es.TriangleMesh, whole: es.TriangleMesh) -> int:
+    """Return the number of the row that holds the match of two meshes, and of no others."""
+    digests = mesh_fingerprint(part).digest + mesh_fingerprint(whole).digest
+    return int(sha256(digests.encode()).hexdigest()[:15], 16)  # SQLite has integers of 63 bits
 
 
 def remove_old(folder: Path, in_use: Collection[Path] = ()) -> None:
-    """Remove sessions that are too old, and the oldest of those that take too much space."""
+    """Remove sessions that are too old, and the oldest of those that take too much space.
+
+    The caller owns the folder; `in_use` has the files of its own tabs.
+    """
     found = []
-    for path in folder.glob("*.sqlite"):
-        with suppress(OSError):  # another server may remove it
-            stat = path.stat()
-            found.append((time() - stat.st_mtime, stat.st_size, path))
+    for path in folder.iterdir():
+        if path.suffix and "-" not in path.suffix:  # what SQLite keeps beside a file goes with it
+            with suppress(OSError):  # a file that is being made gets another name
+                stat = path.stat()
+                found.append((time() - stat.st_mtime, stat.st_size, path))
     total = 0
     for age, size, path in sorted(found):
         total += size
         large = total > MOST_BYTES and age > YOUNG
         if path not in in_use and (large or age > MOST_DAYS * 86400):
-            with suppress(OSError):
-                path.unlink()
+            for ending in ("-wal", "-shm", ""):
+                with suppress(OSError):
+                    Path(f"{path}{ending}").unlink()

@@ -1,7 +1,6 @@
 """The shapes of one tab, and the five calls of the page: the same for all hosts."""
 
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -29,7 +28,7 @@ from eigenshape_studio.tab.company import Company
 from eigenshape_studio.tab.history import History, Shape
 from eigenshape_studio.tab.scene import Scene
 from eigenshape_studio.tab.searching import Searching
-from eigenshape_studio.tab.sessions import SessionFile
+from eigenshape_studio.tab.sessions import NotKeptError, SessionFile
 from eigenshape_studio.wire import WireError, decode, encode
 
 POLL = 0.1  # seconds between reports of the progress of a report
@@ -45,7 +44,7 @@ class Answer:
     message : bytes
     status : int
         As in HTTP: 200, 400 if the call was at fault, 500 if the studio was, 503 if the call can be
-        sent again in a while.
+        sent again in a while, 507 if a change could not be written, so that it was not made.
     """
 
     message: bytes
@@ -133,8 +132,11 @@ class Workspace(Scene):
         history = History([shape.fork() for shape in shapes], file)
         Scene.__init__(twin, history, self.specimens, self.folders)
         twin._begin(self.searching.shelf)
-        with suppress(es.EigenshapeError, OSError):  # they may have gone
-            twin.changes.use(history.index, history.collection)
+        for folders in ((history.index, ""), ("", history.collection)):
+            try:
+                twin.changes.use(*folders)
+            except (es.EigenshapeError, OSError) as error:
+                twin.losses.append(f"{''.join(folders)} cannot be opened any more: {error}")
         return twin
 
     def close(self) -> None:
@@ -142,14 +144,16 @@ class Workspace(Scene):
         self.company.close()
         for shape in self.history.shapes.values():
             shape.leave()
-        if self.history.file is not None:
-            self.history.file.close()
+        with self.changing:
+            self.history.file = None
 
     def answer(self, call: str, message: bytes) -> Answer:
         """Answer a call; whatever is wrong with it becomes an answer, too."""
         try:
             meta, arrays = decode(message)
             return Answer(encode(*self._dispatch(call, meta, arrays)), 200)
+        except NotKeptError as error:
+            return Answer(error_message("NotKeptError", str(error)), 507)
         except (es.EigenshapeError, WireError, RequestError, OSError) as error:
             return Answer(error_message(type(error).__name__, window_message(error)), 400)
         except PreparingError as error:
@@ -170,7 +174,7 @@ class Workspace(Scene):
     def state(self) -> dict[str, Any]:
         """Return what the page shows beside the arrays."""
         analysis, history = self.analysis, self.history
-        now = history.now
+        now, points = history.now, history.now.shape.found.points
         shelf = self.searching.shelf
         capabilities = [name for name in CAPABILITIES if name != "query" or shelf is not None]
         capabilities += [] if self.specimens is None else ["collection"]
@@ -184,6 +188,7 @@ class Workspace(Scene):
             "most_bytes": self.most_bytes,
             "suffixes": ",".join(es.io.SHAPE_FORMATS),
             "notes": self.notes,
+            "losses": self.losses,
             "large": analysis.large_facts(),
             "health": analysis.health_facts(),
             "values": [_field_facts(name, field) for name, field in self.fields.items()],
@@ -192,8 +197,8 @@ class Workspace(Scene):
             "deformation": self.bending.facts(),
             "index": None if shelf is None else shelf.facts(),
             **self.company.facts(),
-            "n_images": count_images(now.shape.attributes),
-            "n_points": 0 if now.shape.points is None else len(now.shape.points),
+            "n_images": count_images(self.attributes),
+            "n_points": 0 if points is None else len(points),
             "shapes": [[shape.number, shape.name] for shape in history.shapes.values()],
             "history": [moment.text for moment in history.moments[1:]],
             "place": history.place,
@@ -288,15 +293,24 @@ class Workspace(Scene):
             # A page that did not hear of an answer sends its change again.
             name = str(meta.get("id", ""))[:64]
             again = bool(name) and name == history.last
-            if not again:
-                vertices = self._works[kind](meta, arrays)
+            kept = [(each, dict(vars(each))) for each in (self, self.searching, history)]
+            try:
+                if not again:
+                    vertices = self._works[kind](meta, arrays)
+                if history.now is not before:
+                    history.last = name
+                    history.save()
+            except BaseException:  # all of a change is made, or nothing
+                if history.now.shape is not before.shape:
+                    history.now.shape.leave()
+                    before.shape.enter()
+                for each, values in kept:
+                    vars(each).update(values)
+                raise
             if history.now.pose is not before.pose:
                 self.bending.bound = None
             if again or history.now.pose is not before.pose:
                 vertices = self.mesh.vertices
-            if history.now is not before:
-                history.last = name
-                history.save()
             told = self.warnings
             state = self.state()
         facts = {"state": state, "seconds": perf_counter() - began, "warnings": told}

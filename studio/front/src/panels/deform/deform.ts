@@ -115,7 +115,7 @@ export class DeformPanel implements Panel {
   }
 
   shown(): void {
-    this.active = true;
+    this.active = this.selection.seen = true;
     this.showTools();
     this.selection.paint();
   }
@@ -127,6 +127,7 @@ export class DeformPanel implements Panel {
     this.app.second?.viewer.setPointer();
     this.motion.drop();
     this.selection.paint();
+    this.selection.seen = false;
   }
 
   /** The vertices of the chosen region. */

@@ -30,6 +30,7 @@ export class Selection {
   regions = new Regions(0);
   region = 0; // that the tools change
   crossing: number[] = []; // vertices of faces that cross
+  seen = false; // whether the panel is
   lit: Uint8Array | null = null; // of each vertex: how much it belongs to the limb under the pointer
   readonly box: BoxTool;
   private readonly ring = h("div", { class: "ring", hidden: true });
@@ -178,7 +179,7 @@ export class Selection {
       if (strength) marks.set([...rgbOf(COLORS[0]!), GLOW * strength], 4 * vertex);
     });
     for (const vertex of this.crossing) marks.set([...rgbOf(CROSSING), TINT], 4 * vertex);
-    app.viewer.setMarks(marks);
+    if (this.seen) app.viewer.setMarks(marks); // otherwise the colors are those of another panel
     const count = regions.vertices(region).length.toLocaleString("en");
     const place = region === FIXED ? "the fixed part" : `region ${region + 1}`;
     this.form.text("region-count", `${count} vertices in ${place}`);
@@ -199,7 +200,7 @@ export class Selection {
       .change({ kind: "select", text: `${text}: ${place}` }, "", { regions: this.regions.owners })
       .then((done) => {
         this.sending -= 1;
-        if (done) this.known = app.state.selected;
+        this.known = done ? app.state.selected : -1; // if refused, those of the server are shown again
         return this.takeRegions(app.state);
       })
       .catch((error) => app.fail(error));
