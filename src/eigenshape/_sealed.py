@@ -11,9 +11,10 @@ import os
 import secrets
 import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import disk_usage
 from typing import Any, NamedTuple
 from zlib import crc32
 
@@ -26,6 +27,8 @@ PAGE = 16_384  # bytes
 MAPPED = 2**31 - 65_536  # bytes that SQLite maps of a file, at most; a mapped page is not copied
 CACHED = 16_000  # KB of pages that a connection keeps, so that inner pages are read once
 LONGEST_WAIT = 5.0  # seconds for another writer to end; a change takes milliseconds
+LONG_LOG = 2**19  # bytes of the log, which a few changes make
+SHARED_BYTES = 65_536  # that a reader takes beside a file and its log, at most
 # Errors that a damaged file causes: SQLite quotes bytes of it in messages, which may be no text.
 DAMAGE = (sqlite3.Error, UnicodeError)
 BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
@@ -63,8 +66,11 @@ class Kind:
         The statement that creates each table, whose last column is `checksum`.
     more : tuple of str
         Further statements, such as indexes.
-    missing, rescue, renew : str
-        What to do where there is no such file, where it is damaged, and where it cannot be read.
+    missing, rescue, renew, room : str
+        What to do where there is no such file, where it is damaged, where it cannot be read, and
+        where its disk is full.
+    reserve : int
+        Bytes of a file beside it that are given up on a full disk, so that rows can be removed.
     """
 
     noun: str
@@ -74,6 +80,8 @@ class Kind:
     missing: str = ""
     rescue: str = ""
     renew: str = ""
+    room: str = "free some space"
+    reserve: int = 0
 
     @property
     def a_noun(self) -> str:
@@ -217,23 +225,75 @@ def require_format(kind: Kind, path: Path, database: sqlite3.Connection) -> None
 
 
 @contextmanager
-def writing(kind: Kind, path: Path) -> Iterator[sqlite3.Connection]:
+def writing(kind: Kind, path: Path, *, frees: bool = False) -> Iterator[sqlite3.Connection]:
     """Open a file to change it. At the end of the block all changes are committed, or none.
 
     Raise StoreError if the file is not of this kind and format, another process is writing, or the
-    disk is full.
+    disk is full. A change that `frees` space has the reserve for its log.
     """
     require_file(kind, path)
-    with explained(kind, path), closing(connect(path, "mode=rw")) as database:
-        require_format(kind, path, database)
-        database.execute(WRITE_AHEAD)
-        database.execute("PRAGMA synchronous = FULL")
-        database.execute(f"PRAGMA cache_size = -{CACHED}")
-        # The lock of SQLite: the system takes it from a process that dies.
-        database.execute("BEGIN IMMEDIATE")
-        yield database
-        if database.in_transaction:  # if the block raises before, closing rolls back
-            database.execute("COMMIT")
+    reserve = _beside(path, "reserve")
+    if frees:
+        with suppress(OSError):  # SQLite will say what does not allow it
+            reserve.unlink()
+    try:
+        with explained(kind, path), closing(connect(path, "mode=rw")) as database:
+            require_format(kind, path, database)
+            database.execute(WRITE_AHEAD)
+            database.execute("PRAGMA synchronous = FULL")
+            database.execute(f"PRAGMA cache_size = -{CACHED}")
+            database.execute("PRAGMA temp_store = MEMORY")  # the disk of /tmp may be full, too
+            database.execute(f"PRAGMA journal_size_limit = {LONG_LOG // 2}")
+            if not frees:
+                _shorten_log(path, database)  # if the file cannot grow, its log must not either
+                database.execute(f"PRAGMA max_page_count = {_most_pages(path, database)}")
+            # The lock of SQLite: the system takes it from a process that dies.
+            database.execute("BEGIN IMMEDIATE")
+            yield database
+            if database.in_transaction:  # if the block raises before, closing rolls back
+                database.execute("COMMIT")
+    finally:
+        if _size(reserve) < kind.reserve:
+            with suppress(OSError):  # what fits
+                # Random bytes: no file system can make them smaller.
+                reserve.write_bytes(os.urandom(kind.reserve))
+
+
+def _beside(path: Path, what: str) -> Path:
+    return path.with_name(f"{path.name}-{what}")
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
+
+
+def is_log_long(path: Path) -> bool:
+    """Return whether the log of a file should be moved into the file."""
+    return _size(_beside(path, "wal")) > LONG_LOG
+
+
+def _shorten_log(path: Path, database: sqlite3.Connection) -> None:
+    """Move a long log into the file, as far as readers allow; the next writer begins it anew."""
+    if is_log_long(path):
+        database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+
+
+def _most_pages(path: Path, database: sqlite3.Connection) -> int:
+    """Return how many pages a file can have with its log beside it.
+
+    SQLite commits if the log fits; one that does not fit into the file then would stay for ever.
+    """
+    (n_pages,) = database.execute("PRAGMA page_count").fetchone()
+    room = disk_usage(path.parent).free - LONG_LOG  # for pages that change
+    # Each new page is in the log and in the file.
+    most = (room + path.stat().st_size + PAGE * n_pages) // 2
+    with suppress(ImportError):  # Windows has no limit of files
+        import resource  # noqa: PLC0415
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+        if limit != resource.RLIM_INFINITY:
+            most = min(most, limit)
+    return most // PAGE
 
 
 def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
@@ -254,13 +314,19 @@ def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
         try:
             with closed_on_error(database):
                 database.execute("SELECT count(*) FROM sqlite_master")
-        except sqlite3.OperationalError:
+        except sqlite3.OperationalError as err:
             if os.access(path.parent, os.W_OK):
-                raise
+                # On a full disk SQLite gets the memory that readers share from the reserve.
+                reserve = _beside(path, "reserve")
+                left = _size(reserve) - SHARED_BYTES
+                if _code(err) not in NO_SPACE or left < 0:
+                    raise
+                os.truncate(reserve, left)
+                return open_to_read(kind, path)
             # SQLite cannot make the files of its log beside a read-only database, which nobody
             # changes then.
-            log = path.with_name(f"{path.name}-wal")
-            if log.exists() and log.stat().st_size:
+            log = _beside(path, "wal")
+            if _size(log):
                 raise StoreError(
                     f"{path.parent} must be writable to be read as long as {log.name} holds changes. "
                     "Read it once with the right to write, or copy it to a writable folder."
@@ -268,6 +334,8 @@ def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
             database = connect(path, "mode=ro&immutable=1")
         with closed_on_error(database):
             require_format(kind, path, database)
+            with suppress(sqlite3.OperationalError):  # without space it stays as it is
+                _shorten_log(path, database)
             database.execute("PRAGMA query_only = ON")
             database.execute(f"PRAGMA cache_size = -{CACHED}")
             database.execute(f"PRAGMA mmap_size = {MAPPED}")
@@ -300,7 +368,7 @@ def explained(kind: Kind, path: Path) -> Iterator[None]:
     try:
         yield
     except DAMAGE as err:
-        code = getattr(err, "sqlite_errorcode", 0) & 0xFF  # the extended code has more bits
+        code = _code(err)
         if code in BUSY:
             text = (
                 f"{kind.noun} has one writer at a time; another process has held {path} for more "
@@ -308,8 +376,8 @@ def explained(kind: Kind, path: Path) -> Iterator[None]:
             )
         elif code in NO_SPACE:
             text = (
-                f"{kind.noun} needs space on its disk; {path.parent}: {err}. Nothing was changed: free "
-                "some space and repeat the call."
+                f"{kind.noun} needs space on its disk; {path.parent}: {err}. Nothing was changed: "
+                f"{kind.room} and repeat the call."
             )
         elif code in NOT_WRITABLE:
             text = (
@@ -320,6 +388,10 @@ def explained(kind: Kind, path: Path) -> Iterator[None]:
             renew = kind.renew[0].upper() + kind.renew[1:]
             text = f"{path} must be a readable {kind.a_noun.split(' ', 1)[1]}; {err}. {renew}."
         raise StoreError(text) from err
+
+
+def _code(err: Exception) -> int:
+    return getattr(err, "sqlite_errorcode", 0) & 0xFF  # the extended code has more bits
 
 
 def read_rows(

@@ -69,7 +69,8 @@ def test_names_of_all_kinds_are_kept_and_are_never_paths(index, tmp_path):
     for name in NAMES:
         other.remove(name)
     assert len(other) == 0
-    assert {path.name for path in index.folder.iterdir()} == {"index.sqlite", "changes.txt"}
+    files = {"index.sqlite", "index.sqlite-reserve", "changes.txt"}
+    assert {path.name for path in index.folder.iterdir()} == files
     assert {path.name for path in tmp_path.iterdir()} == {"index", "out", "other"}
 
 

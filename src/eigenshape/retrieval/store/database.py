@@ -62,6 +62,8 @@ INDEX = _sealed.Kind(
     missing="Create one with ShapeIndex.create, or with `eigenshape index add` on the command line.",
     rescue="Merge the index into a new one to keep what is whole.",
     renew="index the shapes again",
+    room="free some space (remove a few shapes at a time, then compact)",
+    reserve=2**20,  # a shape takes 200 KB of the log to be removed, and ten take 1 MB
 )
 TABLES = tuple(INDEX.tables)
 PRIME, FACTOR = (
@@ -130,14 +132,14 @@ def _not_empty(folder: Path) -> StoreError:
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[sqlite3.Connection]:
+def writing(folder: Path, *, frees: bool = False) -> Iterator[sqlite3.Connection]:
     """Open an index to change it. At the end of the block all changes are committed, or none.
 
     Raise StoreError if the folder is not an index of this format, changes were lost, another
     process is writing, or the disk is full.
     """
     path = folder / DATABASE
-    with _sealed.writing(INDEX, path) as database:
+    with _sealed.writing(INDEX, path, frees=frees) as database:
         before = _sealed.read_seals(INDEX, path, database)
         for lost in lost_changes(committed_changes(folder), before):
             raise StoreError(
