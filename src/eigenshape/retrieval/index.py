@@ -438,12 +438,7 @@ class ShapeIndex:
         with writing(self.folder, frees=True) as database:
             writer = Writer(self.folder, database)
             for name in names:
-                facts = writer.find(name)
-                if facts is None:
-                    raise StoreError(
-                        f"A shape must be in the index to be removed; {name!r} is not."
-                    )
-                writer.delete(facts)
+                writer.remove(name)
 
     def query(
         self,

@@ -202,9 +202,9 @@ class IndexReader:
         else:
             recipe = choose_recipe(list(state.recipes.values()))
             descriptor = describe(as_mesh(shape, "shape"), recipe)
-        return self._search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
+        return self.search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
 
-    def _search(  # noqa: PLR0913 - the choices of a query, each of which has a default
+    def search(  # noqa: PLR0913 - the choices of a query, each of which has a default
         self,
         state: IndexState,
         descriptor: Descriptor,
@@ -231,6 +231,10 @@ class IndexReader:
         is_scaled : bool
             Whether scores are scaled by how isolated each shape is; otherwise they depend on the two
             shapes alone.
+
+        Returns
+        -------
+        Matches
         """
         while True:  # again without what turns out to be damaged
             try:

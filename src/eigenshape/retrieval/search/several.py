@@ -140,7 +140,7 @@ def _ask(
     # One of several indexes need not have each attribute.
     state = reader.state
     chosen = choose_shapes(state, where, must_know=False)
-    return reader._search(state, descriptor, n_matches, chosen, exact=exact)
+    return reader.search(state, descriptor, n_matches, chosen, exact=exact)
 
 
 def _open_reader(folder: Path) -> IndexReader:
