@@ -10,7 +10,7 @@ import sys
 import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
@@ -22,6 +22,7 @@ from test_server import GOOD, HOSTILE, Server, ply_of
 
 import eigenshape as es
 from eigenshape.retrieval.store import database as store
+from eigenshape.retrieval.store.state import MissingShapeError
 from eigenshape_studio.service.openapi import openapi
 from eigenshape_studio.service.server import serve
 from eigenshape_studio.service.shelf import ShelfReader
@@ -606,11 +607,9 @@ def test_an_answer_is_of_one_state(tmp_path):
             (found,) = shelf.query(described[0], 1).found
             label = "a" if found.score < 1e-6 else "b"
             assert (found.shape.label, found.shape.tags) == (label, (label,))
-            try:
+            with suppress(MissingShapeError):  # replaced by now
                 assert shelf.thumbnail("x", found.shape.id) == label.encode()
                 n_pictures += 1
-            except es.StoreError as err:
-                assert "must be in the index to be shown; 'x' is not" in str(err)
         done.result()
     assert n_pictures > 0
 

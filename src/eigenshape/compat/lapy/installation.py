@@ -6,7 +6,6 @@ from threading import RLock
 from eigenshape._errors import MissingExtraError
 from eigenshape.compat.lapy.solver import Solver
 
-
 LOCK = RLock()  # one thread at a time puts a class in the place of another
 
 

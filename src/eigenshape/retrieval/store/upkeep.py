@@ -133,8 +133,8 @@ def merge_indexes(folder: Path, others: Sequence[Path], *, replace: bool = False
     n_added, damages = 0, list[Damage]()
     with writing(folder) as database:
         writer = Writer(folder, database)
-        for other in others:
-            if other.resolve() == folder.resolve():
+        for other in dict.fromkeys(path.resolve() for path in others):  # each once
+            if other == folder.resolve():
                 raise StoreError(
                     f"An index is merged with others; {folder} is this one. Leave it out."
                 )
@@ -158,8 +158,14 @@ def export_index(state: IndexState, records: Sequence[Record], folder: Path) -> 
 
     Raise StoreError if the folder holds anything, or something that is exported is damaged.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    if any(folder.iterdir()):
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        is_empty = not any(folder.iterdir())
+    except OSError as err:
+        raise StoreError(
+            f"An export needs a folder; {folder} cannot be made: {err.strerror}. Choose another folder."
+        ) from err
+    if not is_empty:
         raise StoreError(
             f"{folder} must be empty to export into; it is not. Choose another folder."
         )
