@@ -31,6 +31,7 @@ LONGEST = 0.15  # seconds in which a process takes all of its steps, about
 LOST = "changes that were committed are lost"
 SHARED = "index.sqlite-shm"  # made anew by whoever opens the database first
 FILES = ("index.sqlite", "index.sqlite-wal", SHARED, "changes.txt")
+RESERVE = "index.sqlite-reserve"  # whose bytes nobody reads
 LONG = " " + 20 * "n"  # of names, so that the tables have some pages
 
 

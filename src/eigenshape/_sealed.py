@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import disk_usage
 from typing import Any, NamedTuple
 from zlib import crc32
 
@@ -28,6 +29,8 @@ PAGE = 16_384  # bytes
 MAPPED = 2**31 - 65_536  # bytes that SQLite maps of a file, at most; a mapped page is not copied
 CACHED = 16_000  # KB of pages that a connection keeps, so that inner pages are read once
 LONGEST_WAIT = 5.0  # seconds for another writer to end; a change takes milliseconds
+LONG_LOG = 2**19  # bytes of the log, which a few changes make
+SHARED_BYTES = 65_536  # that a reader takes beside a file and its log, at most
 # Errors that a damaged file causes: SQLite quotes bytes of it in messages, which may be no text.
 DAMAGE = (sqlite3.Error, UnicodeError)
 BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
@@ -69,8 +72,11 @@ class Kind:
         The statement that creates each table, whose last column is `checksum`.
     more : tuple of str
         Further statements, such as indexes.
-    missing, rescue, renew : str
-        What to do where there is no such file, where it is damaged, and where it cannot be read.
+    missing, rescue, renew, room : str
+        What to do where there is no such file, where it is damaged, where it cannot be read, and
+        where its disk is full.
+    reserve : int
+        Bytes of a file beside it that are given up on a full disk, so that rows can be removed.
     changes : str
         Name of a file beside it that holds the number of its changes; empty for none.
     """
@@ -82,6 +88,8 @@ class Kind:
     missing: str = ""
     rescue: str = ""
     renew: str = ""
+    room: str = "free some space"
+    reserve: int = 0
     changes: str = CHANGES
 
     @property
@@ -310,31 +318,83 @@ def require_format(kind: Kind, path: Path, database: sqlite3.Connection) -> None
 
 
 @contextmanager
-def writing(kind: Kind, path: Path) -> Iterator[sqlite3.Connection]:
+def writing(kind: Kind, path: Path, *, frees: bool = False) -> Iterator[sqlite3.Connection]:
     """Open a file to change it. At the end of the block all changes are committed, or none.
 
     Raise StoreError if the file is not of this kind and format, changes were lost, another process
-    is writing, or the disk is full.
+    is writing, or the disk is full. A change that `frees` space has the reserve for its log.
     """
     require_file(kind, path)
-    with explained(kind, path), closing(connect(path, "mode=rw")) as database:
-        require_format(kind, path, database)
-        database.execute(WRITE_AHEAD)
-        database.execute("PRAGMA synchronous = FULL")
-        database.execute(f"PRAGMA cache_size = -{CACHED}")
-        # The lock of SQLite: the system takes it from a process that dies.
-        database.execute("BEGIN IMMEDIATE")
-        before = read_seals(kind, path, database)
-        require_changes(kind, path, "changed", committed_changes(kind, path), before)
-        remove_leftovers(path.parent, path.name)  # of a process that died in `create`
-        yield database
-        now = n_changes(read_seals(kind, path, database))
-        if database.in_transaction:  # if the block raises before, closing rolls back
-            database.execute("COMMIT")
-    if kind.changes and now != n_changes(before):
-        # Not forced to disk: if power fails, a number that is too low misses a lost log at worst.
-        with suppress(OSError):
-            path.with_name(kind.changes).write_text(f"{now}\n")
+    reserve = _beside(path, "reserve")
+    if frees:
+        with suppress(OSError):  # SQLite will say what does not allow it
+            reserve.unlink()
+    try:
+        with explained(kind, path), closing(connect(path, "mode=rw")) as database:
+            require_format(kind, path, database)
+            database.execute(WRITE_AHEAD)
+            database.execute("PRAGMA synchronous = FULL")
+            database.execute(f"PRAGMA cache_size = -{CACHED}")
+            database.execute("PRAGMA temp_store = MEMORY")  # the disk of /tmp may be full, too
+            database.execute(f"PRAGMA journal_size_limit = {LONG_LOG // 2}")
+            if not frees:
+                _shorten_log(path, database)  # if the file cannot grow, its log must not either
+                database.execute(f"PRAGMA max_page_count = {_most_pages(path, database)}")
+            # The lock of SQLite: the system takes it from a process that dies.
+            database.execute("BEGIN IMMEDIATE")
+            before = read_seals(kind, path, database)
+            require_changes(kind, path, "changed", committed_changes(kind, path), before)
+            remove_leftovers(path.parent, path.name)  # of a process that died in `create`
+            yield database
+            now = n_changes(read_seals(kind, path, database))
+            if database.in_transaction:  # if the block raises before, closing rolls back
+                database.execute("COMMIT")
+        if kind.changes and now != n_changes(before):
+            # Not forced to disk: if power fails, a number that is too low misses a lost log at worst.
+            with suppress(OSError):
+                path.with_name(kind.changes).write_text(f"{now}\n")
+    finally:
+        if _size(reserve) < kind.reserve:
+            with suppress(OSError):  # what fits
+                # Random bytes: no file system can make them smaller.
+                reserve.write_bytes(os.urandom(kind.reserve))
+
+
+def _beside(path: Path, what: str) -> Path:
+    return path.with_name(f"{path.name}-{what}")
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
+
+
+def is_log_long(path: Path) -> bool:
+    """Return whether the log of a file should be moved into the file."""
+    return _size(_beside(path, "wal")) > LONG_LOG
+
+
+def _shorten_log(path: Path, database: sqlite3.Connection) -> None:
+    """Move a long log into the file, as far as readers allow; the next writer begins it anew."""
+    if is_log_long(path):
+        database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+
+
+def _most_pages(path: Path, database: sqlite3.Connection) -> int:
+    """Return how many pages a file can have with its log beside it.
+
+    SQLite commits if the log fits; one that does not fit into the file then would stay for ever.
+    """
+    (n_pages,) = database.execute("PRAGMA page_count").fetchone()
+    room = disk_usage(path.parent).free - LONG_LOG  # for pages that change
+    # Each new page is in the log and in the file.
+    most = (room + path.stat().st_size + PAGE * n_pages) // 2
+    with suppress(ImportError):  # Windows has no limit of files
+        import resource  # noqa: PLC0415
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+        if limit != resource.RLIM_INFINITY:
+            most = min(most, limit)
+    return most // PAGE
 
 
 def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
@@ -356,15 +416,18 @@ def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
             with closed_on_error(database):
                 database.execute("SELECT count(*) FROM sqlite_master")
         except sqlite3.OperationalError as err:
-            log = path.with_name(f"{path.name}-wal")
-            if err.sqlite_errorcode & 0xFF in NO_SPACE:
-                # A full disk has no room for the file by which processes share the log: this one
-                # reads the log into its memory, and others wait.
+            log, reserve = _beside(path, "wal"), _beside(path, "reserve")
+            if _code(err) in NO_SPACE and _size(reserve) >= SHARED_BYTES:
+                # On a full disk SQLite gets the memory that readers share from the reserve.
+                os.truncate(reserve, _size(reserve) - SHARED_BYTES)
+                return open_to_read(kind, path)
+            if _code(err) in NO_SPACE:
+                # Without that memory, this one reads the log alone, and others wait.
                 database = connect(path, "mode=rw")
                 database.execute("PRAGMA locking_mode = EXCLUSIVE")
             elif os.access(path.parent, os.W_OK):
                 raise
-            elif log.exists() and log.stat().st_size:
+            elif _size(log):
                 raise StoreError(
                     f"{path.parent} must be writable to be read as long as {log.name} holds changes. "
                     "Read it once with the right to write, or copy it to a writable folder."
@@ -375,6 +438,8 @@ def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
                 database = connect(path, "mode=ro&immutable=1")
         with closed_on_error(database):
             require_format(kind, path, database)
+            with suppress(sqlite3.OperationalError):  # without space it stays as it is
+                _shorten_log(path, database)
             database.execute("PRAGMA query_only = ON")
             database.execute(f"PRAGMA cache_size = -{CACHED}")
             database.execute(f"PRAGMA mmap_size = {MAPPED}")
@@ -417,7 +482,7 @@ def explained(kind: Kind, path: Path) -> Iterator[None]:
         yield
     except (*DAMAGE, OSError) as err:
         kind_of_error = StoreError
-        code = getattr(err, "sqlite_errorcode", 0) & 0xFF  # the extended code has more bits
+        code = _code(err)
         is_full = code in NO_SPACE or getattr(err, "errno", 0) in NO_ROOM
         if isinstance(err, OSError) and not is_full:
             raise
@@ -428,8 +493,8 @@ def explained(kind: Kind, path: Path) -> Iterator[None]:
             )
         elif is_full:
             text = (
-                f"{kind.noun} needs space on its disk; {path.parent}: {err}. Nothing was changed: free "
-                "some space and repeat the call."
+                f"{kind.noun} needs space on its disk; {path.parent}: {err}. Nothing was changed: "
+                f"{kind.room} and repeat the call."
             )
         elif code in NOT_WRITABLE:
             text = (
@@ -441,6 +506,10 @@ def explained(kind: Kind, path: Path) -> Iterator[None]:
             renew = kind.renew[0].upper() + kind.renew[1:]
             text = f"{path} must be a readable {kind.a_noun.split(' ', 1)[1]}; {err}. {renew}."
         raise kind_of_error(text) from err
+
+
+def _code(err: Exception) -> int:
+    return getattr(err, "sqlite_errorcode", 0) & 0xFF  # the extended code has more bits
 
 
 def read_rows(

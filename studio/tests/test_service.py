@@ -10,7 +10,7 @@ import sys
 import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
@@ -22,6 +22,7 @@ from test_server import GOOD, HOSTILE, Server, ply_of
 
 import eigenshape as es
 from eigenshape.retrieval.store import database as store
+from eigenshape.retrieval.store.state import MissingShapeError
 from eigenshape_studio.service.openapi import openapi
 from eigenshape_studio.service.server import serve
 from eigenshape_studio.service.shelf import ShelfReader
@@ -549,6 +550,68 @@ def test_shapes_are_added_and_removed_with_a_token_of_its_own(both):
         assert writer.delete("/v1/shapes/zoo%2Ffish").status_code == 404
         assert running.client.get("/health").json()["shapes"] == 1
         assert [record.name for record in index.records()] == ["zoo/bird"]
+
+
+def test_of_two_that_add_one_name_at_once_the_later_is_refused(both):
+    _, running, _ = both
+    headers = {"authorization": f"Bearer {WRITE_TOKEN}", "content-type": "application/octet-stream"}
+
+    def answers_of(request):
+        with ThreadPoolExecutor(3) as threads:
+            return list(threads.map(lambda _: request(), range(3)))
+
+    def add():
+        parameters = {"name": "twice", "file": "scan.ply"}
+        return httpx.post(
+            f"{running.base}/v1/shapes",
+            params=parameters,
+            content=scan_of("fish"),
+            headers=headers,
+            timeout=300,
+        )
+
+    def remove():
+        return httpx.delete(f"{running.base}/v1/shapes/twice", headers=headers, timeout=300)
+
+    answers = answers_of(add)
+    assert sorted(answer.status_code for answer in answers) == [201, 409, 409]
+    refusals = {answer.text for answer in answers if answer.status_code == 409}
+    assert refusals == {'{"error":"The index has a shape \'twice\'; replace=1 replaces it."}'}
+    assert sorted(answer.status_code for answer in answers_of(remove)) == [200, 404, 404]
+    freed = httpx.post(f"{running.base}/v1/compact", headers=headers, timeout=300)
+    assert freed.json()["bytes"] > 0
+    headers["authorization"] = f"Bearer {TOKEN}"
+    assert httpx.post(f"{running.base}/v1/compact", headers=headers).status_code == 403
+
+
+def test_an_answer_is_of_one_state(tmp_path):
+    """Both shapes that one name stands for in turn are told by score, label, number and picture."""
+    recipe = es.retrieval.HeatRecipe(name="test", scales=(1.0, 2.0), n_features=2, n_shifts=0)
+    rows = np.random.default_rng(0).random((2, 2, 2))
+    described = [es.retrieval.HeatDescriptor(each, np.arange(2), recipe) for each in rows]
+    index = es.ShapeIndex.create(tmp_path / "index")
+    shelf = ShelfReader(index.folder)
+
+    def replace(turn):
+        label = "ab"[turn % 2]
+        facts = {"label": label, "tags": [label], "thumbnail": label.encode(), "digest": label}
+        shape = es.retrieval.DescribedShape("x", [described[turn % 2]], **facts)
+        added = shelf.add(shape, replace=True)
+        assert (added.label, added.tags) == (label, (label,))
+
+    replace(0)
+    n_pictures = 0
+    with ThreadPoolExecutor(2) as threads:
+        done = threads.submit(lambda: [replace(turn) for turn in range(1, 60)])
+        while not done.done():
+            (found,) = shelf.query(described[0], 1).found
+            label = "a" if found.score < 1e-6 else "b"
+            assert (found.shape.label, found.shape.tags) == (label, (label,))
+            with suppress(MissingShapeError):  # replaced by now
+                assert shelf.thumbnail("x", found.shape.id) == label.encode()
+                n_pictures += 1
+        done.result()
+    assert n_pictures > 0
 
 
 def test_a_change_that_cannot_be_written_says_so(both):

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from types import ModuleType
 
 import lapy
@@ -19,7 +20,8 @@ THEIRS = lapy.Solver
 @pytest.fixture(autouse=True)
 def _theirs_again() -> Iterator[None]:
     yield
-    uninstall()
+    while lapy.Solver is not THEIRS:
+        uninstall()
 
 
 def mesh() -> lapy.TriaMesh:
@@ -45,13 +47,39 @@ def test_every_place_gets_ours_and_theirs_again(monkeypatch):
     assert es.compat.lapy.Solver is Solver
 
 
-def test_twice_is_once():
+def test_ours_stays_until_each_call_is_undone():
     install()
     install()
     uninstall()
-    assert lapy.Solver is THEIRS
+    assert issubclass(lapy.Solver, Solver)
     uninstall()
     assert lapy.Solver is THEIRS
+    uninstall()  # one too many changes nothing
+    install()
+    assert issubclass(lapy.Solver, Solver)
+    uninstall()
+    assert lapy.Solver is THEIRS
+
+
+def test_many_threads_put_ours_in_place_and_theirs_back():
+    class Child(lapy.Solver):
+        pass
+
+    def use(_):
+        install()
+        found = lapy.Solver, lapy.shapedna.Solver, Child.__mro__[1]
+        uninstall()
+        return found
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(8) as threads:
+            found = list(threads.map(use, range(200)))
+    finally:
+        sys.setswitchinterval(before)
+    assert all(issubclass(each, Solver) for classes in found for each in classes)
+    assert lapy.Solver is lapy.shapedna.Solver is Child.__mro__[1] is THEIRS
 
 
 def test_what_inherits_from_theirs_inherits_from_ours():

@@ -79,7 +79,7 @@ def find_duplicates(
             if progress is not None:
                 progress(number / len(places), name)
             search = partial(
-                reader._search,
+                reader.search,
                 reader.state,
                 snapshot.descriptor(int(place)),
                 left_out=facts.id,

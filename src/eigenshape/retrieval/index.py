@@ -423,7 +423,7 @@ class ShapeIndex:
         """Remove shapes, all in one step.
 
         Their space in the file serves shapes that are added later, or is given back by `compact`.
-        Readers find them until they are refreshed.
+        Readers find them until they are refreshed. On a full disk, remove about ten at a time.
 
         Parameters
         ----------
@@ -432,17 +432,13 @@ class ShapeIndex:
         Raises
         ------
         StoreError
-            If there is no shape of a name, or another process is writing.
+            If there is no shape of a name, another process is writing, or the disk is full and
+            these are too many at once.
         """
-        with writing(self.folder) as database:
+        with writing(self.folder, frees=True) as database:
             writer = Writer(self.folder, database)
             for name in names:
-                facts = writer.find(name)
-                if facts is None:
-                    raise StoreError(
-                        f"A shape must be in the index to be removed; {name!r} is not."
-                    )
-                writer.delete(facts)
+                writer.remove(name)
 
     def query(
         self,
@@ -586,7 +582,8 @@ class ShapeIndex:
         """Give the space of removed shapes back.
 
         The last pages of the file take the place of free ones, so it costs as much as was removed,
-        and not as the index holds. The file becomes shorter when no reader holds an older state.
+        and not as the index holds. The file becomes shorter when no reader holds an older state. It
+        goes on in steps, so that it works on a full disk, too.
 
         Returns
         -------

@@ -1,6 +1,8 @@
 """Tetrahedra inside surfaces, whose triangles stay as they are."""
 
+import os
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -130,6 +132,25 @@ def test_tetrahedra_that_do_not_fill_the_surface_are_refused(monkeypatch, netgen
     solid = tetrahedralize(BALL)
     assert module._is_bounded_by(solid, BALL)
     assert not module._is_bounded_by(solid, shell)
+
+
+def test_nothing_comes_out_of_standard_output(monkeypatch, netgen, capfd):
+    class Talkative(netgen.Mesh):
+        def GenerateVolumeMesh(self, **options):  # noqa: N802
+            netgen.SetMessageImportance(5)
+            try:
+                super().GenerateVolumeMesh(**options)
+            finally:
+                netgen.SetMessageImportance(0)
+
+    monkeypatch.setattr(netgen, "Mesh", Talkative)
+    n_files = len(list(Path("/dev/fd").iterdir()))
+    tetrahedralize(BALL)
+    os.write(1, b"ours")
+    found = capfd.readouterr()
+    assert found.out == "ours"
+    assert "Delaunay meshing" in found.err
+    assert len(list(Path("/dev/fd").iterdir())) == n_files
 
 
 @pytest.mark.usefixtures("netgen")

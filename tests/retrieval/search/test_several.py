@@ -115,6 +115,29 @@ def test_workers_and_filters(whole, parts, queries):
     assert facts(found) == facts(whole.query(query, where={"label": "class1"}))
 
 
+def test_an_index_stands_for_its_folder(queries, parts):
+    (query, *_) = queries
+    indexes = [es.ShapeIndex.open(folder) for folder in parts]
+    expected = es.retrieval.query_indexes(query, parts)
+    assert facts(es.retrieval.query_indexes(query, indexes)) == facts(expected)
+
+
+def test_what_is_no_list_of_different_indexes_is_named(queries, parts):
+    (query, *_) = queries
+    index = es.ShapeIndex.open(parts[0])
+    for given in (index, 3):
+        with pytest.raises(es.InvalidParameterError, match=r"takes a list.*Put it into a list"):
+            es.retrieval.query_indexes(query, given)
+    for again in (parts[0], str(parts[0]), parts[0] / ".." / parts[0].name, index):
+        with pytest.raises(
+            es.InvalidParameterError,
+            match=r"folders must differ, .*; folders\[2\] is .*part0, as folders\[0\]",
+        ):
+            es.retrieval.query_indexes(query, [*parts[:2], again])
+    with pytest.raises(es.InvalidParameterError, match=r"folders\[1\] must be a str or"):
+        es.retrieval.query_indexes(query, [parts[0], None])
+
+
 def test_what_is_added_or_made_anew_is_seen(shapes, queries, tmp_path):
     (query, *_) = queries
     folders = [tmp_path / "one", tmp_path / "two"]

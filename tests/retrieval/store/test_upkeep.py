@@ -69,7 +69,8 @@ def test_names_of_all_kinds_are_kept_and_are_never_paths(index, tmp_path):
     for name in NAMES:
         other.remove(name)
     assert len(other) == 0
-    assert {path.name for path in index.folder.iterdir()} == {"index.sqlite", "changes.txt"}
+    files = {"index.sqlite", "index.sqlite-reserve", "changes.txt"}
+    assert {path.name for path in index.folder.iterdir()} == files
     assert {path.name for path in tmp_path.iterdir()} == {"index", "out", "other"}
 
 
@@ -107,6 +108,9 @@ def test_parts_merged_answer_as_one_build(tmp_path):
     merged = es.ShapeIndex.create(tmp_path / "merged")
     assert merged.merge(parts) == 30
     assert merged.merge(parts) == 0  # with the same digests
+    twice = es.ShapeIndex.create(tmp_path / "twice")
+    keep(twice, "x", [descriptor(0)])
+    assert es.ShapeIndex.create(tmp_path / "once").merge([twice, twice]) == 1
     assert merged.records() == whole.records()
     for seed in range(0, 30, 7):
         one, other = (index.query(descriptor(seed), n_matches=30) for index in (merged, whole))
@@ -125,6 +129,10 @@ def test_what_cannot_be_merged(index, tmp_path):
     fill(index, range(3))
     with pytest.raises(es.StoreError, match=r"An index is merged with others; .* is this one"):
         index.merge([index])
+    nameless = es.ShapeIndex.create(tmp_path / "nameless")
+    keep(nameless, "s1", [descriptor(9)])
+    with pytest.raises(es.StoreError, match=r"'s1' is in the index already\. Remove it first"):
+        index.merge([nameless])
     other = es.ShapeIndex.create(tmp_path / "other")
     keep(other, "s1", [descriptor(9)], digest="else")
     with pytest.raises(
@@ -173,6 +181,9 @@ def test_export_writes_what_numpy_and_json_read(index, tmp_path):
         index.export(tmp_path / "one")
     with pytest.raises(es.StoreError, match="must be in the index to be exported; 'x' is not"):
         index.export(tmp_path / "two", ["x"])
+    for place in ("records.json", "records.json/below"):
+        with pytest.raises(es.StoreError, match=r"An export needs a folder; .* cannot be made: "):
+            index.export(tmp_path / "one" / place)
 
 
 def test_all_that_is_known_of_a_shape_is_changed_and_nothing_else(index):

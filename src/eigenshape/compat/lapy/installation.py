@@ -1,9 +1,12 @@
 """Our solver in LaPy's place, and LaPy's own again."""
 
 import sys
+from threading import RLock
 
 from eigenshape._errors import MissingExtraError
 from eigenshape.compat.lapy.solver import Solver
+
+LOCK = RLock()  # one thread at a time puts a class in the place of another
 
 
 class InstalledSolver(Solver):
@@ -13,6 +16,7 @@ class InstalledSolver(Solver):
     """
 
     theirs: type | None = None  # LaPy's class while ours stands in its place
+    n_installed: int = 0  # calls of `install` that are not undone
 
 
 def install() -> None:
@@ -21,8 +25,8 @@ def install() -> None:
     It is replaced in LaPy and in every module that has imported it already (lapy.shapedna,
     lapy.heat, lapy.diffgeo, brainprint, neuromodes, ...), and as the base of classes that inherit
     from it (neuromodes.EigenSolver). Modules that are imported later find ours in LaPy. A solver
-    that exists already stays LaPy's. A second call changes nothing. Processes that are started later
-    need a call of their own.
+    that exists already stays LaPy's. Any thread may call this; ours stays until `uninstall` was
+    called as often. Processes that are started later need a call of their own.
 
     Raises
     ------
@@ -50,13 +54,15 @@ def install() -> None:
         raise MissingExtraError(
             "A solver in the place of LaPy's needs LaPy; it is not installed. Run pip install lapy."
         ) from err
-    if InstalledSolver.theirs is None:
-        InstalledSolver.theirs = lapy.Solver
-        _replace(lapy.Solver, InstalledSolver)
+    with LOCK:
+        if InstalledSolver.theirs is None:
+            InstalledSolver.theirs = lapy.Solver
+            _replace(lapy.Solver, InstalledSolver)
+        InstalledSolver.n_installed += 1
 
 
 def uninstall() -> None:
-    """Put LaPy's own `Solver` back into its place, everywhere.
+    """Undo one `install`; the last one puts LaPy's own `Solver` back into its place, everywhere.
 
     Solvers that exist already stay ours. Without an earlier `install` nothing happens.
 
@@ -69,9 +75,11 @@ def uninstall() -> None:
     >>> import eigenshape as es
     >>> es.compat.lapy.uninstall()
     """
-    if InstalledSolver.theirs is not None:
-        _replace(InstalledSolver, InstalledSolver.theirs)
-        InstalledSolver.theirs = None
+    with LOCK:
+        InstalledSolver.n_installed = max(InstalledSolver.n_installed - 1, 0)
+        if InstalledSolver.theirs is not None and not InstalledSolver.n_installed:
+            _replace(InstalledSolver, InstalledSolver.theirs)
+            InstalledSolver.theirs = None
 
 
 def _replace(old: type, new: type) -> None:

@@ -1,5 +1,9 @@
 """Tetrahedra inside a closed surface."""
 
+import ctypes
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from threading import Lock
 
 import numpy as np
@@ -101,7 +105,7 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
     netgen = import_extra("netgen.meshing", "'eigenshape[tetrahedralize]'")
     points, scale = size_one(surface.vertices)
     center = points.mean(axis=0)
-    with ONE_MESHER:
+    with ONE_MESHER, _output_among_errors():
         solid = netgen.Mesh(dim=3)
         solid.AddPoints(np.ascontiguousarray(points - center))
         side = solid.Add(netgen.FaceDescriptor(surfnr=1, domin=1, domout=0, bc=1))
@@ -125,6 +129,30 @@ def tetrahedralize(mesh: MeshLike, side_length: float | None = None) -> Simplici
         f"Tetrahedra must fill what the surface encloses, {volume:g}, and nothing else; "
         f"Netgen filled {filled:g}. No repair here moves vertices; smooth or remesh it where it was made."
     )
+
+
+@contextmanager
+def _output_among_errors() -> Iterator[None]:
+    """Let what Netgen prints come out of the standard error, so that a program's output is its own.
+
+    The descriptor is that of the process: what other threads print meanwhile comes out there, too,
+    and nothing is lost.
+    """
+    try:
+        output = os.dup(1)
+        os.fstat(2)
+    except OSError:  # a process without one of them
+        yield
+        return
+    library = ctypes.CDLL(None) if os.name == "posix" else ctypes.cdll.msvcrt
+    try:
+        library.fflush(None)  # what was printed before
+        os.dup2(2, 1)
+        yield
+    finally:
+        library.fflush(None)
+        os.dup2(output, 1)
+        os.close(output)
 
 
 def _require_closed(mesh: TriangleMesh, pieces: Pieces) -> None:

@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from eigenshape._arguments import describe_value, require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape._sealed import is_log_long
 from eigenshape._text import html_repr
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -29,6 +30,7 @@ from eigenshape.retrieval.search.engines import Engine, supply_from
 from eigenshape.retrieval.search.matches import Matches
 from eigenshape.retrieval.search.scoring import search_candidates
 from eigenshape.retrieval.store.damage import warn_of_damage
+from eigenshape.retrieval.store.database import DATABASE
 from eigenshape.retrieval.store.filters import choose_shapes
 from eigenshape.retrieval.store.state import DamagedEntryError, IndexState, Snapshot, read_state
 
@@ -120,13 +122,16 @@ class IndexReader:
         """
         with self._lock:
             before = self.state
-            now = read_state(before.folder, before)
+            folder, damages, seals = before.folder, before.damages, before.seals
+            now = self._state = read_state(folder, before)
             now.descriptors  # noqa: B018 - read now, so that damage is named here
-            self._state = now
-        warn_of_damage(
-            str(now.folder), [each for each in now.damages if each not in before.damages]
-        )
-        return now.seals != before.seals
+            if is_log_long(folder / DATABASE):
+                # Whoever holds the latest state lets the log move into the file, and whoever reads
+                # that state from the file lets the next writer begin the log anew.
+                del before
+                now = self._state = read_state(folder, now)
+        warn_of_damage(str(folder), [each for each in now.damages if each not in damages])
+        return now.seals != seals
 
     def snapshot(self, recipe: AnyRecipe) -> Snapshot:
         """Return all descriptors by a recipe, as arrays.
@@ -197,9 +202,9 @@ class IndexReader:
         else:
             recipe = choose_recipe(list(state.recipes.values()))
             descriptor = describe(as_mesh(shape, "shape"), recipe)
-        return self._search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
+        return self.search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
 
-    def _search(  # noqa: PLR0913 - the choices of a query, each of which has a default
+    def search(  # noqa: PLR0913 - the choices of a query, each of which has a default
         self,
         state: IndexState,
         descriptor: Descriptor,
@@ -226,6 +231,10 @@ class IndexReader:
         is_scaled : bool
             Whether scores are scaled by how isolated each shape is; otherwise they depend on the two
             shapes alone.
+
+        Returns
+        -------
+        Matches
         """
         while True:  # again without what turns out to be damaged
             try:

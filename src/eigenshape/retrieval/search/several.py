@@ -1,18 +1,19 @@
 """One answer from several indexes: parts of a collection that is too large for one machine."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import lru_cache, partial
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
+from eigenshape._files import as_path
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import Descriptor, describe
@@ -23,12 +24,20 @@ from eigenshape.retrieval.search.reader import IndexReader
 from eigenshape.retrieval.store.database import DATABASE
 from eigenshape.retrieval.store.filters import choose_shapes
 
+
+class _Index(Protocol):
+    """A `ShapeIndex`, which stands for its folder."""
+
+    @property
+    def folder(self) -> Path: ...
+
+
 MOST_OPEN = 256  # readers that a process keeps open between queries
 
 
 def query_indexes(
     shape: MeshLike | Descriptor,
-    folders: Sequence[str | PathLike[str]],
+    folders: Sequence[str | PathLike[str] | _Index],
     *,
     n_matches: Integer = 5,
     where: Mapping[str, Any] | None = None,
@@ -48,8 +57,8 @@ def query_indexes(
     ----------
     shape : MeshLike, HeatDescriptor or PatchDescriptor
         As of `ShapeIndex.query`. A mesh is described once, by the recipe of the first index.
-    folders : sequence of path
-        Indexes with the same recipe, as from ``eigenshape index add --part``.
+    folders : sequence of path or ShapeIndex
+        Different indexes with the same recipe, as from ``eigenshape index add --part``.
     n_matches : int
         Matches to return.
     where : mapping, optional
@@ -90,13 +99,20 @@ def query_indexes(
     """
     require_type(executor, Executor | None, "executor")
     wanted = whole_number(n_matches, "n_matches", 1, 2**30)
-    if isinstance(folders, str | PathLike):
+    if isinstance(folders, str | PathLike) or not isinstance(folders, Iterable):
         raise InvalidParameterError(
-            f"folders takes a list of indexes; it was given one: {fspath(folders)!r}."
+            f"folders takes a list of indexes; it was given one: {str(folders)!r}. Put it into a list."
         )
-    paths = [Path(folder).resolve() for folder in folders]
+    named = [getattr(folder, "folder", folder) for folder in folders]
+    paths = [as_path(folder, f"folders[{number}]").resolve() for number, folder in enumerate(named)]
     if not paths:
         raise InvalidParameterError("folders must name at least one index; it is empty.")
+    for number, path in enumerate(paths):
+        if path in paths[:number]:
+            raise InvalidParameterError(
+                f"folders must differ, or each match would come twice; folders[{number}] is {path}, "
+                f"as folders[{paths.index(path)}] is. Leave it out."
+            )
     if isinstance(shape, Descriptor):
         descriptor = shape
     else:
@@ -140,7 +156,7 @@ def _ask(
     # One of several indexes need not have each attribute.
     state = reader.state
     chosen = choose_shapes(state, where, must_know=False)
-    return reader._search(state, descriptor, n_matches, chosen, exact=exact)
+    return reader.search(state, descriptor, n_matches, chosen, exact=exact)
 
 
 def _open_reader(folder: Path) -> IndexReader:

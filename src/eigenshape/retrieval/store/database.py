@@ -59,6 +59,8 @@ INDEX = _sealed.Kind(
     missing="Create one with ShapeIndex.create, or with `eigenshape index add` on the command line.",
     rescue="Merge the index into a new one to keep what is whole.",
     renew="index the shapes again",
+    room="free some space (remove a few shapes at a time, then compact)",
+    reserve=2**20,  # a shape takes 200 KB of the log to be removed, and ten take 1 MB
 )
 TABLES = tuple(INDEX.tables)
 PRIME, FACTOR = (
@@ -126,13 +128,13 @@ def _not_empty(folder: Path) -> StoreError:
     )
 
 
-def writing(folder: Path) -> AbstractContextManager[sqlite3.Connection]:
+def writing(folder: Path, *, frees: bool = False) -> AbstractContextManager[sqlite3.Connection]:
     """Open an index to change it. At the end of the block all changes are committed, or none.
 
     Raise StoreError if the folder is not an index of this format, changes were lost, another
     process is writing, or the disk is full.
     """
-    return _sealed.writing(INDEX, folder / DATABASE)
+    return _sealed.writing(INDEX, folder / DATABASE, frees=frees)
 
 
 def open_to_read(folder: Path) -> sqlite3.Connection:

@@ -80,6 +80,13 @@ class StoredShape(NamedTuple):
         return numbers + len(self.picture or b"")
 
 
+class MissingShapeError(StoreError):
+    """An index holds no shape of a name."""
+
+    def __init__(self, name: str, purpose: str) -> None:
+        super().__init__(f"A shape must be in the index to {purpose}; {name!r} is not.")
+
+
 class DamagedEntryError(StoreError):
     """Descriptors are not what was written; the message names the first.
 
@@ -217,10 +224,10 @@ class IndexState:
         return None
 
     def require(self, name: str, purpose: str) -> Facts:
-        """Return what is known of a shape by its name; raise StoreError if there is none."""
+        """Return what is known of a shape by its name; raise MissingShapeError if there is none."""
         facts = self.find(name)
         if facts is None:
-            raise StoreError(f"A shape must be in the index to {purpose}; {name!r} is not.")
+            raise MissingShapeError(name, purpose)
         return facts
 
     def shape(self, facts: Facts) -> StoredShape:

@@ -1,6 +1,7 @@
 """Upkeep of an index: give space back, find damage, take descriptors out, make one of several."""
 
 import json
+import sqlite3
 import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -17,6 +18,8 @@ from eigenshape.retrieval.store.damage import Damage, warn_of_damage
 from eigenshape.retrieval.store.database import DATABASE, TABLES, writing
 from eigenshape.retrieval.store.state import DamagedEntryError, IndexState, read_state
 from eigenshape.retrieval.store.writing import Record, Writer
+
+FIRST_STEP = 8  # pages that a compaction moves; they take 0.3 MB of the log
 
 
 @dataclass(frozen=True)
@@ -99,13 +102,27 @@ def compact_index(folder: Path) -> int:
 
     Raise StoreError if another process is writing, the disk is full, or pages are damaged.
     """
-    with writing(folder) as database:
-        (page_size,) = database.execute("PRAGMA page_size").fetchone()
-        (before,) = database.execute("PRAGMA page_count").fetchone()
-        # A script: `execute` would move one page alone.
-        database.executescript("PRAGMA incremental_vacuum; PRAGMA wal_checkpoint(TRUNCATE);")
-        (after,) = database.execute("PRAGMA page_count").fetchone()
-    return int(page_size) * (before - after)
+    with writing(folder, frees=True) as database:
+
+        def number(name: str) -> int:
+            return int(database.execute(f"PRAGMA {name}").fetchone()[0])
+
+        before = number("page_count")
+        n_pages, is_held = FIRST_STEP, 0
+        while number("freelist_count"):
+            # A script: `execute` would move one page alone. It commits each step.
+            database.executescript(f"PRAGMA incremental_vacuum({n_pages})")
+            if not is_held:
+                try:
+                    is_held = number("wal_checkpoint(TRUNCATE)")
+                except sqlite3.OperationalError:  # the file must be shorter first
+                    is_held = 1
+            # The space that a step gives back is enough for the log of one twice as long. While a
+            # reader holds an older state none comes back, so the rest is one step (0).
+            n_pages = 0 if is_held else 2 * n_pages
+        if is_held:
+            number("wal_checkpoint(PASSIVE)")
+        return number("page_size") * (before - number("page_count"))
 
 
 def merge_indexes(folder: Path, others: Sequence[Path], *, replace: bool = False) -> int:
@@ -116,8 +133,8 @@ def merge_indexes(folder: Path, others: Sequence[Path], *, replace: bool = False
     n_added, damages = 0, list[Damage]()
     with writing(folder) as database:
         writer = Writer(folder, database)
-        for other in others:
-            if other.resolve() == folder.resolve():
+        for other in dict.fromkeys(path.resolve() for path in others):  # each once
+            if other == folder.resolve():
                 raise StoreError(
                     f"An index is merged with others; {folder} is this one. Leave it out."
                 )
@@ -141,8 +158,14 @@ def export_index(state: IndexState, records: Sequence[Record], folder: Path) -> 
 
     Raise StoreError if the folder holds anything, or something that is exported is damaged.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    if any(folder.iterdir()):
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        is_empty = not any(folder.iterdir())
+    except OSError as err:
+        raise StoreError(
+            f"An export needs a folder; {folder} cannot be made: {err.strerror}. Choose another folder."
+        ) from err
+    if not is_empty:
         raise StoreError(
             f"{folder} must be empty to export into; it is not. Choose another folder."
         )

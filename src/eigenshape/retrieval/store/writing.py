@@ -28,6 +28,7 @@ from eigenshape.retrieval.store.database import (
 from eigenshape.retrieval.store.filters import RESERVED
 from eigenshape.retrieval.store.state import (
     IndexState,
+    MissingShapeError,
     StoredDescriptor,
     StoredShape,
 )
@@ -219,6 +220,10 @@ def described(shape: DescribedShape) -> StoredShape:
     )
 
 
+class NameTakenError(StoreError):
+    """The name of a shape stands for another one."""
+
+
 class Writer:
     """Writes shapes in an open transaction. What it costs does not grow with the index.
 
@@ -257,10 +262,11 @@ class Writer:
         old = self.find(shape.name)
         same = old is not None and old.digest is not None and old.digest == shape.digest
         if old is not None and not same and not replace:
-            raise StoreError(
-                f"A name stands for one shape; {shape.name!r} is in the index with digest "
-                f"{old.digest}, not {shape.digest}. Remove it first, or add it with replace=True "
-                "(--replace)."
+            digests = f"with digest {old.digest}, not {shape.digest}"
+            raise NameTakenError(
+                f"A name stands for one shape; {shape.name!r} is in the index "
+                f"{digests if old.digest and shape.digest else 'already'}. Remove it first, or add it "
+                "with replace=True (--replace)."
             )
         if old is not None and not (same and self.state.is_whole(old)):
             self.delete(old)
@@ -304,8 +310,15 @@ class Writer:
             )
         return Facts(*row)
 
-    def delete(self, facts: Facts) -> None:
+    def remove(self, name: str) -> None:
         """Delete a shape, its descriptors and its picture."""
+        facts = self.find(name)
+        if facts is None:
+            raise MissingShapeError(name, "be removed")
+        self.delete(facts)
+
+    def delete(self, facts: Facts) -> None:
+        """Delete the rows of a shape."""
         self.database.execute("DELETE FROM descriptor WHERE shape = ?", (facts.id,))
         for table in ("picture", "shape"):
             self.database.execute(f"DELETE FROM {table} WHERE id = ?", (facts.id,))
@@ -316,9 +329,7 @@ class Writer:
         tags, attributes = facts_text(record.tags, record.attributes)
         old = self.find(record.name)
         if old is None:
-            raise StoreError(
-                f"A shape must be in the index to be updated; {record.name!r} is not. Add it first."
-            )
+            raise MissingShapeError(record.name, "be updated")
         new = old._replace(
             label=record.label,
             source=record.source,

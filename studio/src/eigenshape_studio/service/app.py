@@ -10,7 +10,7 @@ from functools import wraps
 from pathlib import Path
 from string import Template
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import quote
 
 import anyio.to_thread
@@ -25,7 +25,13 @@ from starlette.routing import Route
 
 import eigenshape as es
 from eigenshape.retrieval.store.filters import parse_filters
-from eigenshape.retrieval.store.writing import facts_text, require_name, require_text
+from eigenshape.retrieval.store.state import MissingShapeError
+from eigenshape.retrieval.store.writing import (
+    NameTakenError,
+    facts_text,
+    require_name,
+    require_text,
+)
 from eigenshape_studio.guard import App, Guard, Rules, bearer_of, below, is_secret
 from eigenshape_studio.service import openapi
 from eigenshape_studio.service.describing import Describers, MeshRefusedError, Picture
@@ -47,6 +53,7 @@ FILES = {
 MOST_QUERIES = 64
 N_THREADS = 8  # that read the index at the same time
 PICTURE_BYTES = 64 << 20  # of drawings that are kept, 20 to 100 kB each
+T = TypeVar("T")
 Endpoint = Callable[[Request], Awaitable[Response]]
 
 
@@ -129,24 +136,28 @@ class Service:
         require_text(facts["label"])
         facts_text(facts["tags"], facts["attributes"])
         await self._refresh()
-        if self.shelf.shape(name) is not None and not wanted["replace"]:
-            raise RequestError(409, f"The index has a shape {name[:80]!r}; replace=1 replaces it.")
+        if name in self.shelf and not wanted["replace"]:
+            raise _name_taken(name)
         data = await request.body()
         async with self._describing(wanted["file"]):
             shape = await self.describers.describe_shape(
                 suffix, data, self.shelf.recipe, name, facts
             )
-        await self._change(lambda: self.shelf.add(shape, replace=wanted["replace"]))
-        return JSONResponse(self._facts(self._shape(name)), 201)
+        added = await self._change(name, lambda: self.shelf.add(shape, replace=wanted["replace"]))
+        return JSONResponse(self._facts(added), 201)
 
     async def remove_shape(self, request: Request) -> Response:
         """Remove a shape from the index, and tell what was known of it."""
         self._require_writer(request)
         read_parameters(request, ())
-        await self._refresh()
-        shape = self._shape(request.path_params["name"])
-        await self._change(lambda: self.shelf.remove(shape.name))
-        return JSONResponse(self._facts(shape))
+        name = request.path_params["name"]
+        return JSONResponse(self._facts(await self._change(name, lambda: self.shelf.remove(name))))
+
+    async def compact(self, request: Request) -> Response:
+        """Give the space of removed shapes back."""
+        self._require_writer(request)
+        read_parameters(request, ())
+        return JSONResponse({"bytes": await self._change("", self.shelf.compact)})
 
     def _require_writer(self, request: Request) -> None:
         """Refuse a request without the token of those who may change the index."""
@@ -162,10 +173,14 @@ class Service:
                 "Bearer TOKEN`.",
             )
 
-    async def _change(self, work: Callable[[], None]) -> None:
-        """Change the index in a thread."""
+    async def _change(self, name: str, work: Callable[[], T]) -> T:
+        """Change the index in a thread, and return what it holds then of a shape."""
         try:
-            await anyio.to_thread.run_sync(work, limiter=self._threads)
+            return await anyio.to_thread.run_sync(work, limiter=self._threads)
+        except NameTakenError as error:  # by another request, or process, since it was looked for
+            raise _name_taken(name) from error
+        except MissingShapeError as error:
+            raise _no_shape(name) from error
         except es.StoreError as error:  # a full disk, or another process that writes for long
             raise RequestError(503, f"The index was not changed: {error}") from error
 
@@ -244,8 +259,8 @@ class Service:
         """Return the picture of a shape: the one that the index holds, or else one of its file."""
         wanted = read_parameters(request, openapi.THUMBNAIL)
         await self._refresh()
-        shape = self._shape(wanted["name"])
-        image = None if wanted["drawn"] else await self._held_picture(shape.name)
+        shape = self._shape(wanted["name"], wanted["id"])
+        image = None if wanted["drawn"] else await self._held_picture(shape)
         if image is None:
             try:
                 image = (await self._drawing(shape.source)).image
@@ -259,13 +274,13 @@ class Service:
         """Tell where vertices of a shape lie in its picture."""
         wanted = read_parameters(request, openapi.POINTS)
         await self._refresh()
-        shape = self._shape(wanted["name"])
-        address = self._thumbnail_address(shape.name)
+        shape = self._shape(wanted["name"], wanted["id"])
+        address = self._thumbnail_address(shape)
         try:
             drawing = await self._drawing(shape.source)
         except MeshRefusedError:
             # The index may hold a picture, but not where its camera stood.
-            held = await self._held_picture(shape.name)
+            held = await self._held_picture(shape)
             hidden = [None] * len(wanted["vertices"])
             return JSONResponse({"thumbnail": address if held else None, "points": hidden})
         places = [drawing.place(vertex) for vertex in wanted["vertices"]]
@@ -320,29 +335,36 @@ class Service:
             self._drawings.keep(key, drawing)
         return drawing
 
-    async def _held_picture(self, name: str) -> bytes | None:
-        return await anyio.to_thread.run_sync(self.shelf.thumbnail, name, limiter=self._threads)
+    async def _held_picture(self, shape: Shape) -> bytes | None:
+        try:
+            return await anyio.to_thread.run_sync(
+                self.shelf.thumbnail, shape.name, shape.id, limiter=self._threads
+            )
+        except MissingShapeError as error:
+            raise _no_shape(shape.name) from error
 
-    def _shape(self, name: str) -> Shape:
-        shape = self.shelf.shape(name)
-        if shape is None:
-            raise RequestError(404, f"The index holds no shape {name[:80]!r}.")
-        return shape
+    def _shape(self, name: str, number: int | None = None) -> Shape:
+        try:
+            return self.shelf.require(name, number)
+        except MissingShapeError as error:
+            raise _no_shape(name) from error
 
     def _facts(self, shape: Shape) -> dict[str, Any]:
         """Return what an answer says of any shape."""
         has_picture = shape.has_thumbnail or shape.source is not None
         return {
+            "id": shape.id,
             "name": shape.name,
             "label": shape.label,
             "tags": list(shape.tags),
             "attributes": dict(shape.attributes),
             "source": shape.source if self.settings.show_sources else None,
-            "thumbnail": self._thumbnail_address(shape.name) if has_picture else None,
+            "thumbnail": self._thumbnail_address(shape) if has_picture else None,
         }
 
-    def _thumbnail_address(self, name: str) -> str:
-        return f"{self.settings.prefix}/v1/thumbnails?name={quote(name, safe='')}"
+    def _thumbnail_address(self, shape: Shape) -> str:
+        name = quote(shape.name, safe="")
+        return f"{self.settings.prefix}/v1/thumbnails?name={name}&id={shape.id}"
 
     def _match(self, match: Found) -> dict[str, Any]:
         return {
@@ -360,6 +382,7 @@ def make_app(service: Service, rules: Rules) -> App:
         "/v1/query": {"POST": service.query},
         "/v1/shapes": {"GET": service.shapes, "POST": service.add_shape},
         "/v1/shapes/{name:any}": {"GET": service.shape, "DELETE": service.remove_shape},
+        "/v1/compact": {"POST": service.compact},
         "/v1/thumbnails": {"GET": service.thumbnail},
         "/v1/points": {"GET": service.points},
         "/health": {"GET": service.health},
@@ -383,6 +406,14 @@ def _by_method(calls: Mapping[str, Endpoint]) -> type[HTTPEndpoint]:
         method.lower(): staticmethod(_with_plain_errors(call)) for method, call in calls.items()
     }
     return type("Calls", (HTTPEndpoint,), answers)
+
+
+def _name_taken(name: str) -> RequestError:
+    return RequestError(409, f"The index has a shape {name[:80]!r}; replace=1 replaces it.")
+
+
+def _no_shape(name: str) -> RequestError:
+    return RequestError(404, f"The index holds no shape {name[:80]!r}, or another one now.")
 
 
 def _suffix(name: str) -> str:

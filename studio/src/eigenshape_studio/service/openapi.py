@@ -10,6 +10,14 @@ MOST_LISTED = 1000  # shapes of one page of the list
 MOST_POINTS = 500  # whose numbers fit into an address
 
 SHAPE_NAME = Parameter("name", "string", "Name of a shape of the index.", REQUIRED)
+SHAPE_ID = Parameter(
+    "id",
+    "integer",
+    "Number of the shape in an earlier answer; the status is 404 if another one has its name now.",
+    None,
+    0,
+    2**53,
+)
 FILTER = Parameter(
     "filter",
     "strings",
@@ -45,6 +53,7 @@ ADD = (
 )
 POINTS = (
     SHAPE_NAME,
+    SHAPE_ID,
     Parameter(
         "vertices",
         "integers",
@@ -56,6 +65,7 @@ POINTS = (
 )
 THUMBNAIL = (
     SHAPE_NAME,
+    SHAPE_ID,
     Parameter(
         "drawn",
         "boolean",
@@ -82,6 +92,8 @@ def _list(items: dict[str, Any]) -> dict[str, Any]:
 
 SOURCE = MAYBE_TEXT | {"description": "File of the shape, if the service was told to show it."}
 SHAPE = {
+    "id": WHOLE
+    | {"description": "Its number, which no other shape has, also none that replaces it."},
     "name": TEXT,
     "label": MAYBE_TEXT,
     "tags": _list(TEXT),
@@ -135,6 +147,7 @@ SCHEMAS = {
         | {"description": "Address of the picture in which they lie; null if there is none."},
         points=_list(PLACE),
     ),
+    "Compacted": _object(bytes=WHOLE | {"description": "Bytes that were given back."}),
     "Health": _object(status=TEXT, shapes=WHOLE, version=TEXT),
 }
 
@@ -234,6 +247,15 @@ PATHS: dict[str, dict[str, Any]] = {
             status_503="Another process writes.",
         )
         | {"parameters": [PATH_NAME]},
+    },
+    "/v1/compact": {
+        "post": _call(
+            "Give the space of removed shapes back. Takes the token for writing.",
+            _json("Compacted", "What was given back."),
+            status_400=BAD_PARAMETER,
+            status_415=UPLOAD_ERRORS["status_415"],
+            status_503="Another process writes.",
+        )
     },
     "/v1/thumbnails": {
         "get": _call(

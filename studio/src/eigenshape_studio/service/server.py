@@ -2,6 +2,7 @@
 
 import re
 import secrets
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -127,6 +128,8 @@ def serve(  # noqa: PLR0913  one for each option of the command
     if workers is None:
         workers = es.retrieval.Workers(timeout=60.0)
     describers = Describers(workers, shelf.recipe, describe)
+    ended = threading.Event()
+    threading.Thread(target=shelf.refresh_until, args=(ended,), daemon=True).start()
     try:
         app = make_app(
             Service(shelf, describers, Settings(show_sources, write_token, prefix)), rules
@@ -134,4 +137,5 @@ def serve(  # noqa: PLR0913  one for each option of the command
         page = f"{address}/?token={secret}" if browse else None
         run_app(app, listening, lambda: announce(shown), page, grace=GRACE)
     finally:
+        ended.set()
         describers.close()

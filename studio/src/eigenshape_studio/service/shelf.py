@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
@@ -11,8 +12,9 @@ import numpy as np
 from jaxtyping import Int
 
 import eigenshape as es
+from eigenshape.retrieval.store.database import Facts
 from eigenshape.retrieval.store.filters import choose_shapes
-from eigenshape.retrieval.store.state import tags_and_attributes
+from eigenshape.retrieval.store.state import IndexState, MissingShapeError, tags_and_attributes
 
 REFRESH_SECONDS = 1.0  # between looks for shapes that other processes have added or removed
 
@@ -23,6 +25,8 @@ class Shape:
 
     Attributes
     ----------
+    id : int
+        Its number, which no other shape of the index has, also none that replaces it.
     name, label, source : str
     tags : tuple of str
     attributes : dict of str to float or str
@@ -30,6 +34,7 @@ class Shape:
         Whether the index holds its picture.
     """
 
+    id: int
     name: str
     label: str | None
     source: str | None
@@ -116,17 +121,32 @@ class ShelfReader:
                 self._reader.refresh()
                 self._due = monotonic() + REFRESH_SECONDS
 
-    def add(self, shape: es.retrieval.DescribedShape, *, replace: bool) -> None:
+    def refresh_until(self, ended: threading.Event) -> None:
+        """See each second what others have changed: the log grows while a state is held."""
+        while not ended.wait(REFRESH_SECONDS):
+            with suppress(es.EigenshapeError, OSError):  # which the next request reports
+                self.refresh()
+
+    def add(self, shape: es.retrieval.DescribedShape, *, replace: bool) -> Shape:
         """Add a shape, or replace one; StoreError says what does not allow it."""
         with self._writing:  # an index has one writer, and waits for others for seconds alone
             self._index.add_many([shape], replace=replace)
-        self.refresh(now=True)
+            self.refresh(now=True)
+            return self.require(shape.name)
 
-    def remove(self, name: str) -> None:
-        """Remove a shape; StoreError says what does not allow it."""
+    def remove(self, name: str) -> Shape:
+        """Remove a shape and return what was known; StoreError says what does not allow it."""
         with self._writing:
+            self.refresh(now=True)
+            shape = self.require(name)
             self._index.remove(name)
-        self.refresh(now=True)
+            self.refresh(now=True)
+        return shape
+
+    def compact(self) -> int:
+        """Give the space of removed shapes back, and return its bytes."""
+        with self._writing:
+            return self._index.compact()
 
     def require_attributes(self, where: Mapping[str, Any] | None) -> None:
         """Refuse conditions about an attribute that no shape has."""
@@ -151,19 +171,18 @@ class ShelfReader:
         exact : bool
             Whether every shape must be compared.
         """
-        if not len(self):
+        state = self._reader.state  # of which all is that is said; it may be an older one soon
+        if not len(state):
             return Answer()
-        matches = self._reader.query(descriptor, n_matches=n_matches, where=where, exact=exact)
-        found = tuple(self._found(descriptor, match) for match in matches)
-        return Answer(found, matches.method, matches.n_compared, matches.nothing_alike)
-
-    def _found(self, descriptor: Any, match: es.retrieval.Match) -> Found:
-        ours, theirs = match.correspondences.T
-        pairs = np.column_stack([descriptor.vertices[ours], match.vertices[theirs]])
-        shape = self.shape(match.name)
-        if shape is None:  # removed since
-            shape = Shape(match.name, match.label, match.source)
-        return Found(shape, match.score, match.chance, pairs)
+        chosen = choose_shapes(state, where)
+        matches = self._reader.search(state, descriptor, n_matches, chosen, exact=exact)
+        found = []
+        for match in matches:
+            ours, theirs = match.correspondences.T
+            pairs = np.column_stack([descriptor.vertices[ours], match.vertices[theirs]])
+            shape = _shape_of(state.require(match.name, "be found"))
+            found.append(Found(shape, match.score, match.chance, pairs))
+        return Answer(tuple(found), matches.method, matches.n_compared, matches.nothing_alike)
 
     def shapes(
         self, offset: int, limit: int, where: Mapping[str, Any] | None = None
@@ -174,20 +193,29 @@ class ShelfReader:
         names = state.names
         if chosen is not None:
             names = sorted(facts.name for facts in state.facts(chosen).values())
-        found = map(self.shape, names[offset : offset + limit])
-        return len(names), [shape for shape in found if shape is not None]
+        found = (state.require(name, "be listed") for name in names[offset : offset + limit])
+        return len(names), [_shape_of(facts) for facts in found]
 
-    def shape(self, name: str) -> Shape | None:
-        """Return a shape by its name."""
-        state = self._reader.state
-        facts = state.find(name)
-        if facts is None:
-            return None
-        told = (facts.name, facts.label, facts.source, *tags_and_attributes(facts))
-        return Shape(*told, bool(facts.n_pictures))
+    def __contains__(self, name: str) -> bool:
+        return self._reader.state.find(name) is not None
 
-    def thumbnail(self, name: str) -> bytes | None:
+    def require(self, name: str, number: int | None = None) -> Shape:
+        """Return a shape by its name; raise MissingShapeError if there is none with that number."""
+        return _shape_of(_require(self._reader.state, name, number))
+
+    def thumbnail(self, name: str, number: int) -> bytes | None:
         """Return the picture that the index holds of a shape, PNG or WebP; None if it holds none."""
         state = self._reader.state
-        facts = state.find(name)
-        return None if facts is None else state.picture(facts)
+        return state.picture(_require(state, name, number))
+
+
+def _require(state: IndexState, name: str, number: int | None) -> Facts:
+    facts = state.require(name, "be shown")
+    if number not in (None, facts.id):  # one that has replaced it
+        raise MissingShapeError(name, "be shown")
+    return facts
+
+
+def _shape_of(facts: Facts) -> Shape:
+    known = (facts.id, facts.name, facts.label, facts.source, *tags_and_attributes(facts))
+    return Shape(*known, bool(facts.n_pictures))

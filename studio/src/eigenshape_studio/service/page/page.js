@@ -135,7 +135,7 @@ function card(match, rank, drawn, signal) {
 /** Show the picture of a match with its dots; a match whose file is gone has none. */
 async function illustrate(stage, match, pairs, drawn, signal) {
   const theirs = pairs.map(([, vertex]) => vertex).join(",");
-  const wanted = new URLSearchParams({ name: match.name, vertices: theirs });
+  const wanted = new URLSearchParams({ name: match.name, id: match.id, vertices: theirs });
   try {
     const { points, thumbnail } = await call(`v1/points?${wanted}`, { signal });
     if (!thumbnail) {
