@@ -90,7 +90,7 @@ class Kind:
     renew: str = ""
     room: str = "free some space"
     reserve: int = 0
-    changes: str = CHANGES
+    changes: str = ""
 
     @property
     def a_noun(self) -> str:

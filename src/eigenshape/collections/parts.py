@@ -37,6 +37,7 @@ COLLECTION = _sealed.Kind(
     },
     rescue="Build it again in the same folder: fits that are whole are used again.",
     renew="build it again in another folder",
+    changes=_sealed.CHANGES,
 )
 
 

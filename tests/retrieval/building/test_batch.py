@@ -335,7 +335,9 @@ def test_few_tasks_are_submitted_ahead_so_that_results_do_not_pile_up(index, tmp
     assert submitted == [4, 5, 6, 7, 8, 9, 9, 9, 9]
 
 
-@pytest.mark.parametrize(("n_files", "n_tasks"), [(1, 1), (27, 27), (63, 63), (200, 67), (4096, 128)])
+@pytest.mark.parametrize(
+    ("n_files", "n_tasks"), [(1, 1), (27, 27), (63, 63), (200, 67), (4096, 128)]
+)
 def test_few_files_go_to_many_workers_and_many_files_in_few_tasks(n_files, n_tasks, tmp_path):
     executor = CountingExecutor()
     todo = [Item(str(number), tmp_path / str(number)) for number in range(n_files)]

@@ -59,6 +59,7 @@ INDEX = _sealed.Kind(
     missing="Create one with ShapeIndex.create, or with `eigenshape index add` on the command line.",
     rescue="Merge the index into a new one to keep what is whole.",
     renew="index the shapes again",
+    changes=_sealed.CHANGES,
     room="free some space (remove a few shapes at a time, then compact)",
     reserve=2**20,  # a shape takes 200 KB of the log to be removed, and ten take 1 MB
 )
