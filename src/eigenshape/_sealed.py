@@ -385,16 +385,17 @@ def _most_pages(path: Path, database: sqlite3.Connection) -> int:
     SQLite commits if the log fits; one that does not fit into the file then would stay for ever.
     """
     (n_pages,) = database.execute("PRAGMA page_count").fetchone()
+    (limit,) = database.execute("PRAGMA max_page_count").fetchone()
     room = disk_usage(path.parent).free - LONG_LOG  # for pages that change
     # Each new page is in the log and in the file.
     most = (room + path.stat().st_size + PAGE * n_pages) // 2
     with suppress(ImportError):  # Windows has no limit of files
         import resource  # noqa: PLC0415
 
-        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
-        if limit != resource.RLIM_INFINITY:
-            most = min(most, limit)
-    return most // PAGE
+        longest, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+        if longest != resource.RLIM_INFINITY:
+            most = min(most, longest)
+    return min(most // PAGE, int(limit))
 
 
 def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:

@@ -125,17 +125,14 @@ def test_an_index_stands_for_its_folder(queries, parts):
 def test_what_is_no_list_of_different_indexes_is_named(queries, parts):
     (query, *_) = queries
     index = es.ShapeIndex.open(parts[0])
-    for given in (index, 3):
-        with pytest.raises(es.InvalidParameterError, match=r"takes a list.*Put it into a list"):
-            es.retrieval.query_indexes(query, given)
+    with pytest.raises(es.InvalidParameterError, match=r"takes a list.*Put it into a list"):
+        es.retrieval.query_indexes(query, index)
     for again in (parts[0], str(parts[0]), parts[0] / ".." / parts[0].name, index):
         with pytest.raises(
             es.InvalidParameterError,
-            match=r"folders must differ, .*; folders\[2\] is .*part0, as folders\[0\]",
+            match=r"folders must differ, .*; folders\[2\] is .*, as folders\[0\]",
         ):
             es.retrieval.query_indexes(query, [*parts[:2], again])
-    with pytest.raises(es.InvalidParameterError, match=r"folders\[1\] must be a str or"):
-        es.retrieval.query_indexes(query, [parts[0], None])
 
 
 def test_what_is_added_or_made_anew_is_seen(shapes, queries, tmp_path):

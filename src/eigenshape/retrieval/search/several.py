@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from eigenshape.retrieval.store.database import DATABASE
 from eigenshape.retrieval.store.filters import choose_shapes
 
 
+@runtime_checkable
 class _Index(Protocol):
     """A `ShapeIndex`, which stands for its folder."""
 
@@ -37,7 +38,7 @@ MOST_OPEN = 256  # readers that a process keeps open between queries
 
 def query_indexes(
     shape: MeshLike | Descriptor,
-    folders: Sequence[str | PathLike[str] | _Index],
+    folders: Sequence[str | PathLike[str] | _Index] | _Index,
     *,
     n_matches: Integer = 5,
     where: Mapping[str, Any] | None = None,
@@ -99,7 +100,7 @@ def query_indexes(
     """
     require_type(executor, Executor | None, "executor")
     wanted = whole_number(n_matches, "n_matches", 1, 2**30)
-    if isinstance(folders, str | PathLike) or not isinstance(folders, Iterable):
+    if not isinstance(folders, Iterable) or isinstance(folders, str | PathLike):
         raise InvalidParameterError(
             f"folders takes a list of indexes; it was given one: {str(folders)!r}. Put it into a list."
         )
