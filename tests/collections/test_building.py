@@ -232,6 +232,24 @@ def test_a_file_that_cannot_be_read_is_named_with_a_remedy(scans, copy, what, qu
         es.collections.build_collection(scans, copy)
 
 
+def test_what_is_lost_is_named_and_made_again(scans, tmp_path, quick):
+    copy = tmp_path / "made"  # by rough fits alone: lost ones are made again by the same method
+    built = es.collections.build_collection(scans, copy)
+    (copy / "changes.txt").write_text("9999\n")
+    with pytest.raises(es.StoreError, match=r"to be read; .* changes that were committed are lost"):
+        es.collections.open_collection(copy)
+    assert same(es.collections.build_collection(scans, copy), built)
+    spoil(copy, "DELETE FROM part WHERE kind = 'last' AND name = 'ball 1'")
+    with pytest.raises(es.StoreError, match=r"the fit of 'ball 1' is lost. Build it again"):
+        es.collections.open_collection(copy)
+    assert same(es.collections.build_collection(scans, copy), built)
+    spoil(copy, "UPDATE seal SET n_rows = 'many' WHERE name = 'state'")
+    with pytest.raises(es.StoreError, match="the seal of state differs"):
+        es.collections.open_collection(copy)
+    assert same(es.collections.build_collection(scans, copy), built)
+    assert same(es.collections.open_collection(copy), built)
+
+
 def test_a_full_disk_is_named_and_nothing_is_lost(scans, built, copy, quick, monkeypatch):
     connect = _sealed.connect
 
