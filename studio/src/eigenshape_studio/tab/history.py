@@ -94,9 +94,8 @@ class Shape:
     def skin(self) -> Skin | None:
         """How the shape looks, if its file says so."""
         attributes = self.found.attributes
-        if count_images(attributes) < 0:
+        if attributes is None or count_images(attributes) < 0:
             return None
-        assert attributes is not None  # noqa: S101  they are counted
         return find_skin(attributes)
 
     @property
@@ -362,26 +361,21 @@ class History:
         """Write what is new to the file of the tab, if it has one."""
         if self.file is None:
             return
-        shapes = [each for each in self.shapes.values() if (each, each.is_read) not in self._kept]
-        moments = [moment for moment in self.moments if moment not in self._kept]
-        poses = {moment.pose for moment in moments if moment.pose.number} - self._kept
-        self.file.write(
-            {
-                "places": [(1, self.now.number, self.last, self.index, self.collection)],
-                "shapes": [_shape_row(shape) for shape in shapes],
-                "poses": [_pose_row(pose) for pose in poses],
-                "steps": [_moment_row(moment) for moment in moments],
-            },
-            [moment.number for moment in self.moments],
-            begin=not self._kept,
-        )
-        self._kept = {*self.moments, *poses, *(moment.pose for moment in self.moments)}
-        self._kept |= {(shape, shape.is_read) for shape in self.shapes.values()}
+        shapes = {(shape, shape.is_read) for shape in self.shapes.values()}
+        poses = {moment.pose for moment in self.moments if moment.pose.number}
+        kept = self._kept
+        rows = {
+            "places": [(1, self.now.number, self.last, self.index, self.collection)],
+            "shapes": [_shape_row(shape) for shape, _ in shapes - kept],
+            "poses": [_pose_row(pose) for pose in poses - kept],
+            "steps": [_moment_row(moment) for moment in self.moments if moment not in kept],
+        }
+        self.file.write(rows, [moment.number for moment in self.moments], begin=not kept)
+        self._kept = {*shapes, *poses, *self.moments}
         # Of the poses in the file, those near the present one stay in memory, too.
-        near = {moment.pose for moment in self.moments[-N_IN_MEMORY:]} | {self.now.pose}
-        for moment in self.moments:
-            if moment.pose not in near:
-                moment.pose.mesh = None
+        near = {moment.pose for moment in self.moments[-N_IN_MEMORY:]}
+        for pose in poses - near - {self.now.pose}:
+            pose.mesh = None
 
     def _restore(self, file: SessionFile) -> bool:
         """Continue the session of a file; return False if there is none."""
