@@ -91,8 +91,9 @@ def find_items(
     >>> item.name, item.label
     ('cats/felix', 'cats')
     """
-    is_one = isinstance(sources, str) or not isinstance(sources, Iterable)
-    folders = [sources] if is_one else list(sources)
+    folders = [sources] if isinstance(sources, str | Path) else sources
+    if not isinstance(folders, Iterable):  # None, a number: `as_path` names it
+        folders = [folders]
     items = [item for source in folders for item in _items_of(as_path(source, "sources"))]
     if not items:
         raise InvalidParameterError(
