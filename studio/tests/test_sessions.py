@@ -195,6 +195,10 @@ def test_old_sessions_and_the_oldest_of_too_many_are_removed(tmp_path, monkeypat
         path = tmp_path / f"{name}.sqlite"
         path.write_bytes(bytes(100))
         os.utime(path, (path.stat().st_mtime - days * 86400,) * 2)
+    # Of a session that was made when its server was killed
+    for name in ("old.sqlite.0f", "old.sqlite.0f-journal"):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (1.0, 1.0))
     remove_old(tmp_path, [tmp_path / "open.sqlite"])
     assert {path.stem for path in tmp_path.iterdir()} == {"young", "recent", "open"}
 

@@ -283,6 +283,6 @@ def remove_old(folder: Path, in_use: Collection[Path] = ()) -> None:
         total += size
         large = total > MOST_BYTES and age > YOUNG
         if path not in in_use and (large or age > MOST_DAYS * 86400):
-            for ending in ("-wal", "-shm", ""):
+            for ending in ("-wal", "-shm", "-journal", ""):
                 with suppress(OSError):
                     Path(f"{path}{ending}").unlink()
