@@ -132,9 +132,10 @@ class _CallWriter:
                 expected.append(found)
                 continue
             expected.append(length)
-            if length.isidentifier() and length not in self.known:
-                self.known.add(length)
-                self.types.append(f"{length} = {found}")
+            first, _, more = length.partition("+")  # n+1 gives n its value, too
+            if first.isidentifier() and first not in self.known:
+                self.known.add(first)
+                self.types.append(f"{first} = {found} - {more or 0}")
         shape = f"({', '.join(expected)},)"
         self.shapes.append(f"if {name}.shape != {shape}: _refuse({wanted!r}, {name}, {shape})")
         return f"_address({name})"
