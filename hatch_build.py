@@ -8,16 +8,20 @@ another platform, one of TARGETS; zig compiles for all of them on any.
 import ctypes
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import sysconfig
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 HERE = Path(__file__).parent
 PACKAGE = HERE / "src" / "eigenshape"
 LIBRARIES = PACKAGE / "_libraries"
+WINDOWS = PACKAGE / "windows.c"  # empty on other systems
+LIBRARY = "kernels-{}.so"  # of a level of processors, whatever such files are called elsewhere
 VARIABLE = "EIGENSHAPE_TARGET"
 
 try:
@@ -65,11 +69,22 @@ class KernelBuildHook(BuildHookInterface):  # type: ignore[misc, valid-type]
         """Compile, and give the wheel the name of its platform, for any Python 3."""
         if self.target_name != "wheel":
             return
+        if version == "editable":
+            build_in_place()
+            return
         target = TARGETS[target_name()]
-        build_kernels(target, own_level() if version == "editable" else None)
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{target.wheel}"
-        build_data["artifacts"].append("src/eigenshape/_libraries/*")
+        self.folder = tempfile.TemporaryDirectory()
+        for level in target.processors:
+            library = Path(self.folder.name) / LIBRARY.format(level)
+            compile_library(target, level, library)
+            build_data["force_include"][str(library)] = f"eigenshape/_libraries/{library.name}"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Remove what is in the wheel now."""
+        if hasattr(self, "folder"):
+            self.folder.cleanup()
 
 
 def target_name() -> str:
@@ -82,41 +97,38 @@ def target_name() -> str:
     return name
 
 
-def build_kernels(target: Target, only: int | None = None) -> None:
-    """Compile a library for each processor of a platform, or for one alone."""
+def build_in_place() -> None:
+    """Compile a library for this processor alone, beside the sources."""
+    target = TARGETS[target_name()]
+    lowest = min(target.processors)
+    with tempfile.TemporaryDirectory() as folder:
+        small = Path(folder) / LIBRARY.format(lowest)
+        compile_library(target, lowest, small, sources=[PACKAGE / "processor.c"])
+        level = ctypes.CDLL(str(small)).processor_level()
     LIBRARIES.mkdir(exist_ok=True)
     for library in LIBRARIES.iterdir():
         library.unlink()
-    levels = target.processors if only is None else [only]
-    for level in levels:
-        compile_library(target, level, LIBRARIES / f"kernels-{level}.so", RELEASE)
-
-
-def own_level() -> int:
-    """Return the level of this processor, as a small library says."""
-    target = TARGETS[target_name()]
-    lowest = min(target.processors)
-    library = Path(tempfile.mkdtemp()) / "processor.so"
-    compile_library(
-        target, lowest, library, RELEASE, [PACKAGE / "processor.c", PACKAGE / "windows.c"]
-    )
-    return ctypes.CDLL(str(library)).processor_level()
+    compile_library(target, level, LIBRARIES / LIBRARY.format(level))
 
 
 def compile_library(
-    target: Target, level: int, library: Path, options: list[str], sources: list[Path] | None = None
+    target: Target,
+    level: int,
+    library: Path,
+    *,
+    options: Sequence[str] = RELEASE,
+    sources: Sequence[Path] = (),
 ) -> None:
     """Compile one library, of all kernels or of some sources."""
     flags = [*FLAGS, *options, "-target", target.zig, f"-mcpu={target.processors[level]}"]
-    command = [sys.executable, "-m", "ziglang", "cc", *flags, f"-I{PACKAGE}"]
-    # The linker leaves other files beside its result on Windows.
+    command = [sys.executable, "-m", "ziglang", "cc", *flags, f"-I{PACKAGE}", "-o"]
+    kernels = sources or sorted({*PACKAGE.rglob("*.c")} - {WINDOWS})
+    # On Windows the linker leaves other files beside its result.
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / library.name
-        subprocess.run(
-            [*command, "-o", made, *(sources or sorted(PACKAGE.rglob("*.c")))], check=True
-        )
-        library.write_bytes(made.read_bytes())
+        subprocess.run([*command, made, *kernels, WINDOWS], check=True)
+        shutil.move(made, library)
 
 
 if __name__ == "__main__":
-    build_kernels(TARGETS[target_name()], own_level())
+    build_in_place()

@@ -14,8 +14,8 @@ the arguments follow the lengths that the decorator names. In C
     tuple[...]                   is the address of a struct of addresses,
     -> tuple[int, float]         is a struct, returned by value.
 
-A length is a name, a number, or an expression such as `n+1` of lengths and arguments named before;
-`_` is any length. Each call checks types, order and lengths of its arrays, which C cannot, and that
+A length is a name, a number, or an expression such as `n+1` of lengths and of arguments; `_` is any
+length. Each call checks types, order and lengths of its arrays, which C cannot, and that
 what is in `Out` may be written to. It copies nothing, and lets other threads run.
 """
 
@@ -45,22 +45,23 @@ def kernel(*lengths: str) -> Callable[[Stub], Stub]:
     """Bind a declaration to the C function of its name, which takes these lengths last."""
 
     def bind(stub: Stub) -> Stub:
-        kinds = get_annotations(stub)
+        kinds: dict[str, Any] = get_annotations(stub)
         result = kinds.pop("return")
         function = _find(stub)
         function.argtypes = [NUMBERS.get(kind, ctypes.c_void_p) for kind in kinds.values()]
         function.argtypes += [ctypes.c_int64] * len(lengths)
         writer = _CallWriter(stub.__name__, kinds)
         passed = [writer.pass_on(name, kind) for name, kind in kinds.items()]
-        returned = f"function({', '.join([*passed, *lengths])})"
+        returned = f"_function({', '.join([*passed, *lengths])})"
         if get_origin(result) is tuple:
             function.restype = _structure(get_args(result))
             returned += ".values()"
         else:
             function.restype = NUMBERS[result]
         # Written out, as dataclasses do it: checks in a loop take 1.5 times as long.
-        lines = [f"def {stub.__name__}({', '.join(kinds)}):", *writer.lines, f"return {returned}"]
-        scope = writer.scope | {"function": function}
+        head = f"def {stub.__name__}({', '.join(kinds)}):"
+        lines = [head, *writer.types, *writer.shapes, f"return {returned}"]
+        scope = writer.scope | {"_function": function}
         exec("\n    ".join(lines), scope)
         call = scope[stub.__name__]
         call.__module__, call.__doc__ = stub.__module__, stub.__doc__
@@ -75,12 +76,13 @@ class _CallWriter:
 
     def __init__(self, kernel: str, kinds: dict[str, Any]) -> None:
         self.kernel = kernel
-        self.lines: list[str] = []
+        self.types: list[str] = []  # these lines also give the lengths their values
+        self.shapes: list[str] = []
         self.scope: dict[str, Any] = {
-            "ndarray": np.ndarray,
-            "index": index,
-            "refuse": _refuse,
-            "address": _choose_address(),
+            "_ndarray": np.ndarray,
+            "_index": index,
+            "_refuse": _refuse,
+            "_address": _choose_address(),
         }
         # Names that lengths can be computed from
         self.known = {name for name, kind in kinds.items() if kind is int}
@@ -88,7 +90,7 @@ class _CallWriter:
     def pass_on(self, name: str, kind: Any) -> str:
         """Write the checks of an argument, and return what is passed on to C."""
         if kind is int:
-            return f"index({name})"
+            return f"_index({name})"
         if kind in NUMBERS:
             return name
         if get_origin(kind) is tuple:
@@ -100,13 +102,13 @@ class _CallWriter:
     def _pass_tuple(self, name: str, kinds: tuple[Any, ...]) -> str:
         parts = [f"{name}_{place}" for place in range(len(kinds))]
         wanted = f"{self.kernel}: {name} must be a tuple of {len(kinds)}"
-        self.lines += [
-            f"if len({name}) != {len(kinds)}: refuse({wanted!r}, {name})",
+        self.types += [
+            f"if len({name}) != {len(kinds)}: _refuse({wanted!r}, {name})",
             f"{', '.join(parts)}, = {name}",
         ]
         passed = [self.pass_on(part, kind) for part, kind in zip(parts, kinds, strict=True)]
-        self.scope[f"struct_{name}"] = ctypes.c_void_p * len(kinds)
-        return f"struct_{name}({', '.join(passed)})"
+        self.scope[f"_struct_{name}"] = ctypes.c_void_p * len(kinds)
+        return f"_struct_{name}({', '.join(passed)})"
 
     def _pass_array(self, name: str, kind: Any, *, is_written: bool) -> str:
         dtype, lengths = np.dtype(kind.dtypes[-1]), kind.dim_str.split()
@@ -116,12 +118,12 @@ class _CallWriter:
         )
         if is_written:
             wanted += ", that can be written to"
-        self.scope[f"is_{dtype}"] = dtype
+        self.scope[f"_{dtype}"] = dtype
         flag = "carray" if is_written else "c_contiguous"
-        self.lines.append(
-            f"if not isinstance({name}, ndarray) or {name}.dtype != is_{dtype} "
+        self.types.append(
+            f"if not isinstance({name}, _ndarray) or {name}.dtype != _{dtype} "
             f"or {name}.ndim != {len(lengths)} or not {name}.flags.{flag}: "
-            f"refuse({wanted!r}, {name})"
+            f"_refuse({wanted!r}, {name})"
         )
         expected = []
         for axis, length in enumerate(lengths):
@@ -130,12 +132,13 @@ class _CallWriter:
                 expected.append(found)
                 continue
             expected.append(length)
-            if length.isidentifier() and length not in self.known:
-                self.known.add(length)
-                self.lines.append(f"{length} = {found}")
+            first, _, more = length.partition("+")  # n+1 gives n its value, too
+            if first.isidentifier() and first not in self.known:
+                self.known.add(first)
+                self.types.append(f"{first} = {found} - {more or 0}")
         shape = f"({', '.join(expected)},)"
-        self.lines.append(f"if {name}.shape != {shape}: refuse({wanted!r}, {name}, {shape})")
-        return f"address({name})"
+        self.shapes.append(f"if {name}.shape != {shape}: _refuse({wanted!r}, {name}, {shape})")
+        return f"_address({name})"
 
 
 def _refuse(wanted: str, value: Any, shape: tuple[int, ...] | None = None) -> NoReturn:

@@ -12,6 +12,7 @@ from eigenshape._kernels import Out, kernel
 LEAF = 160  # most points of a segment that is ordered by minimum degree
 WORD = 63  # bits of an int64 in a set of neighbors, without its sign
 
+Pointers = Int64[np.ndarray, "n+1"]
 Points = Int64[np.ndarray, " n"]
 Some = Int64[np.ndarray, " _"]
 Segment = Int64[np.ndarray, " size"]
@@ -20,7 +21,7 @@ Counts = Int64[np.ndarray, " count"]
 
 @kernel()
 def breadth_first(
-    indptr: Some,
+    indptr: Pointers,
     indices: Some,
     root: int,
     owner: Out[Points],
@@ -36,7 +37,7 @@ def breadth_first(
 
 @kernel("size")
 def smooth_keys(
-    indptr: Some,
+    indptr: Pointers,
     indices: Some,
     segment: Segment,
     owner: Points,
@@ -52,7 +53,7 @@ def smooth_keys(
 
 @kernel("size")
 def count_cuts(
-    indptr: Some,
+    indptr: Pointers,
     indices: Some,
     segment: Segment,
     owner: Points,
@@ -87,7 +88,7 @@ def cheapest_cut(
 
 @kernel("size")
 def take_sides(
-    indptr: Some,
+    indptr: Pointers,
     indices: Some,
     segment: Segment,
     owner: Points,
@@ -102,7 +103,7 @@ def take_sides(
 
 @kernel()
 def order_leaf(
-    indptr: Some,
+    indptr: Pointers,
     indices: Some,
     nodes: Out[Points],
     start: int,
