@@ -12,6 +12,7 @@ the arguments follow the lengths that the decorator names. In C
     Float64[np.ndarray, "n k"]   is the address of the first entry, of constants if not in `Out`,
     int, float, bool             are int64_t, double, bool,
     tuple[...]                   is the address of a struct of addresses,
+    list[Float64[...]]           is the address of the addresses of its arrays,
     -> tuple[int, float]         is a struct, returned by value.
 
 A length is a name, a number, or an expression such as `n+1` of lengths and of arguments; `_` is any
@@ -83,6 +84,7 @@ class _CallWriter:
             "_index": index,
             "_refuse": _refuse,
             "_address": _choose_address(),
+            "_addresses": lambda found: (ctypes.c_void_p * len(found))(*found),
         }
         # Names that lengths can be computed from
         self.known = {name for name, kind in kinds.items() if kind is int}
@@ -95,6 +97,8 @@ class _CallWriter:
             return name
         if get_origin(kind) is tuple:
             return self._pass_tuple(name, get_args(kind))
+        if get_origin(kind) is list:
+            return self._pass_list(name, get_args(kind)[0])
         if get_origin(kind) is Annotated:
             return self._pass_array(name, get_args(kind)[0], is_written=True)
         return self._pass_array(name, kind, is_written=False)
@@ -109,6 +113,16 @@ class _CallWriter:
         passed = [self.pass_on(part, kind) for part, kind in zip(parts, kinds, strict=True)]
         self.scope[f"_struct_{name}"] = ctypes.c_void_p * len(kinds)
         return f"_struct_{name}({', '.join(passed)})"
+
+    def _pass_list(self, name: str, kind: Any) -> str:
+        each, kept = f"each_of_{name}", (self.types, self.shapes)
+        self.types, self.shapes = [], []
+        passed = self._pass_array(each, kind, is_written=False)
+        checks = [*self.types, *self.shapes, f"_{name}.append({passed})"]
+        self.types, self.shapes = kept
+        # All lengths are known there.
+        self.shapes += [f"_{name} = []", f"for {each} in {name}:", *(f"    {c}" for c in checks)]
+        return f"_addresses(_{name})"
 
     def _pass_array(self, name: str, kind: Any, *, is_written: bool) -> str:
         dtype, lengths = np.dtype(kind.dtypes[-1]), kind.dim_str.split()
@@ -214,3 +228,9 @@ def _load() -> tuple[ctypes.CDLL, Path]:
     level = lowest.processor_level()
     path = libraries[max(each for each in libraries if each <= level or each == min(libraries))]
     return ctypes.CDLL(str(path)), path
+
+
+def library_function(name: str) -> int:
+    """Return the address of a function of C's mathematics library, for kernels that call it."""
+    library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)
+    return ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0
