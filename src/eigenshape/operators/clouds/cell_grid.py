@@ -121,9 +121,10 @@ def gaussian_differences(
     """Return w_i Σ_j w_j exp(-|x_i - x_j|²/4t) (f_i - f_j) for each column f, storing nothing between pairs."""
     sorted_values = np.ascontiguousarray(values[grid.order])
     sums = np.empty_like(sorted_values)
-    known = (grid.points, grid.cells, grid.runs), grid.reach**2
-    kernel = 1 / (4 * t), EXPONENTIAL, weights[grid.order]
-    _each_cell(grid, partial(sum_differences, *known, *kernel, sorted_values, sums))
+    arrays = weights[grid.order], sorted_values, sums
+    cells = grid.points, grid.cells, grid.runs
+    work = partial(sum_differences, cells, grid.reach**2, 1 / (4 * t), EXPONENTIAL, *arrays)
+    _each_cell(grid, work)
     result = np.empty_like(sums)
     result[grid.order] = sums
     return result
