@@ -1,17 +1,17 @@
 """Kernel of a maximum matching (Hopcroft and Karp 1973)."""
 
 import numpy as np
-from jaxtyping import Int, Int32, Int64
+from jaxtyping import Int, Int64
 
 from eigenshape._kernels import Out, kernel
 
+Indices = Int64[np.ndarray, " _"]
+Rows = Int64[np.ndarray, " n"]
+
 
 def match_rows(
-    starts: Int[np.ndarray, " n1"],
-    columns: Int[np.ndarray, " k"],
-    n_columns: int,
-    first: Int64[np.ndarray, " n"],
-) -> tuple[Int64[np.ndarray, " n"], Int64[np.ndarray, " n"]]:
+    starts: Int[np.ndarray, " n+1"], columns: Int[np.ndarray, " _"], n_columns: int, first: Rows
+) -> tuple[Rows, Rows]:
     """Match as many rows as possible with a column each.
 
     The columns of row i are columns[starts[i]:starts[i + 1]]. `first` is a matching to start from:
@@ -20,25 +20,27 @@ def match_rows(
     such rows. These rows are more than the columns in their entries, which proves that no matching
     is larger (Hall 1935).
     """
-    column_of, row_of = first.copy(), np.full(n_columns, -1)
-    depth, following, path = np.empty((3, len(first)), dtype=np.int64)
-    graph = np.asarray(starts, dtype=np.int64), np.asarray(columns, dtype=np.int32)
-    improve_matching(*graph, column_of, row_of, depth, following, path)
+    n = len(starts) - 1
+    row_of, column_of = np.full(n_columns, -1), first.copy()
+    depth = np.full(n, -1)
+    scratch = np.empty((3, n), dtype=np.int64)
+    graph = starts.astype(np.int64, copy=False), columns.astype(np.int64, copy=False)
+    complete_matching(*graph, row_of, column_of, depth, *scratch)
     return column_of, depth
 
 
 @kernel("n")
-def improve_matching(
-    starts: Int64[np.ndarray, " n_starts"],
-    columns: Int32[np.ndarray, " k"],
-    column_of: Out[Int64[np.ndarray, " n_starts-1"]],
-    row_of: Out[Int64[np.ndarray, " n_columns"]],
-    depth: Out[Int64[np.ndarray, " n"]],
-    following: Out[Int64[np.ndarray, " n"]],
-    path: Out[Int64[np.ndarray, " n"]],
+def complete_matching(
+    starts: Int64[np.ndarray, "n+1"],
+    columns: Indices,
+    row_of: Out[Indices],
+    column_of: Out[Rows],
+    depth: Out[Rows],
+    following: Out[Rows],
+    queue: Out[Rows],
+    path: Out[Rows],
 ) -> None:
-    """Fill the results of `match_rows`.
+    """Complete a matching, the column of each row, to a largest one; fill depths as in `match_rows`.
 
-    On entry `column_of` is the matching to start from, and `row_of` is -1; it becomes the row of
-    each column. `following` and `path` are scratch.
+    `row_of` comes filled with -1; it and the last three are scratch.
     """

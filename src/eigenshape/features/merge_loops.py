@@ -1,4 +1,4 @@
-"""Kernels of merge trees and diagrams: join faces over edges, and points over links, in order.
+"""Kernels of `merge_tree`: sort the sides of faces by edge, and join faces across them.
 
 Here the number of a vertex is its rank; the lowest vertex is 0. Sides are grouped by the higher
 vertex of their edge, so a loop over falling ranks visits the edges in falling order, and only the
@@ -10,22 +10,28 @@ from jaxtyping import Bool, Int, Int32, Int64
 
 from eigenshape._kernels import Out, kernel
 
+Corners = Int32[np.ndarray, "f 3"]
+FaceNumbers = Int32[np.ndarray, " f"]
+Sides = Int32[np.ndarray, " f*3"]
+Points = Int64[np.ndarray, " n"]
+Indices = Int64[np.ndarray, " _"]
+
 
 @kernel("f")
 def find_corners(
     faces: Int64[np.ndarray, "f 3"],
     rank: Int32[np.ndarray, " n"],
-    corners: Out[Int32[np.ndarray, "f 3"]],
+    corners: Out[Corners],
 ) -> None:
     """Fill the ranks of each face's corners, highest first."""
 
 
 @kernel("f")
 def file_sides(
-    corners: Int32[np.ndarray, "f 3"],
-    place: Out[Int64[np.ndarray, " n"]],
-    lower: Out[Int32[np.ndarray, " 3*f"]],
-    owner: Out[Int32[np.ndarray, " 3*f"]],
+    corners: Corners,
+    place: Out[Points],
+    lower: Out[Sides],
+    owner: Out[Sides],
 ) -> None:
     """Group the three sides of each face by their higher vertex.
 
@@ -34,15 +40,15 @@ def file_sides(
     """
 
 
-@kernel("n_starts - 1")
+@kernel("n")
 def join_faces(
-    corners: Int32[np.ndarray, "f 3"],
-    starts: Int64[np.ndarray, " n_starts"],
-    lower: Out[Int32[np.ndarray, " 3*f"]],
-    owner: Out[Int32[np.ndarray, " 3*f"]],
-    climbs_to: Out[Int32[np.ndarray, " f"]],
-    highest: Out[Int32[np.ndarray, " f"]],
-    ended: Out[Int32[np.ndarray, "f 4"]],
+    corners: Corners,
+    starts: Int64[np.ndarray, "n+1"],
+    lower: Out[Sides],
+    owner: Out[Sides],
+    climbs_to: Out[FaceNumbers],
+    highest: Out[FaceNumbers],
+    ended: Out[Int32[np.ndarray, "_ 4"]],
 ) -> int:
     """Join faces across edges in falling order; return the number of basins that end.
 
@@ -56,51 +62,51 @@ def join_faces(
 
 
 def join_points(
-    starts: Int[np.ndarray, " n1"], neighbors: Int[np.ndarray, " k"], order: Int64[np.ndarray, " n"]
-) -> tuple[Int64[np.ndarray, " n"], Int64[np.ndarray, "e 2"]]:
+    starts: Int[np.ndarray, " n+1"], neighbors: Int[np.ndarray, " _"], order: Points
+) -> tuple[Points, Int64[np.ndarray, "ended 2"]]:
     """Add points in the given order, and join each to its neighbors that are already there.
 
     Returns the first point of each point's component and, for each component that was joined to an
     earlier one, its first point and the point that joined them.
     """
     n = len(order)
-    place = np.empty(n, dtype=np.int64)
-    place[order] = np.arange(n)
-    root, ended = np.arange(n), np.empty((n, 2), dtype=np.int64)
-    links = np.asarray(starts, dtype=np.int64), np.asarray(neighbors, dtype=np.int32)
-    n_ended = add_points(*links, np.ascontiguousarray(order), place, root, ended)
+    place, root = np.empty(n, dtype=np.int64), np.arange(n)
+    place[order] = root
+    ended = np.empty((n, 2), dtype=np.int64)
+    graph = starts.astype(np.int64, copy=False), neighbors.astype(np.int64, copy=False)
+    n_ended = add_points(*graph, np.ascontiguousarray(order), place, root, ended)
     return root, ended[:n_ended].copy()
 
 
 @kernel("n")
 def add_points(
-    starts: Int64[np.ndarray, " n_starts"],
-    neighbors: Int32[np.ndarray, " k"],
-    order: Int64[np.ndarray, " n_starts-1"],
-    place: Int64[np.ndarray, " n"],
-    root: Out[Int64[np.ndarray, " n"]],
+    starts: Int64[np.ndarray, "n+1"],
+    neighbors: Indices,
+    order: Points,
+    place: Points,
+    root: Out[Points],
     ended: Out[Int64[np.ndarray, "n 2"]],
 ) -> int:
-    """Fill the results of `join_points`, and return how many components were joined.
+    """Fill roots and endings of `join_points`; return the number of endings.
 
-    `place` is the inverse of `order`; `root` holds the number of each point on entry.
+    `place` is the inverse of the order. On entry, `root` holds the number of each point.
     """
 
 
 def spanning_forest(
-    ends: Int64[np.ndarray, "e 2"], order: Int64[np.ndarray, " e"], n: int
-) -> Bool[np.ndarray, " e"]:
+    ends: Int64[np.ndarray, "m 2"], order: Int64[np.ndarray, " m"], n: int
+) -> Bool[np.ndarray, " m"]:
     """Return, for each edge, whether it joins two components when edges are added in order."""
-    joins = np.empty(len(ends), dtype=bool)
+    joins = np.zeros(len(ends), dtype=np.bool_)
     add_edges(ends, np.ascontiguousarray(order), np.arange(n), joins)
     return joins
 
 
-@kernel("e")
+@kernel("m")
 def add_edges(
-    ends: Int64[np.ndarray, "e 2"],
-    order: Int64[np.ndarray, " e"],
-    root: Out[Int64[np.ndarray, " n"]],
-    joins: Out[Bool[np.ndarray, " e"]],
+    ends: Int64[np.ndarray, "m 2"],
+    order: Int64[np.ndarray, " m"],
+    root: Out[Points],
+    joins: Out[Bool[np.ndarray, " m"]],
 ) -> None:
-    """Fill the result of `spanning_forest`; `root` holds the number of each point on entry."""
+    """Mark the edges that join two components; on entry, `root` holds the number of each point."""
