@@ -6,14 +6,14 @@ from jaxtyping import Bool, Float64, Int64
 from eigenshape._kernels import Out, kernel
 
 
-@kernel("p", "c")
+@kernel("n_polygons", "n")
 def clip_ears(
-    outlines: Float64[np.ndarray, "p c 2"],
+    outlines: Float64[np.ndarray, "n_polygons n 2"],
     rounding: float,
-    triangles: Out[Int64[np.ndarray, "p c-2 3"]],
-    is_simple: Out[Bool[np.ndarray, " p"]],
-    neighbors: Out[Int64[np.ndarray, "2 c"]],
-    shapes: Out[Float64[np.ndarray, " c"]],
+    triangles: Out[Int64[np.ndarray, "n_polygons n-2 3"]],
+    is_simple: Out[Bool[np.ndarray, " n_polygons"]],
+    neighbors: Out[Int64[np.ndarray, "2 n"]],
+    shapes: Out[Float64[np.ndarray, " n"]],
 ) -> None:
     """Cut polygons of c corners into triangles, and say which of them do not cross themselves.
 

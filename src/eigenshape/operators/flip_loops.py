@@ -25,27 +25,29 @@ def cotangents(lengths: Float64[np.ndarray, " h"]) -> Float64[np.ndarray, " h"]:
     return found
 
 
-@kernel("f")
-def fill_areas(lengths: Float64[np.ndarray, " h"], found: Out[Float64[np.ndarray, " f"]]) -> None:
+@kernel("n_faces")
+def fill_areas(
+    lengths: Float64[np.ndarray, " n_sides"], found: Out[Float64[np.ndarray, " n_faces"]]
+) -> None:
     """Fill the area of each triangle."""
 
 
-@kernel("h")
+@kernel("n_sides")
 def fill_cotangents(
-    lengths: Float64[np.ndarray, " h"], found: Out[Float64[np.ndarray, " h"]]
+    lengths: Float64[np.ndarray, " n_sides"], found: Out[Float64[np.ndarray, " n_sides"]]
 ) -> None:
     """Fill the cotangent of the angle opposite to each side."""
 
 
-@kernel("h")
+@kernel("n_sides")
 def flip_edges(
-    tails: Out[Int64[np.ndarray, " h"]],
-    twins: Out[Int64[np.ndarray, " h"]],
-    lengths: Out[Float64[np.ndarray, " h"]],
+    tails: Out[Int64[np.ndarray, " n_sides"]],
+    twins: Out[Int64[np.ndarray, " n_sides"]],
+    lengths: Out[Float64[np.ndarray, " n_sides"]],
     tolerance: float,
     most: int,
-    queue: Out[Int64[np.ndarray, " h"]],
-    is_waiting: Out[Bool[np.ndarray, " h"]],
+    queue: Out[Int64[np.ndarray, " n_sides"]],
+    is_waiting: Out[Bool[np.ndarray, " n_sides"]],
 ) -> int:
     """Flip edges in place until all are Delaunay; return the number of flips.
 

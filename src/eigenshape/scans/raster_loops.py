@@ -6,15 +6,15 @@ from jaxtyping import Float64, Int64
 from eigenshape._kernels import Out, kernel
 
 
-@kernel("f", "h", "w")
+@kernel("n_faces", "height", "width")
 def fill_buffer(
     points: Float64[np.ndarray, "n 3"],
-    faces: Int64[np.ndarray, "f 3"],
+    faces: Int64[np.ndarray, "n_faces 3"],
     least_doubled_area: float,
     slack: float,
-    face_at: Out[Int64[np.ndarray, "h w"]],
-    weights: Out[Float64[np.ndarray, "h w 3"]],
-    depth: Out[Float64[np.ndarray, "h w"]],
+    face_at: Out[Int64[np.ndarray, "height width"]],
+    weights: Out[Float64[np.ndarray, "height width 3"]],
+    depth: Out[Float64[np.ndarray, "height width"]],
 ) -> None:
     """Write the nearest face at the middle of each pixel, its weights there, and its height.
 

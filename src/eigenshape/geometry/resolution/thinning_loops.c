@@ -3,7 +3,7 @@
 
 /* The height of a face above its longest side, as a share of that; less is a sliver. */
 static const double LEAST_HEIGHT = 0.03;
-enum { FREE, RIM, FIXED }; /* kinds of vertices */
+enum { FREE = 0, RIM = 1, FIXED = 2 }; /* kinds of vertices */
 
 struct surface {
     const double (*points)[3];

@@ -13,15 +13,15 @@ from eigenshape._kernels import Out, kernel
 RIM, FIXED = 1, 2  # kinds of vertices beside free ones, which are 0; FIXED ones never move
 
 
-@kernel("n")
+@kernel("n_vertices")
 def collapse_short_edges(
-    points: Float64[np.ndarray, "n 3"],
-    faces: Out[Int64[np.ndarray, "f 3"]],
-    alive: Out[Bool[np.ndarray, " f"]],
-    heads: Out[Int64[np.ndarray, " n"]],
-    links: Out[Int64[np.ndarray, " 3*f"]],
-    kinds: Int64[np.ndarray, " n"],
-    marks: Out[Int64[np.ndarray, "n+1 2"]],
+    points: Float64[np.ndarray, "n_vertices 3"],
+    faces: Out[Int64[np.ndarray, "n_faces 3"]],
+    alive: Out[Bool[np.ndarray, " n_faces"]],
+    heads: Out[Int64[np.ndarray, " n_vertices"]],
+    links: Out[Int64[np.ndarray, " 3*n_faces"]],
+    kinds: Int64[np.ndarray, " n_vertices"],
+    marks: Out[Int64[np.ndarray, "n_vertices+1 2"]],
     length: float,
     most_neighbors: int,
     least_cosine: float,
@@ -35,10 +35,10 @@ def collapse_short_edges(
     """
 
 
-@kernel("f")
+@kernel("n_faces")
 def link_corners(
-    faces: Int64[np.ndarray, "f 3"],
-    heads: Out[Int64[np.ndarray, " n"]],
-    links: Out[Int64[np.ndarray, " 3*f"]],
+    faces: Int64[np.ndarray, "n_faces 3"],
+    heads: Out[Int64[np.ndarray, " n_vertices"]],
+    links: Out[Int64[np.ndarray, " 3*n_faces"]],
 ) -> None:
     """Fill the lists of corners; `heads` is -1 on entry."""

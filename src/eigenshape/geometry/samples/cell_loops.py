@@ -6,11 +6,11 @@ from jaxtyping import Float64
 from eigenshape._kernels import Out, kernel
 
 
-@kernel("n", "k")
+@kernel("n_sets", "n_points")
 def cell_areas(
-    places: Float64[np.ndarray, "n k 2"],
-    areas: Out[Float64[np.ndarray, " n"]],
-    scratch: Out[Float64[np.ndarray, "2 2*k+4 2"]],
+    places: Float64[np.ndarray, "n_sets n_points 2"],
+    areas: Out[Float64[np.ndarray, " n_sets"]],
+    scratch: Out[Float64[np.ndarray, "2 2*n_points+4 2"]],
 ) -> None:
     """Fill the area of the origin's Voronoi cell within the convex hull, for each point set.
 

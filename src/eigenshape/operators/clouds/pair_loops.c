@@ -4,17 +4,12 @@
 /* C's exp, which kernels are given: they call no library of themselves. */
 typedef double function(double);
 
-/* A half-open range of points. */
-struct run {
-    int64_t first, end;
-};
-
-/* Points in the order of cells, the first of each cell, and the runs that hold all partners of the
-   points of a cell. */
+/* Points in the order of cells, the first of each cell, and the runs, half-open ranges, that hold
+   all partners of the points of a cell. */
 struct cells {
     const double *points;
     const int64_t *firsts;
-    const struct run *runs;
+    const int64_t (*runs)[2];
 };
 
 static double square_between(const double *one, const double *two, int64_t dim) {
@@ -35,7 +30,7 @@ KERNEL void count_pairs(const struct cells *cells, const int64_t *order, double 
             if (!wanted[order[i]]) continue;
             int64_t found = 0;
             for (int64_t run = cell * n_runs; run < (cell + 1) * n_runs; run++) {
-                for (int64_t j = cells->runs[run].first; j < cells->runs[run].end; j++)
+                for (int64_t j = cells->runs[run][0]; j < cells->runs[run][1]; j++)
                     found += square_between(points + i * dim, points + j * dim, dim) <= farthest;
             }
             counts[order[i]] = found;
@@ -68,7 +63,7 @@ KERNEL void fill_pairs(const struct cells *cells, const int64_t *order, const in
            ascending. */
         int64_t n_near = 0;
         for (int64_t run = cell * n_runs; run < (cell + 1) * n_runs; run++) {
-            for (int64_t j = cells->runs[run].first; j < cells->runs[run].end; j++)
+            for (int64_t j = cells->runs[run][0]; j < cells->runs[run][1]; j++)
                 numbers[n_near++] = order[j];
         }
         sort(numbers, n_near);
@@ -101,7 +96,7 @@ KERNEL void sum_differences(const struct cells *cells, double farthest, double r
             double *sum = sums + i * n_values;
             for (int64_t b = 0; b < n_values; b++) sum[b] = 0;
             for (int64_t run = cell * n_runs; run < (cell + 1) * n_runs; run++) {
-                for (int64_t j = cells->runs[run].first; j < cells->runs[run].end; j++) {
+                for (int64_t j = cells->runs[run][0]; j < cells->runs[run][1]; j++) {
                     double square = square_between(points + i * dim, points + j * dim, dim);
                     if (!(square <= farthest)) continue;
                     double pair = weights[i] * weights[j] * exp_of(-rate * square);

@@ -13,11 +13,13 @@ from jaxtyping import Bool, Float64, Int, Int32, Int64
 from eigenshape._kernels import Out, kernel
 
 Cells: TypeAlias = tuple[
-    Float64[np.ndarray, "n d"], Int64[np.ndarray, " firsts"], Int64[np.ndarray, "firsts-1 runs 2"]
+    Float64[np.ndarray, "n dim"],
+    Int64[np.ndarray, "n_cells+1"],
+    Int64[np.ndarray, "n_cells n_runs 2"],
 ]
 
 
-@kernel("d", "runs")
+@kernel("dim", "n_runs")
 def count_pairs(
     cells: Cells,
     order: Int64[np.ndarray, " n"],
@@ -30,7 +32,7 @@ def count_pairs(
     """Count the partners of the wanted points, which are numbered as before they were sorted."""
 
 
-@kernel("d", "runs")
+@kernel("dim", "n_runs")
 def fill_pairs(
     cells: Cells,
     order: Int64[np.ndarray, " n"],
@@ -40,10 +42,10 @@ def fill_pairs(
     exponential: int,
     weights: Float64[np.ndarray, " n"],
     starts: Int64[np.ndarray, " n+1"],
-    columns: Out[Int32[np.ndarray, " z"]],
-    values: Out[Float64[np.ndarray, " z"]],
+    columns: Out[Int32[np.ndarray, " n_entries"]],
+    values: Out[Float64[np.ndarray, " n_entries"]],
     numbers: Out[Int64[np.ndarray, " most"]],
-    near: Out[Float64[np.ndarray, "most d"]],
+    near: Out[Float64[np.ndarray, "most dim"]],
     begin: int,
     end: int,
 ) -> None:
@@ -54,15 +56,15 @@ def fill_pairs(
     """
 
 
-@kernel("d", "runs", "b")
+@kernel("dim", "n_runs", "n_values")
 def sum_differences(
     cells: Cells,
     farthest: float,
     rate: float,
     exponential: int,
     weights: Float64[np.ndarray, " n"],
-    values: Float64[np.ndarray, "n b"],
-    sums: Out[Float64[np.ndarray, "n b"]],
+    values: Float64[np.ndarray, "n n_values"],
+    sums: Out[Float64[np.ndarray, "n n_values"]],
     begin: int,
     end: int,
 ) -> None:
@@ -81,21 +83,21 @@ def component_labels(
 
 @kernel("n")
 def fill_labels(
-    starts: Int64[np.ndarray, " n_starts"],
-    columns: Int32[np.ndarray, " k"],
-    labels: Out[Int64[np.ndarray, " n_starts-1"]],
+    starts: Int64[np.ndarray, "n+1"],
+    columns: Int32[np.ndarray, " _"],
+    labels: Out[Int64[np.ndarray, " n"]],
     stack: Out[Int64[np.ndarray, " n"]],
 ) -> None:
     """Fill the result of `component_labels`; `stack` is scratch."""
 
 
-@kernel("n", "k")
+@kernel("n_points", "n")
 def local_rings(
-    x: Float64[np.ndarray, "n k"],
-    y: Float64[np.ndarray, "n k"],
-    order: Int64[np.ndarray, "n k"],
-    rings: Out[Int64[np.ndarray, "n k"]],
-    hull: Out[Int64[np.ndarray, " 2*k+2"]],
+    x: Float64[np.ndarray, "n_points n"],
+    y: Float64[np.ndarray, "n_points n"],
+    order: Int64[np.ndarray, "n_points n"],
+    rings: Out[Int64[np.ndarray, "n_points n"]],
+    hull: Out[Int64[np.ndarray, " 2*n+2"]],
 ) -> None:
     """Write the convex hull of each row of points by Andrew's monotone chain (1979), then -1.
 

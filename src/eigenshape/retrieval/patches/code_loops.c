@@ -14,8 +14,7 @@ struct form {
     double price;
 };
 
-KERNEL void unpack_rows(const uint8_t *restrict rows, int8_t *restrict codes, int64_t n_rows,
-                        int64_t half) {
+KERNEL void unpack_rows(const uint8_t *rows, int8_t *codes, int64_t n_rows, int64_t half) {
     for (int64_t row = 0; row < n_rows; row++) {
         const uint8_t *packed = rows + row * half;
         int8_t *first = codes + 2 * row * half, *second = first + half;

@@ -1,6 +1,6 @@
 """Kernels of `distance` and `coarse`: codes of four bits, and distances of descriptions or short rows.
 
-A description has `m` codes, for each base radius those of `n_sizes` sizes.
+A description has `n_codes` codes: for each base radius those of `n_sizes` sizes.
 """
 
 import numpy as np
@@ -9,27 +9,29 @@ from jaxtyping import Float32, Float64, Int8, Int16, Int64, UInt8
 from eigenshape._kernels import Out, kernel
 
 
-@kernel("r", "half")
+@kernel("n_rows", "half")
 def unpack_rows(
-    rows: UInt8[np.ndarray, "r half"], codes: Out[Int8[np.ndarray, "r 2*half"]]
+    rows: UInt8[np.ndarray, "n_rows half"], codes: Out[Int8[np.ndarray, "n_rows 2*half"]]
 ) -> None:
     """Write the codes of packed rows: the first half of a code lies in the low half bytes."""
 
 
-@kernel("r", "v")
-def fill_lengths(codes: Int8[np.ndarray, "r v"], found: Out[Float64[np.ndarray, " r"]]) -> None:
+@kernel("n_rows", "width")
+def fill_lengths(
+    codes: Int8[np.ndarray, "n_rows width"], found: Out[Float64[np.ndarray, " n_rows"]]
+) -> None:
     """Write the length of each code; 1 for a code of zeros, whose cosines are 0."""
 
 
-@kernel("m", "v", "k")
+@kernel("n_codes", "width", "n_others")
 def distances_to(
-    query: Int8[np.ndarray, "m v"],
-    query_lengths: Float64[np.ndarray, " m"],
-    others: Int8[np.ndarray, "r v"],
-    other_lengths: Float64[np.ndarray, " r"],
+    query: Int8[np.ndarray, "n_codes width"],
+    query_lengths: Float64[np.ndarray, " n_codes"],
+    others: Int8[np.ndarray, "n_rows width"],
+    other_lengths: Float64[np.ndarray, " n_rows"],
     n_sizes: int,
     price: float,
-    found: Out[Float64[np.ndarray, " k"]],
+    found: Out[Float64[np.ndarray, " n_others"]],
 ) -> None:
     """Write 1 - the mean cosine of one description and each of many, at the best relative size.
 
@@ -37,18 +39,18 @@ def distances_to(
     """
 
 
-@kernel("u", "v", "k")
+@kernel("n_query_codes", "width", "n_others")
 def packed_view_distances(
-    query: Int8[np.ndarray, "u v"],
-    query_lengths: Float64[np.ndarray, " u"],
-    others: list[UInt8[np.ndarray, "_ v//2"]],
-    n_rows: Int64[np.ndarray, " k"],
-    codes: Out[Int8[np.ndarray, "most v"]],
+    query: Int8[np.ndarray, "n_query_codes width"],
+    query_lengths: Float64[np.ndarray, " n_query_codes"],
+    others: list[UInt8[np.ndarray, "_ width//2"]],
+    n_rows: Int64[np.ndarray, " n_others"],
+    codes: Out[Int8[np.ndarray, "most width"]],
     code_lengths: Out[Float64[np.ndarray, " most"]],
-    m: int,
+    n_codes: int,
     n_sizes: int,
     price: float,
-    found: Out[Float64[np.ndarray, " k"]],
+    found: Out[Float64[np.ndarray, " n_others"]],
 ) -> None:
     """Write the mean of two distances to each other shape: to it, and to the nearest of it and its views.
 
@@ -58,13 +60,13 @@ def packed_view_distances(
     """
 
 
-@kernel("s", "d", "n")
+@kernel("n_sizes", "width", "n_rows")
 def scan_rows(
-    query: Int16[np.ndarray, "s d"],
-    rows: Int8[np.ndarray, "n s d"],
+    query: Int16[np.ndarray, "n_sizes width"],
+    rows: Int8[np.ndarray, "n_rows n_sizes width"],
     unit: float,
     price: float,
-    found: Out[Float32[np.ndarray, " n"]],
+    found: Out[Float32[np.ndarray, " n_rows"]],
 ) -> None:
     """Write 1 - the best mean cosine over relative sizes, of one query with each shape.
 

@@ -48,8 +48,9 @@ def find_leading(
     """Return the value of `leading`, and fill the support; the other arrays are scratch."""
 
 
-@kernel("m", "a")
+@kernel("n_points", "n_landmarks")
 def fill_between(
-    lengths: Float32[np.ndarray, "m a"], found: Out[Float32[np.ndarray, "m m"]]
+    lengths: Float32[np.ndarray, "n_points n_landmarks"],
+    found: Out[Float32[np.ndarray, "n_points n_points"]],
 ) -> None:
     """Write the mean of the bounds of each distance that distances to landmarks give."""

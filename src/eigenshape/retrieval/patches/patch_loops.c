@@ -14,7 +14,9 @@ static const double PI = 0x1.921fb54442d18p1;
 
 /* The points, normals and areas of all vertices. */
 struct surface {
-    const double (*points)[3], (*normals)[3], *areas;
+    const double (*points)[3];
+    const double (*normals)[3];
+    const double *areas;
 };
 
 /* The vertices around a point, the nearest first. */

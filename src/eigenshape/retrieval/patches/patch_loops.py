@@ -13,17 +13,17 @@ RING_NUMBERS = TURN_BINS + HEIGHT_BINS + 2
 AREA = TURN_BINS + HEIGHT_BINS  # the place of that logarithm
 
 
-@kernel("m", "n", "r")
+@kernel("n_centers", "n", "n_radii")
 def fill_discs(
-    rows: Float64[np.ndarray, "m n"],
-    centers: Int64[np.ndarray, " m"],
+    rows: Float64[np.ndarray, "n_centers n"],
+    centers: Int64[np.ndarray, " n_centers"],
     surface: tuple[
         Float64[np.ndarray, "n 3"], Float64[np.ndarray, "n 3"], Float64[np.ndarray, " n"]
     ],
-    radii: Float64[np.ndarray, " r"],
+    radii: Float64[np.ndarray, " n_radii"],
     order: Out[Int64[np.ndarray, " n"]],
-    found: Out[Float32[np.ndarray, "m r 4 16"]],
-    covered: Out[Float64[np.ndarray, "m r 4"]],
+    found: Out[Float32[np.ndarray, "n_centers n_radii 4 16"]],
+    covered: Out[Float64[np.ndarray, "n_centers n_radii 4"]],
 ) -> None:
     """Write the numbers of the discs around vertices, for each of the ascending radii.
 
