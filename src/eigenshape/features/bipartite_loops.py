@@ -1,7 +1,7 @@
 """Kernel of a maximum matching (Hopcroft and Karp 1973)."""
 
 import numpy as np
-from jaxtyping import Int64
+from jaxtyping import Int, Int64
 
 from eigenshape._kernels import Out, kernel
 
@@ -9,7 +9,9 @@ Indices = Int64[np.ndarray, " _"]
 Rows = Int64[np.ndarray, " n"]
 
 
-def match_rows(starts: Indices, columns: Indices, n_columns: int, first: Rows) -> tuple[Rows, Rows]:
+def match_rows(
+    starts: Int[np.ndarray, " n+1"], columns: Int[np.ndarray, " _"], n_columns: int, first: Rows
+) -> tuple[Rows, Rows]:
     """Match as many rows as possible with a column each.
 
     The columns of row i are columns[starts[i]:starts[i + 1]]. `first` is a matching to start from:

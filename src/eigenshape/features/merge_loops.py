@@ -6,7 +6,7 @@ few sides at one vertex must be sorted.
 """
 
 import numpy as np
-from jaxtyping import Bool, Int32, Int64
+from jaxtyping import Bool, Int, Int32, Int64
 
 from eigenshape._kernels import Out, kernel
 
@@ -61,7 +61,9 @@ def join_faces(
     """
 
 
-def join_points(starts: Indices, neighbors: Indices, order: Points) -> tuple[Points, Indices]:
+def join_points(
+    starts: Int[np.ndarray, " n+1"], neighbors: Int[np.ndarray, " _"], order: Points
+) -> tuple[Points, Int64[np.ndarray, "ended 2"]]:
     """Add points in the given order, and join each to its neighbors that are already there.
 
     Returns the first point of each point's component and, for each component that was joined to an
