@@ -230,7 +230,8 @@ def _load() -> tuple[ctypes.CDLL, Path]:
     return ctypes.CDLL(str(path)), path
 
 
-def library_function(name: str) -> int:
-    """Return the address of a function of C's mathematics library, for kernels that call it."""
+def math_functions(*names: str) -> tuple[int, ...]:
+    """Return the addresses of functions of C's mathematics library, for kernels that call them."""
     library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)
-    return ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0
+    found = [ctypes.cast(getattr(library, name), ctypes.c_void_p).value for name in names]
+    return tuple(address or 0 for address in found)

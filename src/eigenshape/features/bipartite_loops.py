@@ -10,7 +10,7 @@ Rows = Int64[np.ndarray, " n"]
 
 
 def match_rows(
-    starts: Int[np.ndarray, " n+1"], columns: Int[np.ndarray, " _"], n_columns: int, first: Rows
+    starts: Int[np.ndarray, " _"], columns: Int[np.ndarray, " _"], n_columns: int, first: Rows
 ) -> tuple[Rows, Rows]:
     """Match as many rows as possible with a column each.
 

@@ -62,7 +62,7 @@ def join_faces(
 
 
 def join_points(
-    starts: Int[np.ndarray, " n+1"], neighbors: Int[np.ndarray, " _"], order: Points
+    starts: Int[np.ndarray, " _"], neighbors: Int[np.ndarray, " _"], order: Points
 ) -> tuple[Points, Int64[np.ndarray, "ended 2"]]:
     """Add points in the given order, and join each to its neighbors that are already there.
 

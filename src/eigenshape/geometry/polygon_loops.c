@@ -1,5 +1,5 @@
 /* Ear clipping of polygons: documented in polygon_loops.py. */
-#include "hypotenuse.h"
+#include "kernels.h"
 
 /* In place of the shape of a corner that was cut off. */
 static const double GONE = -2;

@@ -1,120 +1,106 @@
-/* Loops over the sides of an intrinsic triangulation: documented in flip_loops.py. */
-#include "hypotenuse.h"
+/* Loops over the sides of an intrinsic triangulation. The sides of triangle f are 3f, 3f + 1, 3f + 2,
+   in order around it. Side h starts at the vertex `tails[h]`, has length `lengths[h]`, and is glued to
+   side `twins[h]` of another triangle or the same. */
+#include "kernels.h"
 
-static int64_t next_side(int64_t side) { return side % 3 == 2 ? side - 2 : side + 1; }
-
-/* A side of a triangle, and the two that follow it. */
-struct sides {
-    double a, b, c;
-};
-
-static struct sides sides_from(const double *lengths, int64_t side) {
-    int64_t next = next_side(side);
-    return (struct sides){lengths[side], lengths[next], lengths[next_side(next)]};
-}
+static inline int64_t next_side(int64_t side) { return side % 3 == 2 ? side - 2 : side + 1; }
 
 /* Heron's formula in Kahan's order, which is accurate for needles too. */
-static double area_of(struct sides of) {
-    double low = minimum(of.a, of.b), high = maximum(of.a, of.b);
-    double small = minimum(low, of.c), large = maximum(high, of.c);
-    double middle = maximum(low, minimum(high, of.c));
+static double area_of(double a, double b, double c) {
+    double low = a < b ? a : b, high = a < b ? b : a;
+    double small = low < c ? low : c, large = high > c ? high : c;
+    double rest = high < c ? high : c, middle = low > rest ? low : rest;
     double product = (large + (middle + small)) * (small - (large - middle));
     product *= (small + (large - middle)) * (large + (middle - small));
-    return 0.25 * square_root(maximum(product, 0.0));
+    return 0.25 * square_root(product > 0 ? product : 0);
 }
 
-/* The cotangent of the angle opposite to side a, and the size of its terms. */
+KERNEL void fill_areas(const double *lengths, double *found, int64_t f) {
+    for (int64_t i = 0; i < f; i++)
+        found[i] = area_of(lengths[3 * i], lengths[3 * i + 1], lengths[3 * i + 2]);
+}
+
 struct cotangent {
     double value, size;
 };
 
-static struct cotangent cotangent_opposite(struct sides of) {
-    double four_areas = 4 * area_of(of), aa = of.a * of.a, bb = of.b * of.b, cc = of.c * of.c;
-    return (struct cotangent){(bb + cc - aa) / four_areas, (aa + bb + cc) / four_areas};
+/* The cotangent of the angle opposite to a side, and the size of its terms. */
+static struct cotangent cotangent(const double *lengths, int64_t side) {
+    int64_t second = next_side(side);
+    double a = lengths[side], b = lengths[second], c = lengths[next_side(second)];
+    double four_areas = 4 * area_of(a, b, c);
+    return (struct cotangent){(b * b + c * c - a * a) / four_areas,
+                              (a * a + b * b + c * c) / four_areas};
 }
 
-/* The place of the corner opposite to side a: along the side, and perpendicular to it. */
+KERNEL void fill_cotangents(const double *lengths, double *found, int64_t n) {
+    for (int64_t side = 0; side < n; side++) found[side] = cotangent(lengths, side).value;
+}
+
 struct apex {
     double along, above;
 };
 
-static struct apex apex_over(struct sides of) {
-    double along = (of.a * of.a + of.c * of.c - of.b * of.b) / (2 * of.a);
-    return (struct apex){along, 2 * area_of(of) / of.a};
+/* The coordinates of the opposite corner, along a side and perpendicular to it. */
+static struct apex apex(const double *lengths, int64_t side) {
+    int64_t second = next_side(side);
+    double a = lengths[side], b = lengths[second], c = lengths[next_side(second)];
+    return (struct apex){(a * a + c * c - b * b) / (2 * a), 2 * area_of(a, b, c) / a};
 }
 
-KERNEL void fill_areas(const double *lengths, double *found, int64_t n_faces) {
-    for (int64_t f = 0; f < n_faces; f++) found[f] = area_of(sides_from(lengths, 3 * f));
-}
-
-KERNEL void fill_cotangents(const double *lengths, double *found, int64_t n_sides) {
-    for (int64_t side = 0; side < n_sides; side++)
-        found[side] = cotangent_opposite(sides_from(lengths, side)).value;
-}
-
-/* Return whether the angles opposite to an edge sum to more than 180°, beyond rounding. */
-static bool is_crossed(const double *lengths, int64_t side, int64_t twin, double tolerance) {
-    struct cotangent one = cotangent_opposite(sides_from(lengths, side));
-    struct cotangent two = cotangent_opposite(sides_from(lengths, twin));
-    return one.value + two.value < -tolerance * (one.size + two.size);
-}
-
-/* Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): the edge becomes the other
-   diagonal, and each outer side moves to the place of the one before it. */
-static void flip_edge(int64_t *tails, int64_t *twins, double *lengths, int64_t side,
-                      const int64_t outer[4]) {
-    int64_t twin = twins[side];
-    /* The other diagonal of the two triangles, unfolded into the plane. */
-    struct apex one = apex_over(sides_from(lengths, side));
-    struct apex two = apex_over(sides_from(lengths, twin));
-    double diagonal = hypotenuse(lengths[side] - one.along - two.along, one.above + two.above);
-    int64_t old_tails[4], old_twins[4];
-    double old_lengths[4];
+/* Flip the edge of a side. Triangles (u, v, w) and (v, u, x) become (x, w, u) and (w, x, v): the four
+   outer sides, which are filled in, move one place. */
+static void flip(int64_t *tails, int64_t *twins, double *lengths, int64_t side, int64_t *outer) {
+    int64_t twin = twins[side], from[4], twin_of[4];
+    double length_of[4];
+    /* The length of the other diagonal of the two triangles, unfolded. */
+    struct apex one = apex(lengths, side), two = apex(lengths, twin);
+    double crossing = hypotenuse(lengths[side] - one.along - two.along, one.above + two.above);
+    outer[0] = next_side(side), outer[1] = next_side(outer[0]);
+    outer[2] = next_side(twin), outer[3] = next_side(outer[2]);
     for (int k = 0; k < 4; k++) {
-        old_tails[k] = tails[outer[(k + 1) % 4]];
-        old_twins[k] = twins[outer[(k + 1) % 4]];
-        old_lengths[k] = lengths[outer[(k + 1) % 4]];
+        int64_t old = outer[(k + 1) % 4];
+        from[k] = tails[old], twin_of[k] = twins[old], length_of[k] = lengths[old];
     }
     for (int k = 0; k < 4; k++) {
-        /* The twin may be one of the outer sides, which has a new place too. */
-        int64_t other = old_twins[k];
+        int64_t other = twin_of[k];
         for (int j = 0; j < 4; j++) {
-            if (old_twins[k] == outer[(j + 1) % 4]) other = outer[j];
+            if (twin_of[k] != outer[(j + 1) % 4]) continue;
+            other = outer[j];
+            break;
         }
-        tails[outer[k]] = old_tails[k];
-        lengths[outer[k]] = old_lengths[k];
+        tails[outer[k]] = from[k];
+        lengths[outer[k]] = length_of[k];
         twins[outer[k]] = other;
         twins[other] = outer[k];
     }
     tails[side] = tails[outer[2]];
     tails[twin] = tails[outer[0]];
-    lengths[side] = lengths[twin] = diagonal;
+    lengths[side] = lengths[twin] = crossing;
 }
 
 KERNEL int64_t flip_edges(int64_t *tails, int64_t *twins, double *lengths, double tolerance,
-                          int64_t most, int64_t *queue, bool *is_waiting, int64_t n_sides) {
-    int64_t first = 0, length = 0, n_flips = 0;
-    for (int64_t side = 0; side < n_sides; side++) {
-        is_waiting[side] = side < twins[side];
-        if (is_waiting[side]) queue[length++] = side;
+                          int64_t most, int64_t *queue, bool *waiting, int64_t n) {
+    int64_t first = 0, length = 0, flips = 0, outer[4];
+    for (int64_t side = 0; side < n; side++) {
+        if (side >= twins[side]) continue;
+        queue[length++] = side;
+        waiting[side] = true;
     }
-    while (length > 0) {
-        int64_t side = queue[first], twin = twins[side];
-        first = (first + 1) % n_sides;
+    while (length) {
+        int64_t side = queue[first];
+        first = (first + 1) % n;
         length--;
-        is_waiting[side] = false;
-        if (!is_crossed(lengths, side, twin, tolerance)) continue;
-        n_flips++;
-        if (n_flips > most) return -1;
-        int64_t outer[4] = {next_side(side), next_side(next_side(side)), next_side(twin),
-                            next_side(next_side(twin))};
-        flip_edge(tails, twins, lengths, side, outer);
+        waiting[side] = false;
+        struct cotangent one = cotangent(lengths, side), two = cotangent(lengths, twins[side]);
+        if (!(one.value + two.value < -tolerance * (one.size + two.size))) continue;
+        if (++flips > most) return -1;
+        flip(tails, twins, lengths, side, outer);
         for (int k = 0; k < 4; k++) {
-            if (is_waiting[outer[k]] || is_waiting[twins[outer[k]]]) continue;
-            queue[(first + length) % n_sides] = outer[k];
-            is_waiting[outer[k]] = true;
-            length++;
+            if (waiting[outer[k]] || waiting[twins[outer[k]]]) continue;
+            queue[(first + length++) % n] = outer[k];
+            waiting[outer[k]] = true;
         }
     }
-    return n_flips;
+    return flips;
 }

@@ -10,47 +10,53 @@ from jaxtyping import Bool, Float64, Int64
 
 from eigenshape._kernels import Out, kernel
 
+Lengths = Float64[np.ndarray, " n"]
+Sides = Int64[np.ndarray, " n"]
 
-def areas(lengths: Float64[np.ndarray, " h"]) -> Float64[np.ndarray, " f"]:
-    """Return the area of each triangle, by Heron's formula in Kahan's order."""
+
+def areas(lengths: Lengths) -> Float64[np.ndarray, " f"]:
+    """Return the areas of the triangles."""
     found = np.empty(len(lengths) // 3)
     fill_areas(lengths, found)
     return found
 
 
-def cotangents(lengths: Float64[np.ndarray, " h"]) -> Float64[np.ndarray, " h"]:
-    """Return the cotangent of the angle opposite to each side."""
-    found = np.empty_like(lengths)
+@kernel("f")
+def fill_areas(lengths: Float64[np.ndarray, " f*3"], found: Out[Float64[np.ndarray, " f"]]) -> None:
+    """Fill the areas of the triangles."""
+
+
+def cotangents(lengths: Lengths) -> Lengths:
+    """Return the cotangents of the angles opposite to the sides."""
+    found = np.empty(len(lengths))
     fill_cotangents(lengths, found)
     return found
 
 
-@kernel("n_faces")
-def fill_areas(
-    lengths: Float64[np.ndarray, " n_sides"], found: Out[Float64[np.ndarray, " n_faces"]]
-) -> None:
-    """Fill the area of each triangle."""
+@kernel("n")
+def fill_cotangents(lengths: Lengths, found: Out[Lengths]) -> None:
+    """Fill the cotangents of the angles opposite to the sides."""
 
 
-@kernel("n_sides")
-def fill_cotangents(
-    lengths: Float64[np.ndarray, " n_sides"], found: Out[Float64[np.ndarray, " n_sides"]]
-) -> None:
-    """Fill the cotangent of the angle opposite to each side."""
-
-
-@kernel("n_sides")
-def flip_edges(
-    tails: Out[Int64[np.ndarray, " n_sides"]],
-    twins: Out[Int64[np.ndarray, " n_sides"]],
-    lengths: Out[Float64[np.ndarray, " n_sides"]],
-    tolerance: float,
-    most: int,
-    queue: Out[Int64[np.ndarray, " n_sides"]],
-    is_waiting: Out[Bool[np.ndarray, " n_sides"]],
+def flip_to_delaunay(
+    tails: Sides, twins: Sides, lengths: Lengths, tolerance: float, most: int
 ) -> int:
     """Flip edges in place until all are Delaunay; return the number of flips.
 
     Edges are flipped in the order in which they are found. Returns -1 after more than `most` flips.
-    `queue` and `is_waiting` are scratch.
     """
+    queue, waiting = np.empty(len(tails), dtype=np.int64), np.zeros(len(tails), dtype=np.bool_)
+    return flip_edges(tails, twins, lengths, tolerance, most, queue, waiting)
+
+
+@kernel("n")
+def flip_edges(
+    tails: Out[Sides],
+    twins: Out[Sides],
+    lengths: Out[Lengths],
+    tolerance: float,
+    most: int,
+    queue: Out[Sides],
+    waiting: Out[Bool[np.ndarray, " n"]],
+) -> int:
+    """Flip as `flip_to_delaunay`; the last two are scratch, and `waiting` comes filled with False."""

@@ -6,7 +6,7 @@ from jaxtyping import Float, Int
 from eigenshape._arrays import record
 from eigenshape._errors import ConvergenceError
 from eigenshape.geometry.measure import unit_vectors
-from eigenshape.operators.flip_loops import flip_edges
+from eigenshape.operators import flip_loops
 
 # a pair of cotangents that sums to less below zero is cocircular, relative to the terms in it
 TOLERANCE = 1e-12
@@ -134,8 +134,7 @@ def flip_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Tria
     """
     tails, twins, lengths = cover.tails.copy(), cover.twins.copy(), cover.lengths.copy()
     most = MOST_FLIPS * len(tails)
-    scratch = np.empty(len(tails), dtype=np.int64), np.empty(len(tails), dtype=bool)
-    if flip_edges(tails, twins, lengths, tolerance, most, *scratch) < 0:
+    if flip_loops.flip_to_delaunay(tails, twins, lengths, tolerance, most) < 0:
         raise ConvergenceError(
             f"Flips to Delaunay must end; {most} flips of {len(tails) // 2} edges did not."
         )

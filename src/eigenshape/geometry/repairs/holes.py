@@ -1,11 +1,11 @@
 """The repair of holes: their triangulation between the vertices around them."""
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Int
 
 from eigenshape._errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.hole_loops import fill_chains
+from eigenshape.geometry.repairs.hole_loops import triangulate
 from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import boundary_loops, edge_table, half_edges, neighbor_links
@@ -53,7 +53,7 @@ def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[Tr
                 drawn = drawn[np.isin(drawn, loop).all(axis=1)]
                 here, there = (drawn[:, :, None] == loop).argmax(axis=2).T
                 taken[here, there] = taken[there, here] = True
-            triangles = _triangulate(points, taken)
+            triangles = triangulate(points, taken)
             added += [loop[triangles]] if len(triangles) else []
             n_open += not len(triangles)
     sealed = TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, *added]))
@@ -66,23 +66,3 @@ def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[Tr
     if n_open:
         report += f", left {n_open} that good faces do not close"
     return RepairedMesh(sealed, (report,), np.arange(mesh.n_vertices))
-
-
-def _triangulate(
-    points: Float[np.ndarray, "n 3"], taken: Bool[np.ndarray, "n n"]
-) -> Int[np.ndarray, "_ 3"]:
-    """Return the cheapest triangles of a closed chain of points, without sides that are taken.
-
-    There are none if every triangulation needs such a side, or a triangle without area.
-    """
-    n = len(points)
-    costs, middles = np.empty((n, n)), np.empty((n, n), dtype=np.int64)
-    fill_chains(points, taken, costs, middles)
-    triangles = []
-    chains = [(0, n - 1)] if np.isfinite(costs[0, -1]) else []
-    while chains:
-        i, j = chains.pop()
-        middle = int(middles[i, j])
-        triangles.append((j, middle, i))
-        chains += [chain for chain in ((i, middle), (middle, j)) if chain[1] - chain[0] > 1]
-    return np.array(triangles, dtype=np.int64).reshape(-1, 3)

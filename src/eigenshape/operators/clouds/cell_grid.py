@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import record
-from eigenshape._kernels import library_function
+from eigenshape._kernels import math_functions
 from eigenshape._threads import map_in_threads
 from eigenshape.operators.clouds.pair_loops import count_pairs, fill_pairs, sum_differences
 
@@ -22,7 +22,7 @@ AXES = 3  # axes that are cut into cells, those along which the points spread mo
 # Cells along an axis at most: 2^60 cells have numbers that fit 64 bits.
 CELLS_PER_AXIS = 2**20
 CHUNK = 64  # cells a task
-EXPONENTIAL = library_function("exp")
+(EXPONENTIAL,) = math_functions("exp")
 
 
 @record

@@ -23,11 +23,9 @@ def leading(
     A √s v over the eigenvalue: this is v / √s, but finite even if a share is 0.
     """
     n = len(shares)
-    agreeing, vectors, support = np.empty((n, n)), np.empty((2, n)), np.empty(n)
-    sizes = ratio, slack, shortest
-    value = find_leading(
-        ours, theirs, shares, *sizes, agreeing, *vectors, support, blas_routine("dgemv")
-    )
+    agreeing, (vector, scaled), support = np.empty((n, n)), np.empty((2, n)), np.empty(n)
+    scratch, dgemv = (agreeing, vector, scaled), blas_routine("dgemv")
+    value = find_leading(ours, theirs, shares, ratio, slack, shortest, *scratch, support, dgemv)
     return value, support
 
 
