@@ -146,7 +146,7 @@ def main() -> None:
         unknown = [name for name in chosen if name not in CALLS]
         if unknown:
             sys.exit(f"Calls must be of {', '.join(CALLS)}; {unknown[0]!r} is not.")
-    packages = ["eigenshape", "lapy", "robust_laplacian", "numpy", "scipy", "numba"]
+    packages = ["eigenshape", "lapy", "robust_laplacian", "numpy", "scipy"]
     report = Report(packages, options, COLUMNS, cells)
     with tempfile.TemporaryDirectory() as folder:
         mesh = Path(folder) / "mesh.npz"

@@ -197,7 +197,7 @@ def _choose_address() -> Callable[[np.ndarray], int]:
 
 def _find(stub: Callable[..., Any]) -> Any:
     """Return the C function of a declaration."""
-    library, path = _load()
+    library, path = load_library()
     remedy = "run `python hatch_build.py` in the folder of the sources, or `pip install -e .` again"
     # In an editable install the sources may have changed since the library was built.
     folder = Path(str(sys.modules[stub.__module__].__file__)).parent
@@ -213,7 +213,7 @@ def _find(stub: Callable[..., Any]) -> Any:
 
 
 @cache
-def _load() -> tuple[ctypes.CDLL, Path]:
+def load_library() -> tuple[ctypes.CDLL, Path]:
     """Load the library for this processor; a call of `CDLL` lets other threads run."""
     if VARIABLE in os.environ:
         path = Path(os.environ[VARIABLE])
