@@ -63,8 +63,8 @@ KERNEL double find_leading(const float *ours, const float *theirs, const double 
     return value;
 }
 
-KERNEL void fill_between(const float *lengths, float *found, int64_t n_points,
-                         int64_t n_landmarks) {
+KERNEL void between_landmarks(const float *lengths, float *found, int64_t n_points,
+                              int64_t n_landmarks) {
     for (int64_t one = 0; one < n_points; one++) {
         const float *ours = lengths + one * n_landmarks;
         found[one * n_points + one] = 0;

@@ -47,7 +47,7 @@ def find_leading(
 
 
 @kernel("n_points", "n_landmarks")
-def fill_between(
+def between_landmarks(
     lengths: Float32[np.ndarray, "n_points n_landmarks"],
     found: Out[Float32[np.ndarray, "n_points n_points"]],
 ) -> None:
