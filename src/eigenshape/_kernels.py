@@ -181,6 +181,18 @@ def _choose_address() -> Callable[[np.ndarray], int]:
     return read_field if all(read_field(probe) == ask(probe) for probe in probes) else ask
 
 
+@cache
+def math_functions(*names: str) -> tuple[int, ...]:
+    """Return the addresses of functions of the C library, such as exp, for kernels that take them.
+
+    A kernel that called them itself would be tied to one C library.
+    """
+    libraries = {"nt": "ucrtbase", "posix": None}  # None is what this process has loaded
+    library = ctypes.CDLL(libraries[os.name])
+    addresses = [ctypes.cast(library[name], ctypes.c_void_p).value for name in names]
+    return tuple(address for address in addresses if address)
+
+
 def _find(stub: Callable[..., Any]) -> Any:
     """Return the C function of a declaration."""
     library, path = _load()

@@ -1,14 +1,23 @@
-"""Compiled loops of `matching`: matches that agree, and distances by landmarks."""
+"""Kernels of `matching`: matches that agree, and distances by landmarks."""
 
 import numpy as np
+from jaxtyping import Float, Float32, Float64
 
-from eigenshape._compile import njit
+from eigenshape._kernels import Out, kernel
 
 ROUNDS = 20  # of the power method
 
+Square = Float64[np.ndarray, "n n"]
 
-@njit
-def leading(ours, theirs, shares, ratio, slack, least):
+
+def leading(
+    ours: Float[np.ndarray, "n n"],
+    theirs: Float[np.ndarray, "n n"],
+    shares: Float[np.ndarray, " n"],
+    ratio: float,
+    slack: float,
+    least: float,
+) -> tuple[float, Float64[np.ndarray, " n"]]:
     """Return the largest eigenvalue of the agreement of matches, and the support of each match.
 
     `ours` and `theirs` are distances between matched points; the first are multiplied by `ratio`.
@@ -16,39 +25,35 @@ def leading(ours, theirs, shares, ratio, slack, least):
     distance. For the matrix √s A √s with the shares s, and its eigenvector v, the support is
     A √s v over the eigenvalue: this is v / √s, but finite even if a share is 0.
     """
-    count = len(ours)
-    agreeing = np.zeros((count, count))
-    for one in range(count):
-        for two in range(one):
-            a, b = ratio * ours[one, two], theirs[one, two]
-            if np.isinf(a) or np.isinf(b):
-                continue
-            error = abs(a - b) / max(a, b, least) / slack
-            if error < 1:
-                agreeing[one, two] = agreeing[two, one] = 1 - error * error
-    roots, vector = np.sqrt(shares), np.ones(count)
-    support, value = np.zeros(count), 0.0
+    n = len(ours)
+    agreeing = np.zeros((n, n))
+    lengths = ours.astype(np.float64), theirs.astype(np.float64)
+    fill_agreement(*lengths, ratio, slack, least, agreeing)
+    roots, vector = np.sqrt(shares), np.ones(n)
     for _ in range(ROUNDS):
         support = agreeing @ (roots * vector)
         image = roots * support
-        value = np.sqrt((image * image).sum())
+        value = np.sqrt(np.cumsum(image * image)[-1])
         if value == 0:
             break
         vector, support = image / value, support / value
     return value, support
 
 
-@njit
-def between_landmarks(lengths, found):
+@kernel("n")
+def fill_agreement(
+    ours: Square,
+    theirs: Square,
+    ratio: float,
+    slack: float,
+    least: float,
+    agreeing: Out[Square],
+) -> None:
+    """Fill how far two matches agree, as `leading` says; `agreeing` comes filled with 0."""
+
+
+@kernel("n", "a")
+def between_landmarks(
+    lengths: Float32[np.ndarray, "n a"], found: Out[Float32[np.ndarray, "n n"]]
+) -> None:
     """Write the mean of the bounds of each distance that distances to landmarks give."""
-    n_points, n_landmarks = lengths.shape
-    for one in range(n_points):
-        found[one, one] = 0.0
-        for two in range(one):
-            most, least = np.inf, 0.0
-            for landmark in range(n_landmarks):
-                a, b = lengths[one, landmark], lengths[two, landmark]
-                most = min(most, a + b)
-                if a != b:  # two infinite distances have no difference
-                    least = max(least, abs(a - b))
-            found[one, two] = found[two, one] = (most + least) / 2

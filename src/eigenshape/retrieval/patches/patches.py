@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import shortest_path
 
 from eigenshape._arrays import ReadOnly, record, whole_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._kernels import math_functions
 from eigenshape._threads import map_in_threads, one_blas_thread
 from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -227,7 +228,7 @@ def describe_discs(
     Normals and areas are those of the vertices; radii ascend.
     """
     numbers = np.empty((len(points), len(radii), NUMBERS), dtype=np.float32)
-    surface = mesh.vertices, normals, areas
+    surface, libm = (mesh.vertices, normals, areas), math_functions("log")
 
     def describe_task(first: int) -> None:
         scratch = (
@@ -238,7 +239,7 @@ def describe_discs(
         )
         for number in range(first, min(first + DISCS_PER_TASK, len(points))):
             center = mesh.vertices[points[number]]
-            describe_discs_of(rows[number], center, surface, radii, scratch, numbers[number])
+            describe_discs_of(rows[number], center, surface, radii, scratch, numbers[number], libm)
 
     map_in_threads(describe_task, range(0, len(points), DISCS_PER_TASK))
     return numbers
