@@ -27,8 +27,8 @@ def lengths(
 def distances_to(
     query: Int8[np.ndarray, "n_codes width"],
     query_lengths: Float64[np.ndarray, " n_codes"],
-    others: Int8[np.ndarray, "n_rows width"],
-    other_lengths: Float64[np.ndarray, " n_rows"],
+    others: Int8[np.ndarray, "n_others*n_codes width"],
+    other_lengths: Float64[np.ndarray, " n_others*n_codes"],
     n_sizes: int,
     price: float,
     found: Out[Float64[np.ndarray, " n_others"]],
