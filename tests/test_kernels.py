@@ -55,9 +55,7 @@ def members(text, struct):
 
 
 def type_of_entries(kind):
-    """Return the type of entries in C; that of the address of a function is its result's."""
-    if kind is int:
-        return "void"
+    """Return the type of entries in C."""
     written = get_origin(kind) is Annotated
     dtype = str(np.dtype((get_args(kind)[0] if written else kind).dtypes[-1]))
     return ("" if written else "const ") + ENTRIES.get(dtype, f"{dtype}_t")
@@ -68,7 +66,13 @@ def agrees(kind, declared, text):
         return re.fullmatch(rf"{NUMBERS[kind]} \w+", declared)
     if get_origin(kind) is tuple:
         struct = re.fullmatch(r"const struct (\w+) \*\w+", declared)
-        return struct and members(text, struct[1]) == [type_of_entries(k) for k in get_args(kind)]
+        in_c = members(text, struct[1])
+        # A number is the address of a function
+        wanted = [in_c[i] if k is int else type_of_entries(k) for i, k in enumerate(get_args(kind))]
+        return in_c == wanted
+    if get_origin(kind) is list:
+        name = type_of_entries(get_args(kind)[0])
+        return re.fullmatch(rf"{name} \*const \*\w+", declared)
     name = type_of_entries(kind)
     # Rows of eight numbers have a type of their own
     name = name.replace("double", "(?:double|eight)")

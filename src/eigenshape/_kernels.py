@@ -195,6 +195,18 @@ def _choose_address() -> Callable[[np.ndarray], int]:
     return read_field if all(read_field(probe) == ask(probe) for probe in probes) else ask
 
 
+@cache
+def math_functions(*names: str) -> tuple[int, ...]:
+    """Return the addresses of functions of the C library, such as exp, for kernels that take them.
+
+    A kernel that called them itself would be tied to one C library.
+    """
+    libraries = {"nt": "ucrtbase", "posix": None}  # None is what this process has loaded
+    library = ctypes.CDLL(libraries[os.name])
+    addresses = [ctypes.cast(library[name], ctypes.c_void_p).value for name in names]
+    return tuple(address for address in addresses if address)
+
+
 def _find(stub: Callable[..., Any]) -> Any:
     """Return the C function of a declaration."""
     library, path = load_library()
@@ -228,10 +240,3 @@ def load_library() -> tuple[ctypes.CDLL, Path]:
     level = lowest.processor_level()
     path = libraries[max(each for each in libraries if each <= level or each == min(libraries))]
     return ctypes.CDLL(str(path)), path
-
-
-def math_functions(*names: str) -> tuple[int, ...]:
-    """Return the addresses of functions of C's mathematics library, for kernels that call them."""
-    library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)
-    found = [ctypes.cast(getattr(library, name), ctypes.c_void_p).value for name in names]
-    return tuple(address or 0 for address in found)

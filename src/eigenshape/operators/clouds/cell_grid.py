@@ -22,7 +22,7 @@ AXES = 3  # axes that are cut into cells, those along which the points spread mo
 # Cells along an axis at most: 2^60 cells have numbers that fit 64 bits.
 CELLS_PER_AXIS = 2**20
 CHUNK = 64  # cells a task
-(EXPONENTIAL,) = math_functions("exp")
+EXPONENTIAL = math_functions("exp")
 
 
 @record

@@ -1,8 +1,9 @@
 /* Loops over clouds: documented in pair_loops.py. */
 #include "kernels.h"
 
-/* C's exp, which kernels are given: they call no library of themselves. */
-typedef double function(double);
+struct libm {
+    double (*exp)(double);
+};
 
 /* Points in the order of cells, the first of each cell, and the runs, half-open ranges, that hold
    all partners of the points of a cell. */
@@ -53,11 +54,10 @@ static void sort(int64_t *numbers, int64_t n) {
 }
 
 KERNEL void fill_pairs(const struct cells *cells, const int64_t *order, const int64_t *place,
-                       double farthest, double rate, int64_t exponential, const double *weights,
+                       double farthest, double rate, const struct libm *libm, const double *weights,
                        const int64_t *starts, int32_t *columns, double *values, int64_t *numbers,
                        double *near, int64_t begin, int64_t end, int64_t dim, int64_t n_runs) {
     const double *points = cells->points;
-    function *exp_of = (function *)(intptr_t)exponential;
     for (int64_t cell = begin; cell < end; cell++) {
         /* The numbers of points that may lie within reach, before they were sorted into cells,
            ascending. */
@@ -77,7 +77,7 @@ KERNEL void fill_pairs(const struct cells *cells, const int64_t *order, const in
                 double square = square_between(points + i * dim, near + j * dim, dim);
                 if (!(square <= farthest)) continue;
                 columns[entry] = (int32_t)numbers[j];
-                values[entry] = weights[row] * weights[numbers[j]] * exp_of(-rate * square);
+                values[entry] = weights[row] * weights[numbers[j]] * libm->exp(-rate * square);
                 entry++;
             }
         }
@@ -85,11 +85,10 @@ KERNEL void fill_pairs(const struct cells *cells, const int64_t *order, const in
 }
 
 KERNEL void sum_differences(const struct cells *cells, double farthest, double rate,
-                            int64_t exponential, const double *weights, const double *values,
+                            const struct libm *libm, const double *weights, const double *values,
                             double *sums, int64_t begin, int64_t end, int64_t dim, int64_t n_runs,
                             int64_t n_values) {
     const double *points = cells->points;
-    function *exp_of = (function *)(intptr_t)exponential;
     for (int64_t cell = begin; cell < end; cell++) {
         for (int64_t i = cells->firsts[cell]; i < cells->firsts[cell + 1]; i++) {
             const double *own = values + i * n_values;
@@ -99,7 +98,7 @@ KERNEL void sum_differences(const struct cells *cells, double farthest, double r
                 for (int64_t j = cells->runs[run][0]; j < cells->runs[run][1]; j++) {
                     double square = square_between(points + i * dim, points + j * dim, dim);
                     if (!(square <= farthest)) continue;
-                    double pair = weights[i] * weights[j] * exp_of(-rate * square);
+                    double pair = weights[i] * weights[j] * libm->exp(-rate * square);
                     for (int64_t b = 0; b < n_values; b++)
                         sum[b] += pair * (own[b] - values[j * n_values + b]);
                 }

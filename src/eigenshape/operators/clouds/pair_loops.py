@@ -39,7 +39,7 @@ def fill_pairs(
     place: Int64[np.ndarray, " n"],
     farthest: float,
     rate: float,
-    exponential: int,
+    libm: tuple[int],
     weights: Float64[np.ndarray, " n"],
     starts: Int64[np.ndarray, " n+1"],
     columns: Out[Int32[np.ndarray, " n_entries"]],
@@ -51,7 +51,7 @@ def fill_pairs(
 ) -> None:
     """Fill the columns and values of the rows of some cells.
 
-    `place` is the inverse of `order`, and `exponential` the address of C's exp. `numbers` and
+    `place` is the inverse of `order`, and `libm` the address of exp. `numbers` and
     `near` are scratch, with one entry for each point that a cell may reach.
     """
 
@@ -61,7 +61,7 @@ def sum_differences(
     cells: Cells,
     farthest: float,
     rate: float,
-    exponential: int,
+    libm: tuple[int],
     weights: Float64[np.ndarray, " n"],
     values: Float64[np.ndarray, "n n_values"],
     sums: Out[Float64[np.ndarray, "n n_values"]],

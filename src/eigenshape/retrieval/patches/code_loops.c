@@ -14,7 +14,7 @@ struct form {
     double price;
 };
 
-KERNEL void unpack_rows(const uint8_t *rows, int8_t *codes, int64_t n_rows, int64_t half) {
+KERNEL void unpack(const uint8_t *rows, int8_t *codes, int64_t n_rows, int64_t half) {
     for (int64_t row = 0; row < n_rows; row++) {
         const uint8_t *packed = rows + row * half;
         int8_t *first = codes + 2 * row * half, *second = first + half;
@@ -30,7 +30,7 @@ static int32_t dot(const int8_t *one, const int8_t *two, int64_t width) {
     return total;
 }
 
-KERNEL void fill_lengths(const int8_t *codes, double *found, int64_t n_rows, int64_t width) {
+KERNEL void lengths(const int8_t *codes, double *found, int64_t n_rows, int64_t width) {
     for (int64_t row = 0; row < n_rows; row++) {
         const int8_t *code = codes + row * width;
         int32_t squares = dot(code, code, width);
@@ -96,14 +96,14 @@ KERNEL void packed_view_distances(const int8_t *query, const double *query_lengt
     struct form form = {n_codes, n_sizes, width, price};
     struct description ours = {query, query_lengths}, theirs = {codes, code_lengths};
     for (int64_t i = 0; i < n_others; i++) {
-        unpack_rows(others[i], codes, n_rows[i], width / 2);
-        fill_lengths(codes, code_lengths, n_rows[i], width);
+        unpack(others[i], codes, n_rows[i], width / 2);
+        lengths(codes, code_lengths, n_rows[i], width);
         found[i] = view_distance(ours, n_query_codes, theirs, n_rows[i], form);
     }
 }
 
-KERNEL void scan_rows(const int16_t *query, const int8_t *rows, double unit, double price,
-                      float *found, int64_t n_sizes, int64_t width, int64_t n_rows) {
+KERNEL void scan(const int16_t *query, const int8_t *rows, double unit, double price, float *found,
+                 int64_t n_sizes, int64_t width, int64_t n_rows) {
     for (int64_t place = 0; place < n_rows; place++) {
         const int8_t *shape = rows + place * n_sizes * width;
         double best = -INFINITE;

@@ -10,14 +10,14 @@ from eigenshape._kernels import Out, kernel
 
 
 @kernel("n_rows", "half")
-def unpack_rows(
+def unpack(
     rows: UInt8[np.ndarray, "n_rows half"], codes: Out[Int8[np.ndarray, "n_rows 2*half"]]
 ) -> None:
     """Write the codes of packed rows: the first half of a code lies in the low half bytes."""
 
 
 @kernel("n_rows", "width")
-def fill_lengths(
+def lengths(
     codes: Int8[np.ndarray, "n_rows width"], found: Out[Float64[np.ndarray, " n_rows"]]
 ) -> None:
     """Write the length of each code; 1 for a code of zeros, whose cosines are 0."""
@@ -27,8 +27,8 @@ def fill_lengths(
 def distances_to(
     query: Int8[np.ndarray, "n_codes width"],
     query_lengths: Float64[np.ndarray, " n_codes"],
-    others: Int8[np.ndarray, "n_rows width"],
-    other_lengths: Float64[np.ndarray, " n_rows"],
+    others: Int8[np.ndarray, "n_others*n_codes width"],
+    other_lengths: Float64[np.ndarray, " n_others*n_codes"],
     n_sizes: int,
     price: float,
     found: Out[Float64[np.ndarray, " n_others"]],
@@ -61,7 +61,7 @@ def packed_view_distances(
 
 
 @kernel("n_sizes", "width", "n_rows")
-def scan_rows(
+def scan(
     query: Int16[np.ndarray, "n_sizes width"],
     rows: Int8[np.ndarray, "n_rows n_sizes width"],
     unit: float,

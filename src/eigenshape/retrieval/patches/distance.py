@@ -7,7 +7,7 @@ from jaxtyping import Float, Int, Int8, UInt8
 
 from eigenshape.retrieval.patches.code_loops import (
     distances_to,
-    fill_lengths,
+    lengths,
     packed_view_distances,
 )
 
@@ -86,7 +86,7 @@ def _rows(
     """Return codes one below the other, and their lengths."""
     rows = np.ascontiguousarray(codes.reshape(-1, codes.shape[-1]))
     found = np.empty(len(rows))
-    fill_lengths(rows, found)
+    lengths(rows, found)
     return rows, found
 
 

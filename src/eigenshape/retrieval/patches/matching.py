@@ -8,7 +8,7 @@ from eigenshape._arrays import ReadOnly, record
 from eigenshape._errors import InvalidParameterError
 from eigenshape._threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whiten_numbers
-from eigenshape.retrieval.patches.matching_loops import fill_between, leading
+from eigenshape.retrieval.patches.matching_loops import between_landmarks, leading
 from eigenshape.retrieval.patches.patches import RADII, Patches
 
 # Whitened numbers are rounded to sixteenths and clipped at 127 of them, so that one is a byte. With
@@ -148,7 +148,7 @@ def distances_by_landmarks(lengths: Float32[np.ndarray, "m a"]) -> Float32[np.nd
     to any landmark. The mean of the least sum and the largest difference is exact for a landmark.
     """
     distances = np.empty((len(lengths), len(lengths)), dtype=np.float32)
-    fill_between(np.ascontiguousarray(lengths), distances)
+    between_landmarks(np.ascontiguousarray(lengths), distances)
     # Of rounded lengths the bounds may cross, so those that are known are copied.
     n_landmarks = lengths.shape[1]
     distances[:, :n_landmarks] = lengths

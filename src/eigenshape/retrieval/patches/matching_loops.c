@@ -3,16 +3,18 @@
 
 enum { ROUNDS = 20 }; /* of the power method */
 
-/* BLAS: y = a A x + b y, with the sizes and steps of A, x and y. */
-typedef void multiply(const char *transposed, const int *rows, const int *columns, const double *a,
-                      const double *matrix, const int *wide, const double *x, const int *x_step,
-                      const double *b, double *y, const int *y_step);
+/* dgemv of BLAS: y = a A x + b y, with the sizes and steps of A, x and y. */
+struct blas {
+    void (*dgemv)(const char *transposed, const int *rows, const int *columns, const double *a,
+                  const double *matrix, const int *wide, const double *x, const int *x_step,
+                  const double *b, double *y, const int *y_step);
+};
 
-static void multiply_square(multiply *dgemv, int64_t n, const double *matrix, const double *x,
-                            double *y) {
+static void multiply_square(const struct blas *blas, int64_t n, const double *matrix,
+                            const double *x, double *y) {
     int size = (int)n, step = 1;
     double one = 1, zero = 0;
-    dgemv("T", &size, &size, &one, matrix, &size, x, &step, &zero, y, &step);
+    blas->dgemv("T", &size, &size, &one, matrix, &size, x, &step, &zero, y, &step);
 }
 
 /* Return the share by which two matches agree, given the distances between their points. */
@@ -37,7 +39,7 @@ static void fill_agreeing(const float *ours, const float *theirs, double ratio, 
 
 KERNEL double find_leading(const float *ours, const float *theirs, const double *shares,
                            double ratio, double slack, double shortest, double *agreeing,
-                           double *vector, double *scaled, double *support, int64_t dgemv,
+                           double *vector, double *scaled, double *support, const struct blas *blas,
                            int64_t n) {
     fill_agreeing(ours, theirs, ratio, slack, shortest, agreeing, n);
     for (int64_t i = 0; i < n; i++) {
@@ -47,7 +49,7 @@ KERNEL double find_leading(const float *ours, const float *theirs, const double 
     double value = 0;
     for (int round = 0; round < ROUNDS; round++) {
         for (int64_t i = 0; i < n; i++) scaled[i] = square_root(shares[i]) * vector[i];
-        multiply_square((multiply *)(intptr_t)dgemv, n, agreeing, scaled, support);
+        multiply_square(blas, n, agreeing, scaled, support);
         double squares = 0;
         for (int64_t i = 0; i < n; i++) {
             vector[i] = square_root(shares[i]) * support[i];
@@ -63,8 +65,8 @@ KERNEL double find_leading(const float *ours, const float *theirs, const double 
     return value;
 }
 
-KERNEL void fill_between(const float *lengths, float *found, int64_t n_points,
-                         int64_t n_landmarks) {
+KERNEL void between_landmarks(const float *lengths, float *found, int64_t n_points,
+                              int64_t n_landmarks) {
     for (int64_t one = 0; one < n_points; one++) {
         const float *ours = lengths + one * n_landmarks;
         found[one * n_points + one] = 0;

@@ -24,8 +24,8 @@ def leading(
     """
     n = len(shares)
     agreeing, (vector, scaled), support = np.empty((n, n)), np.empty((2, n)), np.empty(n)
-    scratch, dgemv = (agreeing, vector, scaled), blas_routine("dgemv")
-    value = find_leading(ours, theirs, shares, ratio, slack, shortest, *scratch, support, dgemv)
+    scratch, blas = (agreeing, vector, scaled), (blas_routine("dgemv"),)
+    value = find_leading(ours, theirs, shares, ratio, slack, shortest, *scratch, support, blas)
     return value, support
 
 
@@ -41,13 +41,13 @@ def find_leading(
     vector: Out[Float64[np.ndarray, " n"]],
     scaled: Out[Float64[np.ndarray, " n"]],
     support: Out[Float64[np.ndarray, " n"]],
-    dgemv: int,
+    blas: tuple[int],
 ) -> float:
     """Return the value of `leading`, and fill the support; the other arrays are scratch."""
 
 
 @kernel("n_points", "n_landmarks")
-def fill_between(
+def between_landmarks(
     lengths: Float32[np.ndarray, "n_points n_landmarks"],
     found: Out[Float32[np.ndarray, "n_points n_points"]],
 ) -> None:

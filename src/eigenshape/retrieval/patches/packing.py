@@ -5,7 +5,7 @@ import zlib
 import numpy as np
 from jaxtyping import Int8, UInt8
 
-from eigenshape.retrieval.patches.code_loops import unpack_rows
+from eigenshape.retrieval.patches.code_loops import unpack
 from eigenshape.retrieval.patches.matching import (
     LENGTHS,
     N_LANDMARKS,
@@ -33,7 +33,7 @@ def pack_codes(codes: Int8[np.ndarray, "m v"]) -> UInt8[np.ndarray, "m h"]:
 def unpack_codes(rows: UInt8[np.ndarray, "m h"]) -> Int8[np.ndarray, "m v"]:
     """Return the codes that `pack_codes` turned into bytes."""
     codes = np.empty((len(rows), 2 * rows.shape[1]), dtype=np.int8)
-    unpack_rows(np.ascontiguousarray(rows), codes)
+    unpack(np.ascontiguousarray(rows), codes)
     return codes
 
 

@@ -13,7 +13,7 @@ from numpy.lib.format import open_memmap, read_array
 from eigenshape._arrays import ReadOnly, freeze, record
 from eigenshape._errors import FileFormatError
 from eigenshape._files import replacing
-from eigenshape.retrieval.patches.code_loops import scan_rows
+from eigenshape.retrieval.patches.code_loops import scan
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.distance import N_REFERENCES, SIZE_PRICE, measure_isolations
 from eigenshape.retrieval.patches.packing import unpack_codes
@@ -96,8 +96,8 @@ class CoarseRows(ReadOnly):
         """
         query, unit = self.axes.coarse_query(codes)
         found = np.empty(len(self.checksums), dtype=np.float32)
-        scan_rows(query, self.numbers, unit, SIZE_PRICE, found[: len(self.numbers)])
-        scan_rows(query, self.added, unit, SIZE_PRICE, found[len(self.numbers) :])
+        scan(query, self.numbers, unit, SIZE_PRICE, found[: len(self.numbers)])
+        scan(query, self.added, unit, SIZE_PRICE, found[len(self.numbers) :])
         return found[self.rows]
 
     def scores_at(
@@ -114,7 +114,7 @@ class CoarseRows(ReadOnly):
         """
         query, unit = self.axes.coarse_query(codes)
         found = np.empty(len(places), dtype=np.float32)
-        scan_rows(query, self.numbers_at(places), unit, SIZE_PRICE, found)
+        scan(query, self.numbers_at(places), unit, SIZE_PRICE, found)
         return found
 
     def numbers_at(self, places: Int[np.ndarray, " k"]) -> Int8[np.ndarray, "k s q"]:
