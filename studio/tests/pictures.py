@@ -29,6 +29,7 @@ from browser import (
     wait_until_still,
 )
 from PIL import Image
+from playwright.sync_api import Browser
 
 import eigenshape as es
 
@@ -44,13 +45,13 @@ BIPED = {
 }
 
 
-def main(folder: Path, *, n_vertices: int = 8000) -> list[Path]:
+def main(browser: Browser, folder: Path, *, n_vertices: int = 8000) -> list[Path]:
     """Draw all pictures into a folder."""
     giraffe = es.make_creature("giraffe", n_vertices=n_vertices)
     biped = es.make_creature("biped", n_vertices=n_vertices)
     cells = max(4, n_vertices // 650)  # along the short sides of the bar
     bar = es.geometry.boundary_surface(es.shapes.box(cells, 6 * cells, cells, sides=(1, 6, 1)))
-    with tempfile.TemporaryDirectory() as work, start_browser() as browser:
+    with tempfile.TemporaryDirectory() as work:
         draw = partial(draw_shape, browser, folder, Path(work))
         horse, running = (es.make_creature("quadruped", pose) for pose in (0, 1))
         scan = Path(work) / "scan of a running horse.ply"
@@ -203,4 +204,5 @@ def motion_of(page, axis):
 
 
 if __name__ == "__main__":
-    sys.stdout.writelines(f"{path}\n" for path in main(Path(sys.argv[1])))
+    with start_browser() as chromium:
+        sys.stdout.writelines(f"{path}\n" for path in main(chromium, Path(sys.argv[1])))

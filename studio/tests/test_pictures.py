@@ -13,8 +13,8 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 @pytest.mark.long
 @pytest.mark.sweep
-def test_the_pictures_of_the_docs_can_be_drawn(tmp_path):
-    drawn = main(tmp_path, n_vertices=2000)
+def test_the_pictures_of_the_docs_can_be_drawn(browser, tmp_path):
+    drawn = main(browser, tmp_path, n_vertices=2000)
     shown = re.findall(r"\(pictures/(studio_\S+?)\)", (DOCS / "studio.md").read_text())
     assert set(shown) <= {path.name for path in drawn}
     for path in drawn:

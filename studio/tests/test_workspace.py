@@ -252,9 +252,10 @@ def test_a_surface_of_freesurfer_is_opened_by_its_name(page, tmp_path):
     data = np.frombuffer((tmp_path / "lh.pial").read_bytes(), np.uint8)
     facts, _ = page.call("finish", {"kind": "open", "name": "lh.pial"}, {"file": data})
     assert facts["state"]["n_faces"] == 320
-    data = np.frombuffer(b"\xff\xff\xff", np.uint8)
+    counts = np.array([162, 320, 1], ">i4").tobytes()
+    data = np.frombuffer(b"\xff\xff\xff" + counts + bytes(4 * 162), np.uint8)
     error = page.error("finish", {"kind": "open", "name": "lh.sulc"}, {"file": data})
-    assert "ff ff fe" in error["message"]
+    assert "Functions on vertices" in error["message"]
 
 
 def test_opened_points_become_a_surface_and_the_page_is_told(page):

@@ -274,6 +274,9 @@ def names_for_geomorph(folder: Path) -> dict[str, Any]:
     for name, suffix in (("tps", ".tps"), ("morphologika", ".txt"), ("fcsv", ".fcsv")):
         paths[f"{name}_path"] = folder / f"mice{suffix}"
         morpho.write_landmarks(mice["AKR"] if name == "fcsv" else mice, paths[f"{name}_path"])
+    paths["nts_path"] = folder / "mice.nts"  # read, but not written
+    rows = "\n".join(" ".join(map(str, each.points.ravel())) for each in mice.values())
+    paths["nts_path"].write_text(f"1 2L {3 * k} 0 DIM=3\nAKR DBA\n{rows}\n")
     es.write_mesh(mesh, folder / "shape.ply")
     scientific = (
         "sklearn.cross_decomposition",
