@@ -53,6 +53,7 @@ TARGETS = {
 WARNINGS = ["-Wall", "-Wextra", "-Werror"]
 FLAGS = [
     *["-std=c11", "-shared", "-fPIC", "-fvisibility=hidden", *WARNINGS],
+    "-fno-math-errno",  # otherwise roots of negative numbers call the library
     "-ffp-contract=off",  # the same digits from any compiler; lanes.h says where it may fuse
     "-nostdlib",  # otherwise zig builds parts of the C library first, for eight seconds
 ]

@@ -22,6 +22,10 @@
 static inline int64_t lesser(int64_t a, int64_t b) { return a < b ? a : b; }
 static inline int64_t greater(int64_t a, int64_t b) { return a > b ? a : b; }
 
+/* The first, if the two are equal or one is not a number, as min and max in Python. */
+static inline double minimum(double a, double b) { return b < a ? b : a; }
+static inline double maximum(double a, double b) { return b > a ? b : a; }
+
 /* Division that rounds down, as in Python, by a positive number; that of C rounds to zero. */
 static inline int64_t floor_divide(int64_t a, int64_t b) { return a / b - (a % b < 0); }
 
