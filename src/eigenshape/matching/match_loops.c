@@ -53,7 +53,7 @@ KERNEL void couple_pairs(const int64_t *points, const int64_t *images, const str
 /* Row by row, as they lie in memory; each column keeps the least entries so far in order. */
 KERNEL void fill_nearest_rows(const double *rows, double *least, int64_t *found, int64_t n_rows,
                               int64_t n, int64_t count) {
-    for (int64_t i = 0; i < n_rows; i++) {
+    for (int64_t i = 0; i < n_rows && count; i++) {
         int64_t last = lesser(i, count - 1);
         for (int64_t v = 0; v < n; v++) {
             double value = rows[i * n + v], *kept = &least[v * count];

@@ -56,7 +56,7 @@ KERNEL void fill_curve_places(const double (*boxes)[6], int64_t *places, int64_t
 KERNEL void fill_box_tree(const double (*boxes)[6], int64_t levels, double (*nodes)[6],
                           int64_t n_faces) {
     int64_t leaves = (int64_t)1 << levels;
-    for (int64_t leaf = 0; leaf < leaves; leaf++) {
+    for (int64_t leaf = 0; leaf < leaves && n_faces; leaf++) {
         double *node = nodes[leaves - 1 + leaf];
         int64_t first = first_of_leaf(leaf, n_faces, leaves);
         for (int side = 0; side < 6; side++) node[side] = boxes[first][side];
