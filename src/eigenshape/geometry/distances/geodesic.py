@@ -400,7 +400,7 @@ def average_geodesic_distance(
     return shares @ distances
 
 
-def _scratch(fans: Fans, n_sources: int) -> tuple[np.ndarray, ...]:
+def _scratch(fans: Fans, n_sources: int) -> Any:
     """Return the memory that `spread_wave` needs while it runs."""
     n, n_waves = len(fans[0]) - 1, len(fans[1]) + n_sources
     vertices, settled = np.empty((2, n), dtype=np.int64), np.zeros(n, dtype=np.bool_)
