@@ -14,6 +14,7 @@ import sys
 import sysconfig
 import tempfile
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -124,10 +125,18 @@ def compile_library(
     flags = [*FLAGS, *options, "-target", target.zig, f"-mcpu={target.processors[level]}"]
     command = [sys.executable, "-m", "ziglang", "cc", *flags, f"-I{PACKAGE}", "-o"]
     kernels = sources or sorted({*PACKAGE.rglob("*.c")} - {WINDOWS})
+    if not find_spec("ziglang"):
+        raise SystemExit(
+            "To compile the kernels takes ziglang, a C compiler, which is not installed. "
+            "`pip install -e .` compiles by itself; `pip install -e '.[test]'` also installs ziglang."
+        )
     # On Windows the linker leaves other files beside its result.
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / library.name
-        subprocess.run([*command, made, *kernels, WINDOWS], check=True)
+        if subprocess.run([*command, made, *kernels, WINDOWS], check=False).returncode:
+            raise SystemExit(
+                "The kernels cannot be compiled; see the messages of the compiler above."
+            )
         shutil.move(made, library)
 
 

@@ -20,8 +20,7 @@ STATUS, CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
 
 def describe(packages: list[str]) -> dict[str, object]:
-    """Name the processor, its cores, memory and load, the BLAS, the kernels, and the versions of
-    these packages."""
+    """Name the processor, cores, memory, load, BLAS, kernels, and the versions of these packages."""
     np.ones((2, 2)) @ np.ones((2, 2))  # a BLAS is listed once it is loaded
     _, library = load_library()
     level = f"level {library.stem.rpartition('-')[2]}"  # of processors, as in kernels-3.so

@@ -173,11 +173,11 @@ def test_several_results_are_a_tuple():
 def test_kernels_that_are_missing_or_old_say_what_to_run(tmp_path, monkeypatch):
     monkeypatch.setattr(_kernels, "LIBRARIES", tmp_path)
     with pytest.raises(ImportError, match=r"no kernels in .*; run `python hatch_build\.py`"):
-        _kernels._load.__wrapped__()
-    monkeypatch.setattr(_kernels, "_load", lambda: (None, tmp_path))
+        _kernels.load_library.__wrapped__()
+    monkeypatch.setattr(_kernels, "load_library", lambda: (None, tmp_path))
     os.utime(tmp_path, (1, 1))
     monkeypatch.delenv(_kernels.VARIABLE, raising=False)
-    with pytest.raises(ImportError, match=r"older than their sources in .*; run"):
+    with pytest.raises(ImportError, match=r"older than their source .*\.[ch]; run"):
         _kernels._find(dissection.order_leaf)
 
 

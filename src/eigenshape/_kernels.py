@@ -213,11 +213,10 @@ def _find(stub: Callable[..., Any]) -> Any:
     remedy = "run `python hatch_build.py` in the folder of the sources, or `pip install -e .` again"
     # In an editable install the sources may have changed since the library was built.
     folder = Path(str(sys.modules[stub.__module__].__file__)).parent
-    newest = max((file.stat().st_mtime for file in folder.glob("*.[ch]")), default=0)
-    if VARIABLE not in os.environ and newest > path.stat().st_mtime:
-        raise ImportError(
-            f"The kernels in {path} are older than their sources in {folder}; {remedy}."
-        )
+    sources = [*folder.glob("*.[ch]"), *LIBRARIES.parent.glob("*.h")]
+    newest = max(sources, key=lambda file: file.stat().st_mtime, default=path)
+    if VARIABLE not in os.environ and newest.stat().st_mtime > path.stat().st_mtime:
+        raise ImportError(f"The kernels in {path} are older than their source {newest}; {remedy}.")
     try:
         return library[stub.__name__]
     except AttributeError as err:
@@ -240,9 +239,3 @@ def load_library() -> tuple[ctypes.CDLL, Path]:
     level = lowest.processor_level()
     path = libraries[max(each for each in libraries if each <= level or each == min(libraries))]
     return ctypes.CDLL(str(path)), path
-
-
-def library_function(name: str) -> int:
-    """Return the address of a function of C's mathematics library, for kernels that need it."""
-    library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)
-    return ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0

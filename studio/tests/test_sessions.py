@@ -229,15 +229,15 @@ def test_regions_of_another_shape_are_refused(first):
     assert "undone edit to redo" in page.error("finish", kind="redo")["message"]
 
 
-# Starts a studio for each line it reads. A child has all that the parent has imported and compiled, so
-# it is there within a tenth of a second.
+# Starts a studio for each line it reads. A child has all that the parent has imported, so it is
+# there within a tenth of a second.
 SERVERS = """
 import os, signal, sys
 from pathlib import Path
-from eigenshape_studio.shape.analysis import warm_up
+import eigenshape as es
 from eigenshape_studio.server import serve
 
-warm_up()
+es.DeformationSession(es.rig_shape(es.icosphere(1)))  # imports what an edit takes
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)
 port, mesh, sessions = 0, sys.argv[1], Path(sys.argv[2])
 for line in sys.stdin:

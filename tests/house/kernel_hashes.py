@@ -1,4 +1,4 @@
-"""Hashes of what every compiled loop computes, kept from before the loops were written in C.
+"""Hashes of what every kernel computes, kept from before the loops were written in C.
 
     python tests/house/kernel_hashes.py                 compare all with kernel_hashes.json; a minute
     python tests/house/kernel_hashes.py --check front   compare the loops of front_loops.py alone; seconds
@@ -346,7 +346,7 @@ class Recorder:
         name = f"{home.rpartition('.')[2].removesuffix('_loops')}.{value.__name__}"
 
         def recorded(*arguments: Any) -> Any:
-            self.clear_memory(False)  # numba knows these two functions
+            self.clear_memory(False)  # inside, as before
             try:
                 result = value(*arguments)
             finally:
@@ -374,7 +374,7 @@ def hash_results(case: str) -> str:
 
 def hash_loops(case: str) -> dict[str, str]:
     """Return the hash of each loop that a case calls."""
-    CASES[case]()  # numba compiles before NumPy is changed
+    CASES[case]()  # modules are loaded before NumPy is changed
     es.set_threads(1)
     with Recorder() as recorder:
         CASES[case]()

@@ -84,7 +84,7 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
     def waves_from(first: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         sources = np.arange(first, min(first + SOURCES_PER_TASK, n))
         scratch, counts = _scratch(fans, 1), np.empty(len(sources), dtype=np.int64)
-        # Room for the longest wave, and for many short ones in each compiled call.
+        # Room for the longest wave, and for many short ones in each call.
         reached, distances = (
             np.empty(WAVES_OF_ROOM * n, dtype=np.int64),
             np.empty(WAVES_OF_ROOM * n),

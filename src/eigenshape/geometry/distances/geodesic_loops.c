@@ -1,8 +1,6 @@
 /* A wave that starts at some vertices and crosses unfolded triangles. Documented in geodesic_loops.py. */
 #include "kernels.h"
 
-#include "hypotenuse.h"
-
 enum {
     FRONT = -1
 }; /* stands for the source of a vertex that a straight front of several sources reached */

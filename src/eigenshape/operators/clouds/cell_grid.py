@@ -1,4 +1,4 @@
-"""Sums over all pairs of points that a Gaussian reaches: a grid of cells, walked by compiled loops.
+"""Sums over all pairs of points that a Gaussian reaches: a grid of cells, walked by kernels in C.
 
 Points are sorted by cell. A point's partners lie in runs of that order, one run for each
 neighboring column of cells, so that no list of pairs is ever stored. Each row is computed by
@@ -131,7 +131,7 @@ def gaussian_differences(
 
 
 def _each_cell(grid: CellGrid, work: Callable[[int, int], Any]) -> None:
-    """Share the cells among threads; the compiled loops hold no lock, and no two write to one place."""
+    """Share the cells among threads; the kernels hold no lock, and no two write to one place."""
     n_cells = len(grid.cells) - 1
     chunks = range(0, n_cells, CHUNK)
     map_in_threads(lambda first: work(first, min(first + CHUNK, n_cells)), chunks)

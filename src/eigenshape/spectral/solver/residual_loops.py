@@ -25,5 +25,5 @@ def add_sums(
 
     W and B are given by int64 pointers, indices and entries; `values` are the λ. Without residuals
     the values are not used and the last row of `sums` does not change. `images` (2, k) and `part`
-    (3, k), filled with 0, are scratch. One loop for both uses compiles in half the time of two.
+    (3, k), filled with 0, are scratch. One loop serves both uses.
     """
