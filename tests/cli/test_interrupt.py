@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
 
 import pytest
 
@@ -106,27 +105,27 @@ class Finalized:
         signal.raise_signal(signal.SIGINT)
 
 
-@contextmanager
-def pressed_in_a_finalizer():
+def finalize_and_go_on():
+    Finalized()
+    while True:
+        pass
+
+
+def fail_when_stopped():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt as error:
+        raise ValueError from error
+
+
+@pytest.mark.parametrize("work", [finalize_and_go_on, fail_when_stopped])
+def test_where_python_cannot_raise_it_and_where_it_becomes_another_error(work):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with interruptible():
-            Finalized()
-            yield
+        with pytest.raises(KeyboardInterrupt), interruptible():
+            work()
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def test_in_a_finalizer_ctrl_c_is_repeated():
-    with pytest.raises(KeyboardInterrupt), pressed_in_a_finalizer():
-        while True:
-            pass
-
-
-def test_an_error_after_ctrl_c_is_its_consequence():
-    with pytest.raises(KeyboardInterrupt) as raised, pressed_in_a_finalizer():
-        raise ValueError
-    assert isinstance(raised.value.__cause__, ValueError)
 
 
 @pytest.mark.long
