@@ -47,7 +47,7 @@ def main() -> int:
         )
     everything = options & {"--all", "--nightly"}
     nightly = sorted(options & {"--nightly"})  # an option of pytest, too
-    # Tests start hundreds of processes, each of which would compile the whole package anew.
+    # Tests start hundreds of processes, each of which would translate all modules anew.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     # Threads of BLAS burn a core while they wait for each other. Tests, docs and studio share two
     # cores, where eigenvalues of a matrix of 300 rows took 130 times as long with two threads.

@@ -5,7 +5,7 @@
     python benchmarks/bench_approximate.py --quick                a small one
     python benchmarks/bench_approximate.py --peers --repeats 3    beside pyamg (two hours)
 
-Each solve runs in a process of its own, on one core, after a small one that loads and compiles; the operator is built
+Each solve runs in a process of its own, on one core, after a small one that loads what it needs; the operator is built
 before the clock starts. MiB: the most that the process held during the solve, beyond what it held before. promised:
 largest residual over the last eigenvalue. true: largest difference to the certified eigenvalues, over the last one.
 
@@ -263,7 +263,7 @@ def main() -> None:
     parser.add_argument("--accuracies", nargs="+", type=float, default=[1e-3])
     parser.set_defaults(repeats=1)
     options = parser.parse_args()
-    report = Report(["eigenshape", "numpy", "scipy", "numba", "pyamg"], options, COLUMNS, cells)
+    report = Report(["eigenshape", "numpy", "scipy", "pyamg"], options, COLUMNS, cells)
     quick, usual = (QUICK_PEERS, PEERS) if options.peers else (QUICK, CASES)
     for name in options.cases or (quick if options.quick else usual):
         measure(name, report)

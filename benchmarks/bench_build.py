@@ -30,7 +30,7 @@ from report import Report, Row, options_of
 
 import eigenshape as es
 
-PACKAGES = ["eigenshape", "pebble", "numpy", "numba"]
+PACKAGES = ["eigenshape", "pebble", "numpy"]
 COLUMNS = ("case", "figure", "measured", "aim")
 MISBEHAVING = Path(__file__).with_name("misbehaving.py")
 LIGHT = ("--method", "scale-free", "--views", "0")

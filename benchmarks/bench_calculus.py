@@ -170,7 +170,7 @@ def cells(row: Row) -> list[str]:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
-    packages = ["eigenshape", "lapy", "libigl", "potpourri3d", "numpy", "scipy", "numba"]
+    packages = ["eigenshape", "lapy", "libigl", "potpourri3d", "numpy", "scipy"]
     report = Report(packages, options, COLUMNS, cells)
     for task in TASKS:
         for count in COUNTS:

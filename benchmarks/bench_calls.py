@@ -4,7 +4,7 @@
     python benchmarks/bench_calls.py --quick            small shapes, seconds
     python benchmarks/bench_calls.py --only matching    one group
 
-Each group has a process of its own with one thread. It runs once on a small shape, which loads and compiles what it
+Each group has a process of its own with one thread. It runs once on a small shape, which loads what it
 needs.
 """
 
@@ -16,7 +16,7 @@ from report import Report, Row, in_process, options_of
 
 import eigenshape as es
 
-PACKAGES = ["eigenshape", "numpy", "scipy", "numba"]
+PACKAGES = ["eigenshape", "numpy", "scipy"]
 COLUMNS = ("shape", "call", "CPU s", "wall s")
 Call = tuple[str, Callable[[], object]]
 BUILDS: dict[str, Callable[[es.TriangleMesh], es.Laplacian]] = {

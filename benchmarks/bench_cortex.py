@@ -13,7 +13,7 @@ statistics stay below about 3. **calls** are those of neuromodes' documentation 
 its place, with the largest difference of the answers.
 
 Each library has a process of its own with one thread, of BLAS too, on the same core, and solves something small first,
-which loads and compiles what it needs. For modes the libraries take turns, so that all of them see the same load: a
+which loads what it needs. For modes the libraries take turns, so that all of them see the same load: a
 turn is a new process of each, and the ratio is that of their medians. There are `--repeats` turns, and at least five
 for 200 modes, where the ratio is least.
 """
@@ -33,7 +33,7 @@ from report import Report, Row, in_process, options_of, ratio_text
 
 import eigenshape as es
 
-PACKAGES = ["eigenshape", "lapy", "neuromodes", "numpy", "scipy", "numba"]
+PACKAGES = ["eigenshape", "lapy", "neuromodes", "numpy", "scipy"]
 COLUMNS = ("case", "library", "CPU s", "to ours", "agreement")
 SPECIES, COUNTS = ("human", "macaque", "marmoset"), (200, 500, 1000)
 TURNS = 5  # at least, with the fewest modes

@@ -35,7 +35,7 @@ FULL = {  # vertices, splits, region: the thesis' modes, steps 1 and 2, and step
 }
 QUICK = {(2_500, 0, "half"): ("", None, None)}
 ROUNDS = 10
-PACKAGES = ["eigenshape", "numpy", "scipy", "numba", "libigl"]
+PACKAGES = ["eigenshape", "numpy", "scipy", "libigl"]
 STEPS = {
     "rig": "rig, once",
     "bind": "bind",

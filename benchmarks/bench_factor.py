@@ -4,7 +4,7 @@
     python benchmarks/bench_factor.py --quick         a small one, seconds
 
 The matrix is W + σB of the cotangent Laplacian with σ a thousandth of the mean eigenvalue: positive definite, as
-CHOLMOD wants it. Each method runs in a process of its own with one thread, after a small matrix that loads and compiles
+CHOLMOD wants it. Each method runs in a process of its own with one thread, after a small matrix that loads
 what it needs.
 CPU seconds, median; a ratio under 1.4 is a tie. Peers that are not installed are shown as absent: cholespy (CHOLMOD),
 scikit-sparse (CHOLMOD), pypardiso (PARDISO of the MKL).
@@ -32,7 +32,6 @@ PACKAGES = [
     "pypardiso",
     "mkl",
     "numpy",
-    "numba",
 ]
 RIGHT = 8
 LEVELS = 10

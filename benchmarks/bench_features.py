@@ -6,7 +6,7 @@
 The thesis preset: 300 pairs, heat at fifteen times, the most persistent maxima of the first (thesis 5.4, table 5.3).
 Others have no such call: pyFM's and LaPy's eigenpairs, the sum of the signature (pyFM's own, NumPy's for LaPy), and
 ToMATo of GUDHI on the graph of edges. A library is left out where its last time or memory, in proportion to vertices,
-goes beyond 100 seconds or 10 GiB. Each call has a process of its own, after a small one that loads and compiles.
+goes beyond 100 seconds or 10 GiB. Each call has a process of its own, after a small one that loads what it needs.
 """
 
 import statistics
@@ -35,7 +35,7 @@ LIMIT, MEMORY = 100.0, 10_000  # seconds and MiB
 ONCE = 20.0  # seconds, from which one run is enough
 K, N_FEATURES = 300, 15
 OURS = ("eigenshape", "eigenshape, 1e-3")
-PACKAGES = ["eigenshape", "pyfmaps", "lapy", "gudhi", "numpy", "scipy", "numba"]
+PACKAGES = ["eigenshape", "pyfmaps", "lapy", "gudhi", "numpy", "scipy"]
 COLUMNS = (
     "vertices",
     "method",

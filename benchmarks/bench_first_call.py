@@ -1,12 +1,11 @@
-"""What the first call of a fresh installation costs: imports, compilation and work, beside peers.
+"""What the first call of a process costs: imports and work, beside peers.
 
-    python benchmarks/bench_first_call.py                    all calls, about ten minutes
-    python benchmarks/bench_first_call.py --quick            one call and its peer on a small mesh, half a minute
+    python benchmarks/bench_first_call.py                    all calls, about two minutes
+    python benchmarks/bench_first_call.py --quick            one call and its peers on a small mesh, seconds
     python benchmarks/bench_first_call.py --calls solve,find_parts
 
-Each run takes two processes, one after the other, which share a numba cache that is empty at first: the first process
-compiles what it calls, the second loads it. Libraries take turns, and figures are medians. NumPy is imported before the
-clock starts, since every library needs it. CPU seconds are of all threads, user and system.
+Libraries take turns, each run in a process of its own, and figures are medians. NumPy is imported before the clock
+starts, since every library needs it. CPU seconds are of all threads, user and system.
 """
 
 import json
@@ -26,7 +25,6 @@ COLUMNS = (
     "first call",
     "ratio",
     "both",
-    "first call, kept loops",
     "second call",
 )
 N_VERTICES = 5000
@@ -85,9 +83,9 @@ print(json.dumps(np.diff(times).tolist()))
 """
 
 
-def run_once(imports: str, call: str, mesh: Path, cache: str) -> list[float]:
+def run_once(imports: str, call: str, mesh: Path) -> list[float]:
     """Return the CPU seconds of the imports, of the first and of the second call in a new process."""
-    environment = os.environ | dict.fromkeys(THREADS, "1") | {"NUMBA_CACHE_DIR": cache}
+    environment = os.environ | dict.fromkeys(THREADS, "1")
     command = [sys.executable, "-W", "ignore", "-c", WORKER, imports, call, str(mesh)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -100,18 +98,8 @@ def rows_of(name: str, mesh: Path, repeats: int) -> list[Row]:
     runs: dict[str, list[Row]] = {library: [] for library in CALLS[name]}
     for _ in range(repeats):
         for library, done in runs.items():
-            with tempfile.TemporaryDirectory() as cache:
-                loaded, first, again = run_once(*CALLS[name][library], mesh, cache)
-                _, kept, _ = run_once(*CALLS[name][library], mesh, cache)
-            done.append(
-                {
-                    "import": loaded,
-                    "first": first,
-                    "both": loaded + first,
-                    "kept": kept,
-                    "second": again,
-                }
-            )
+            loaded, first, again = run_once(*CALLS[name][library], mesh)
+            done.append({"import": loaded, "first": first, "both": loaded + first, "second": again})
     rows = []
     for library, done in runs.items():
         medians = {key: statistics.median(run[key] for run in done) for key in done[0]}
@@ -121,7 +109,7 @@ def rows_of(name: str, mesh: Path, repeats: int) -> list[Row]:
 
 def cells(row: Row) -> list[str]:
     """Return the texts of one row."""
-    seconds = [f"{row[key]:.2f}" for key in ("import", "first", "both", "kept", "second")]
+    seconds = [f"{row[key]:.2f}" for key in ("import", "first", "both", "second")]
     return [row["call"], row["library"], *seconds[:2], ratio_text(row["ratio"]), *seconds[2:]]
 
 
@@ -146,7 +134,7 @@ def main() -> None:
         unknown = [name for name in chosen if name not in CALLS]
         if unknown:
             sys.exit(f"Calls must be of {', '.join(CALLS)}; {unknown[0]!r} is not.")
-    packages = ["eigenshape", "lapy", "robust_laplacian", "numpy", "scipy", "numba"]
+    packages = ["eigenshape", "lapy", "robust_laplacian", "numpy", "scipy"]
     report = Report(packages, options, COLUMNS, cells)
     with tempfile.TemporaryDirectory() as folder:
         mesh = Path(folder) / "mesh.npz"

@@ -5,7 +5,7 @@
     python benchmarks/bench_growth.py --only points pairs
 
 Each solve runs in a process of its own, on one core with one thread, after a small one that loads
-and compiles what it needs. The exponent of a series is the slope of a line through the logarithms
+what it needs. The exponent of a series is the slope of a line through the logarithms
 of CPU seconds, fitted by least squares: 1 is proportional.
 """
 
@@ -99,7 +99,7 @@ def main() -> None:
     parser = options_of(__doc__)
     parser.add_argument("--only", nargs="+", choices=SERIES, default=list(SERIES))
     options = parser.parse_args()
-    report = Report(["eigenshape", "numpy", "numba", "scipy"], options, COLUMNS, cells)
+    report = Report(["eigenshape", "numpy", "scipy"], options, COLUMNS, cells)
     for name in options.only:
         for row in measured(name, options.repeats, quick=options.quick):
             report.add(row)

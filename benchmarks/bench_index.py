@@ -28,7 +28,7 @@ FULL, QUICK = (10_000, 100_000), (1_000,)
 AT_ONCE = 20_000  # shapes that are added in one step
 N_CHANGED = 10  # shapes that are added, removed or changed before a refresh
 N_POINTS = 10  # of each shape, so that an index of a million fits on a disk
-PACKAGES = ["eigenshape", "numpy", "numba"]
+PACKAGES = ["eigenshape", "numpy"]
 COLUMNS = ("shapes", "what", "wall-clock ms", "CPU ms", "CPU µs a shape")
 RECIPE = es.retrieval.PatchRecipe()
 

@@ -5,7 +5,7 @@
 
 Points lie on the unit sphere. The first size is that of the mesh Laplacian at t = e²; the second a million points with
 100 neighbors each. Every method ends with the same matrix, W as sparse rows; each runs in a process of its own, after
-one small run that loads and compiles what it needs. Wall seconds, median; a ratio under 1.4 is a tie. What bounds the
+one small run that loads what it needs. Wall seconds, median; a ratio under 1.4 is a tie. What bounds the
 work is memory: a matrix of z entries has 12 z bytes, to be written once, and z exponentials.
 """
 
@@ -26,7 +26,7 @@ from eigenshape.operators import gaussian_laplacian
 
 # Points and entries a row: of the mesh Laplacian at t = e², and of a graph with 100 neighbors
 FULL, QUICK = ((160_000, 247), (1_000_000, 100)), ((2_000, 247),)
-PACKAGES = ["eigenshape", "numpy", "scipy", "scikit-learn", "numba"]
+PACKAGES = ["eigenshape", "numpy", "scipy", "scikit-learn"]
 COLUMNS = ("kernel", "method", "wall s", "ratio", "most GiB")
 CUTOFF = 4.0
 

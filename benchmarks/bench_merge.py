@@ -6,7 +6,7 @@
 GUDHI is asked three times: for the persistence of the whole mesh, whose pairs of triangles and edges are ours and are
 compared with them; for that of its vertices and edges alone, which is enough for maxima; and for ToMATo on the same
 graph, which returns a label a vertex as we do a label a face. Its complexes are filled by `insert_batch`, as its
-documentation advises. Each call has a process of its own, after a small one that loads and compiles.
+documentation advises. Each call has a process of its own, after a small one that loads what it needs.
 """
 
 import statistics
@@ -143,7 +143,7 @@ def cells(row: Row) -> list[str]:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
-    report = Report(["eigenshape", "gudhi", "numpy", "scipy", "numba"], options, COLUMNS, cells)
+    report = Report(["eigenshape", "gudhi", "numpy", "scipy"], options, COLUMNS, cells)
     for n in QUICK if options.quick else FULL:
         for function in ("waves", "noise"):
             for row in rows_of(n, function, options.repeats):

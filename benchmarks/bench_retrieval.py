@@ -5,7 +5,7 @@
 
 Creatures stand for the thesis' models, with as many vertices, split for the large one. EVD and LFD are those of
 experiments/ch5_retrieval.
-Each call has a process of its own, after a small one that loads and compiles. The last row of a method is one query
+Each call has a process of its own, after a small one that loads what it needs. The last row of a method is one query
 by a described scan among 300 shapes: patches and heat ask an index, with six and four views of each shape; patches
 score all, verify thirty, and find correspondences with those that they return.
 """
@@ -42,7 +42,7 @@ QUICK = {(2_500, 0): ()}
 QUERY = (0.02, 0.006, 36.0)
 EXACT = 25_000  # vertices, above which the thesis' recipe is approximate, as in the thesis
 N_SHAPES = 300
-PACKAGES = ["eigenshape", "numpy", "scipy", "numba"]
+PACKAGES = ["eigenshape", "numpy", "scipy"]
 COLUMNS = ("vertices", "method", "CPU s", "wall s", "MiB", "the thesis, then")
 
 

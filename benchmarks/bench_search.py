@@ -33,7 +33,6 @@ from pathlib import Path
 
 import numpy as np
 from machine import file_memory, own_memory
-from numba import njit
 from report import Report, Row, in_process, options_of
 
 import eigenshape as es
@@ -54,7 +53,7 @@ POSES = (1, 2, 3)  # of the creatures that are described if there are no meshes
 MESHES_OF_FOLDER = 5
 AT_ONCE = 1000  # shapes that are added, or compared, in one step
 SUMMED = 2**28  # bytes of the array by which the speed of the memory is measured
-PACKAGES = ["eigenshape", "numpy", "numba", "faiss-cpu", "qdrant-client"]
+PACKAGES = ["eigenshape", "numpy", "faiss-cpu", "qdrant-client"]
 COLUMNS = (
     "shapes",
     "method",
@@ -81,26 +80,6 @@ class Entry:
     vectors: np.ndarray  # (u, b, s, v) float32
     points: tuple[PatchPoints, ...]
     picture: bytes
-
-
-@njit(cache=True, fastmath=True)
-def mix(vectors, chosen, weights, clip, codes):
-    """Write the codes of one mixture: each of unit length, in steps from -7 to 7."""
-    n_rows, width = codes.shape
-    mixed = np.empty(width, dtype=np.float32)
-    for row in range(n_rows):
-        squares = np.float32(0)
-        for place in range(width):
-            number = np.float32(0)
-            for part in range(len(chosen)):
-                number += weights[part] * vectors[chosen[part], row, place]
-            mixed[place] = number
-            squares += number * number
-        step = np.float32(7) / (clip * np.sqrt(squares))
-        for place in range(width):
-            codes[row, place] = np.rint(
-                min(max(step * mixed[place], np.float32(-7)), np.float32(7))
-            )
 
 
 def entries(path: Path | None, folder: Path | None) -> tuple[list[Entry], list[Entry]]:
@@ -146,17 +125,17 @@ def closed_meshes(folder: Path) -> Iterator[es.TriangleMesh]:
 def mixtures(
     some: list[Entry], seed: int, first: int, count: int
 ) -> Iterator[tuple[Entry, es.retrieval.PatchDescriptor]]:
-    """Yield mixtures of three entries each, with random weights, and the first of the three."""
-    shape = some[0].vectors.shape
-    vectors = np.array([entry.vectors for entry in some]).reshape(len(some), -1, shape[-1])
+    """Yield the first of three entries each, and a mixture of them with random weights."""
+    vectors = np.array([entry.vectors for entry in some])
     for number in range(first, first + count):
         rng = np.random.default_rng([seed, number])
         chosen = rng.integers(len(some), size=3)
         weights = rng.dirichlet((1, 1, 1)).astype(np.float32)
-        codes = np.empty(vectors.shape[1:], dtype=np.int8)
-        mix(vectors, chosen, weights, np.float32(RECIPE.clip), codes)
+        mixed = np.tensordot(weights, vectors[chosen], 1)
+        steps = 7 / (RECIPE.clip * np.linalg.norm(mixed, axis=-1, keepdims=True))
+        codes = np.rint(np.clip(steps * mixed, -7, 7)).astype(np.int8)
         entry = some[chosen[0]]
-        descriptor = es.retrieval.PatchDescriptor(codes.reshape(shape), entry.points, RECIPE)
+        descriptor = es.retrieval.PatchDescriptor(codes, entry.points, RECIPE)
         yield entry, descriptor
 
 
@@ -277,7 +256,7 @@ def measure_cold(folder: str, pickled: list[bytes]) -> Row:
             os.fsync(file.fileno())
             os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
     query = pickle.loads(pickled[-1])
-    packed_distances(query.codes, [])  # loads what is compiled
+    packed_distances(query.codes, [])  # loads the kernels
     start = time.perf_counter()
     with es.ShapeIndex.open(folder).reader() as reader:
         reader.query(query, n_matches=N_MATCHES)

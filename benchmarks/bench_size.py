@@ -4,7 +4,7 @@
     python benchmarks/bench_size.py --quick    only ours
 
 It reads what is installed here, with no network: a library, and by its metadata all that it needs on this
-system, without extras. Compiled loops and .pyc files, which are written later, are not counted. The third
+system, without extras. Files .pyc, which are written later, are not counted. The third
 column is the library alone, packed as a wheel packs its files. Libraries that are not installed are left out.
 """
 

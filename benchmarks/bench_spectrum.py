@@ -30,7 +30,7 @@ import eigenshape as es
 
 WORKER = Path(__file__).with_name("spectrum_worker.py")
 MEDIANS = ("cpu", "wall", "cpu_build", "memory", "memory_peak", "residual")
-ALSO = ["numpy", "scipy", "numba", "threadpoolctl"]
+ALSO = ["numpy", "scipy", "threadpoolctl"]
 
 
 def arguments(argv: list[str] | None = None) -> argparse.Namespace:

@@ -42,7 +42,7 @@ sys.path[:0] = [str(STUDIO), str(STUDIO / "tests")]
 import browser as studio  # noqa: E402
 from hatch_build import install_packages  # noqa: E402
 
-PACKAGES = ["eigenshape", "eigenshape-studio", "playwright", "numpy", "scipy", "numba"]
+PACKAGES = ["eigenshape", "eigenshape-studio", "playwright", "numpy", "scipy"]
 COLUMNS = ("shape", "figure", "measured", "aim")
 FULL, QUICK = (25_000, 100_000, 20_000), (2_500, 3_000, 2_000)  # drag, first picture, report
 SIZES, QUICK_SIZES = (5_000, 25_000, 100_000, 1_000_000), (2_000, 8_000)
@@ -158,7 +158,7 @@ def measure_drag(browser: Browser, folder: Path, n_vertices: int, repeats: int) 
         studio.open_page(browser, url, size=studio.LAPTOP) as page,
     ):
         wait_until_ready(page)
-        stroke_box(page, 0.5)  # loads and compiles
+        stroke_box(page, 0.5)  # loads what is needed
         ready = [stroke_box(page, 0.6 + 0.02 * number) for number in range(repeats)]
 
         studio.find(page, "tool-pull").click()
@@ -166,7 +166,7 @@ def measure_drag(browser: Browser, folder: Path, n_vertices: int, repeats: int) 
         move = MOVE.replace("AT_X", str(x)).replace("AT_Y", str(y))
         page.mouse.move(x, y)
         page.mouse.down()
-        # The first rest compiles; each of the others is at another place.
+        # The first rest loads what it needs; each of the others is at another place.
         rests = [
             page.evaluate(REST.replace("MOVE", move).replace("NUMBER", str(number)))
             for number in range(1, repeats + 2)

@@ -4,7 +4,7 @@
     python benchmarks/bench_tetrahedra.py --quick     750 tetrahedra, seconds
 
 Each solve runs in a process of its own, on one core with one thread, after a small one that loads
-and compiles what it needs, and includes the matrices. ARPACK solves the same matrices with the
+what it needs, and includes the matrices. ARPACK solves the same matrices with the
 factors of SciPy (SuperLU); of cubic elements these take more memory than most machines have.
 """
 
@@ -78,7 +78,7 @@ def cells(row: Row) -> list[str]:
 def main() -> None:
     """Measure, print, and write what was asked for."""
     options = options_of(__doc__).parse_args()
-    report = Report(["eigenshape", "numpy", "numba", "scipy", "lapy"], options, COLUMNS, cells)
+    report = Report(["eigenshape", "numpy", "scipy", "lapy"], options, COLUMNS, cells)
     for order in range(LINEAR, CUBIC + 1):
         for row in measured(order, options.repeats, 5 if options.quick else 18):
             report.add(row)

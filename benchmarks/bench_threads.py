@@ -5,7 +5,7 @@
     python benchmarks/bench_threads.py --only patches heat
 
 Each case runs in this process, with one thread, then with two, in turn, and the median of each is
-taken; first small cases load and compile what all need. Results are compared to the last bit. Two
+taken; first small cases load what all need. Results are compared to the last bit. Two
 bounds say what the machine allows: a large product of matrices, which needs the cores alone, and
 the sum of a large array, which needs the memory that they share; both by two threads at once.
 """
@@ -173,7 +173,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=CASES, default=list(CASES))
     options = parser.parse_args()
     report = Report(
-        ["eigenshape", "numpy", "numba", "scipy"],
+        ["eigenshape", "numpy", "scipy"],
         options,
         COLUMNS,
         cells,

@@ -39,7 +39,7 @@ import eigenshape.torch as et
 DATA = Path(
     os.environ.get("EIGENSHAPE_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
 )
-PACKAGES = ["eigenshape", "torch", "torch_geometric", "numpy", "scipy", "numba"]
+PACKAGES = ["eigenshape", "torch", "torch_geometric", "numpy", "scipy"]
 COLUMNS = ("what", "case", "ours", "beside it", "")
 # Turns in which graphs are encoded, by us and by the peer.
 TURNS = 10

@@ -3,7 +3,7 @@
     python benchmarks/bench_transport.py              50,000 vertices; some minutes
     python benchmarks/bench_transport.py --quick      2,500 vertices, seconds
 
-Each task takes its own process, after a small call that loads and compiles. CPU seconds: preparation, one source, and
+Each task takes its own process, after a small call that loads what it needs. CPU seconds: preparation, one source, and
 99 more sources with what is kept.
 """
 
@@ -19,7 +19,7 @@ import eigenshape as es
 
 FULL, QUICK = 50_000, 2_500
 SOURCES = 100
-PACKAGES = ["eigenshape", "potpourri3d", "robust_laplacian", "numpy", "scipy", "numba"]
+PACKAGES = ["eigenshape", "potpourri3d", "robust_laplacian", "numpy", "scipy"]
 COLUMNS = ("task", "method", "points", "preparation", "one source", "99 more")
 
 Step = Callable[[int], object]

@@ -100,7 +100,7 @@ FIGURES = {
     "tetrahedra": Figure("bench_tetrahedra.py --repeats 1", ("operators", *SOLVER)),
     "growth": Figure("bench_growth.py --only points pairs kernel --repeats 1", SOLVER),
     "features": Figure("bench_features.py --repeats 1", (*HEAT, *SOLVER)),
-    "first_call": Figure("bench_first_call.py --repeats 1", ("_compile.py", "spectral/solver")),
+    "first_call": Figure("bench_first_call.py --repeats 1", ("_kernels.py", "spectral/solver")),
     "peers": Figure(
         "bench_approximate.py --peers --cases sphere-20k-20 sphere-100k-20 dragon-20",
         ("spectral/multilevel",),

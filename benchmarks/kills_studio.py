@@ -41,10 +41,10 @@ PULL = {"type": "translation", "vector": [0, 0.4, 0.1]}
 SERVERS = """
 import os, signal, sys
 from pathlib import Path
-from eigenshape_studio.shape.analysis import warm_up
+import eigenshape as es
 from eigenshape_studio.server import serve
 
-warm_up()
+es.DeformationSession(es.rig_shape(es.icosphere(1)))  # imports what an edit takes
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)
 for line in sys.stdin:
     if os.fork() == 0:

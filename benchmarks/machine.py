@@ -13,13 +13,17 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_info
 
+from eigenshape._kernels import load_library
+
 ROOT = Path(__file__).resolve().parents[1]
 STATUS, CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
 
 def describe(packages: list[str]) -> dict[str, object]:
-    """Name the processor, its cores, memory and load, the BLAS, and the versions of these packages."""
+    """Name the processor, cores, memory, load, BLAS, kernels, and the versions of these packages."""
     np.ones((2, 2)) @ np.ones((2, 2))  # a BLAS is listed once it is loaded
+    _, library = load_library()
+    level = f"level {library.stem.rpartition('-')[2]}"  # of processors, as in kernels-3.so
     return {
         "cpu": _field("/proc/cpuinfo", r"model name\s*:\s*(.+)")
         or platform.processor()
@@ -30,7 +34,7 @@ def describe(packages: list[str]) -> dict[str, object]:
         "system": platform.platform(terse=True),
         "python": platform.python_version(),
         "blas": sorted({f"{pool['internal_api']} {pool['version']}" for pool in threadpool_info()}),
-        "versions": {package: _version(package) for package in packages},
+        "versions": {package: _version(package) for package in packages} | {"kernels": level},
     }
 
 

@@ -16,7 +16,6 @@ THREADS = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
     "IGL_NUM_THREADS",
 )
 Row = dict[str, Any]

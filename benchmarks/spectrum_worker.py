@@ -1,6 +1,6 @@
 """One solve by one library, in a process of its own: reads a task as JSON, writes what it took and what came back.
 
-`bench_spectrum.py` starts it. Everything that a library loads or compiles on first use is used once before the clock
+`bench_spectrum.py` starts it. Everything that a library loads on first use is used once before the clock
 starts, on a small shape.
 """
 

@@ -61,7 +61,7 @@ def source() -> dict[str, Any]:
         "command": command("--out"),
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "commit": commit(),
-        "machine": describe(["eigenshape", "numpy", "scipy", "numba"]),
+        "machine": describe(["eigenshape", "numpy", "scipy"]),
     }
 
 

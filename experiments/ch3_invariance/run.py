@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
-import numba
 import numpy as np
 from rich.progress import track
 from threadpoolctl import threadpool_limits
@@ -73,7 +72,7 @@ def threaded(
     operator: Callable[[es.TriangleMesh], es.Laplacian], mesh: es.TriangleMesh, count: int
 ) -> es.Spectrum:
     """Solve with so many threads of BLAS and of our own loops."""
-    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
+    es.set_threads(count)
     with threadpool_limits(count):
         return es.solve_spectrum(operator(mesh), K)
 

@@ -8,11 +8,12 @@ from functools import lru_cache
 from math import factorial
 
 import numpy as np
-from light_field_loops import least_difference, outline, power_sums, silhouette
 from scipy.ndimage import label
+from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
 import eigenshape as es
+from eigenshape.scans.raster import rasterize
 
 N_FIELDS = 10  # dodecahedra, as in the paper
 N_VIEWS = 10  # silhouettes of each: 20 vertices, of which opposite ones see mirror images
@@ -22,10 +23,8 @@ N_NUMBERS = 35 + N_FOURIER
 FOURIER_WEIGHT = 2.0  # the scale, beside 1 for moments, to which the authors' program quantizes
 OUTLINE_POINTS = 256  # at which an outline is sampled, evenly along its length
 MARGIN = 1.0  # pixels left free around the sphere that holds the shape
-# Twice the area, in square pixels, up to which a face is seen from its edge and covers no pixel.
-LEAST_DOUBLED_AREA = 1e-12
-# Pixels this far outside a face, in barycentric coordinates, count as inside, so that rounding leaves no gap.
-EDGE_SLACK = 1e-9
+# The eight neighbors of a pixel, row and column, clockwise from the left
+NEIGHBORS = [(0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1)]
 CANDIDATES = 2000  # random rotations from which those of the dodecahedra are chosen
 
 
@@ -43,9 +42,8 @@ def light_field(mesh: es.TriangleMesh, n_fields: int = N_FIELDS, size: int = 256
     for field, turn in enumerate(_turns(n_fields)):
         for view, axis in enumerate(_axes() @ turn.T):
             flat = (points @ _turn_towards(axis).T[:, :2]) * (size / 2 - MARGIN) + size / 2
-            found[field, view] = _describe_silhouette(
-                silhouette(flat, mesh.faces, size, EDGE_SLACK, LEAST_DOUBLED_AREA)
-            )
+            covered = rasterize(np.pad(flat, ((0, 0), (0, 1))), mesh.faces, size, size).face >= 0
+            found[field, view] = _describe_silhouette(covered)
     return found
 
 
@@ -55,7 +53,10 @@ def light_field_distance(first: np.ndarray, second: np.ndarray) -> float:
     For each dodecahedron around one shape and each around the other, the 60 rotations are tried that map a dodecahedron
     to itself.
     """
-    return float(least_difference(first, second, _pairings()))
+    tables = cdist(first.reshape(-1, N_NUMBERS), second.reshape(-1, N_NUMBERS), "cityblock")
+    tables = tables.reshape(len(first), N_VIEWS, len(second), N_VIEWS)
+    paired = (tables[:, view, :, others] for view, others in enumerate(_pairings().T))
+    return float(sum(paired).min())
 
 
 def _in_unit_ball(mesh: es.TriangleMesh) -> np.ndarray:
@@ -90,6 +91,20 @@ def _describe_silhouette(image: np.ndarray) -> np.ndarray:
     return np.concatenate([zernike_magnitudes(sums), FOURIER_WEIGHT * _fourier(image, center)])
 
 
+def power_sums(x: np.ndarray, y: np.ndarray, order: int) -> np.ndarray:
+    """Return the sums of z^m |z|^2j over points z = x + iy, for m + 2j up to the order."""
+    sums = np.zeros((order + 1, order // 2 + 1), dtype=complex)
+    z, square = x + 1j * y, x**2 + y**2
+    power = np.ones_like(z)
+    for m in range(order + 1):
+        term = power
+        for j in range((order - m) // 2 + 1):
+            sums[m, j] = term.sum()
+            term = term * square
+        power = power * z
+    return sums
+
+
 def zernike_magnitudes(sums: np.ndarray) -> np.ndarray:
     """Return |Σ R_n^m(r) e^{imθ}| over the number of points, each in 0..1.
 
@@ -121,14 +136,42 @@ def _fourier(image: np.ndarray, center: np.ndarray) -> np.ndarray:
     names, away = pieces[image] - 1, np.square(np.argwhere(image) - center).sum(axis=1)
     # Take the largest piece; of equal ones the outer one, so the choice turns with the picture.
     largest = pieces == 1 + np.lexsort((np.bincount(names, away), np.bincount(names)))[-1]
-    start = int(largest.argmax())
-    path = outline(largest, start // image.shape[1], start % image.shape[1]).astype(np.float64)
+    path = np.array(outline(largest), dtype=float)
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     places = np.arange(OUTLINE_POINTS) * along[-1] / OUTLINE_POINTS
     distances = np.interp(places, along, np.linalg.norm(path - center, axis=1))
     waves = np.abs(np.fft.rfft(distances))
     return waves[1 : N_FOURIER + 1] / waves[0] if waves[0] > 0 else np.zeros(N_FOURIER)
+
+
+def outline(image: np.ndarray) -> list[tuple[int, int]]:
+    """Return the rows and columns of the pixels passed by Moore's boundary tracing, clockwise.
+
+    The walk starts at the uppermost, and there leftmost, pixel, and ends when its first step would
+    be repeated.
+    """
+    inside = np.pad(image, (0, 1)).tolist()  # index -1 is outside, too
+    start = int(image.argmax())
+    here = start // image.shape[1], start % image.shape[1]
+    path = [here]
+    came, first = 0, -1  # the direction to where the walk looks from, and the first step
+    while True:
+        for turn in range(1, 9):
+            direction = (came + turn) % 8
+            row, column = here[0] + NEIGHBORS[direction][0], here[1] + NEIGHBORS[direction][1]
+            if inside[row][column]:
+                break
+        else:
+            return path  # a single pixel
+        if here == path[0] and direction == first:
+            return path
+        if first < 0:
+            first = direction
+        here = row, column
+        path.append(here)
+        # The last pixel looked at before the step is behind the new one: look on from there.
+        came = (direction + 5) % 8 if direction % 2 else (direction + 6) % 8
 
 
 @lru_cache

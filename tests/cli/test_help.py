@@ -25,7 +25,7 @@ from eigenshape.stability.plan import USUAL_K
 
 COMMAND = typer.main.get_command(app)
 # eigenshape itself and the command line are light; these take a second together
-HEAVY = {"numpy", "numba", "scipy", "matplotlib", "sqlite3", "jaxtyping"}
+HEAVY = {"numpy", "scipy", "matplotlib", "sqlite3", "jaxtyping"}
 NAMES = [*VERBS, *(f"index {verb}" for verb in INDEX_VERBS)]
 WIDE = {"COLUMNS": "2000"}  # no text is broken over lines
 

@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from eigenshape.cli.verbs import interruptible
 from eigenshape.io.mesh_files import write_mesh
 from eigenshape.retrieval.index import ShapeIndex
 from eigenshape.shapes.creatures import make_creature
@@ -31,7 +32,7 @@ sys.addaudithook(wait)
 """
 
 
-def start(*arguments, before=RESTORE, **environment):
+def start(*arguments, before=RESTORE):
     command = [sys.executable, "-c", before + RUN, *map(str, arguments)]
     return subprocess.Popen(
         command,
@@ -39,7 +40,6 @@ def start(*arguments, before=RESTORE, **environment):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        env=os.environ | environment,
     )
 
 
@@ -80,7 +80,7 @@ def herd(tmp_path):
     [
         ("typer", "stopped\n"),
         ("eigenshape.cli.verbs", "stopped\n"),
-        ("numba", "stopped; what was finished is kept\n"),  # the verb has begun
+        ("numpy", "stopped; what was finished is kept\n"),  # the verb has begun
     ],
 )
 def test_while_libraries_are_imported(ball, module, said):
@@ -98,14 +98,34 @@ def test_while_a_verb_runs(ball, tmp_path, verb):
     assert press_ctrl_c(running) == (130, "stopped; what was finished is kept\n")
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("n_files", [1, 8])
-def test_while_loops_are_compiled(ball, tmp_path, n_files):
-    """Much of compiling is callbacks and finalizers, in which Python cannot raise what Ctrl-C raises."""
-    cache = tmp_path / "cache"
-    running = start("spectrum", ball, "-k", 5, NUMBA_CACHE_DIR=str(cache))
-    wait_until(lambda: len(list(cache.rglob("*.nbi"))) >= n_files, running)
-    assert press_ctrl_c(running) == (130, "stopped; what was finished is kept\n")
+class Finalized:
+    """An object in whose finalizer Ctrl-C is pressed, where Python cannot raise it."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+def finalize_and_go_on():
+    Finalized()
+    while True:
+        pass
+
+
+def fail_when_stopped():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt as error:
+        raise ValueError from error
+
+
+@pytest.mark.parametrize("work", [finalize_and_go_on, fail_when_stopped])
+def test_where_python_cannot_raise_it_and_where_it_becomes_another_error(work):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt), interruptible():
+            work()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.long

@@ -48,7 +48,7 @@ def best_turn(before, after, weights):
 
 
 def fitted(before, after, weights, start):
-    """The rotation of the compiled fit, from a quaternion with its real part first, and what is left."""
+    """The rotation of the kernel, from a quaternion with its real part first, and what is left."""
     n = len(before)
     rest, posed = (np.vstack([np.zeros(3), edges]) for edges in (before, after))
     turns = np.tile(np.asarray(start, dtype=float), (n + 1, 1))

@@ -141,6 +141,16 @@ def test_polygons_that_cross_themselves_are_refused_by_number(outline):
     assert cut_polygons(points, starts, corners)[2].tolist() == [1]
 
 
+def test_polygons_of_one_length_are_cut_or_refused_one_by_one():
+    outlines = [DART, BOW, [[0, 0], [1, 0], [2, 0], [1, 0]], DART]
+    points = np.array([corner for outline in outlines for corner in outline], dtype=np.float64)
+    triangles, owners, crossed = cut_polygons(points, np.arange(0, 17, 4), np.arange(16))
+    assert crossed.tolist() == [1]
+    alone = cut(DART)
+    assert (triangles[owners == 0] == alone).all()
+    assert (triangles[owners == 3] == alone + 12).all()
+
+
 def test_corners_in_the_order_of_the_outline_are_what_the_error_asks_for():
     assert areas(BOW, np.array([0, 2, 1, 3])[cut([BOW[i] for i in (0, 2, 1, 3)])]).sum() == 1.5
 

@@ -23,7 +23,7 @@ PROMISED = {
     "solve_spectrum", "heat_kernel_signature", "merge_tree", "segment", "find_parts", "describe", "ShapeIndex",
     "deform",
 }  # fmt: skip
-HEAVY = {"matplotlib", "meshio", "numba", "numpy", "rich", "scipy", "sqlite3"}
+HEAVY = {"matplotlib", "meshio", "numpy", "rich", "scipy", "sqlite3"}
 
 
 def test_the_short_door_holds_what_people_come_for():

@@ -51,7 +51,7 @@ SCANS = {
 
 @pytest.mark.filterwarnings("ignore:.*are not read")
 def test_every_awkward_file_is_a_shape_or_a_named_error_soon(data, capfd):
-    read_shape(data / "nasty" / "pymesh" / "polygon.obj")  # compiles the loop that cuts polygons
+    read_shape(data / "nasty" / "pymesh" / "polygon.obj")  # loads the kernel that cuts polygons
     for name in MESHES.keys() | REFUSED.keys():
         start = time.perf_counter()
         try:

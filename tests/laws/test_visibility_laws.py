@@ -97,7 +97,7 @@ def test_equal_to_exact_arithmetic_pixel_by_pixel(seed):
 
 def test_memory_is_that_of_the_picture_also_for_one_huge_face():
     huge = np.array([[-1e4, -1e4, 0.0], [1e4, -1e4, 1], [0, 1e4, 2]]), np.array([[0, 1, 2]])
-    rasterize(*huge, 7, 7)  # compiled before memory is counted
+    rasterize(*huge, 7, 7)  # loads the kernel before memory is counted
     tracemalloc.start()
     try:
         seen = rasterize(*huge, 700, 700)

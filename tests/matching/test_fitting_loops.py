@@ -1,4 +1,4 @@
-"""Compiled loops of bending beside plain NumPy."""
+"""Kernels of bending beside plain NumPy."""
 
 import numpy as np
 

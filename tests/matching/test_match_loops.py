@@ -1,4 +1,4 @@
-"""Compiled loops of matching beside plain NumPy."""
+"""Kernels of matching beside plain NumPy."""
 
 import numpy as np
 

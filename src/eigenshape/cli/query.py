@@ -249,7 +249,7 @@ def _print(answers: Sequence[_Answer], *, classify: bool) -> None:
             "score: near 0 for the same shape, about 1 if nothing is alike; chance: the share of "
             "unrelated shapes that would score as well"
         )
-    # One time for both: the first scan of a process waits for loops to be compiled, in either.
+    # One time for both: the first scan of a process waits for modules to be loaded, in either.
     seconds = sum(sum(answer.seconds.values()) for answer in answers)
     n_compared = sum(answer.matches.n_compared for answer in answers)
     out.print(

@@ -30,7 +30,7 @@ VERBS = (
     "match", "collection", "deform", "pose", "stability",
     "index", "query",
     "fuse", "compress", "decompress",
-    "studio", "serve", "report", "warm-up", "demo",
+    "studio", "serve", "report", "demo",
 )  # fmt: skip
 INDEX_VERBS = (
     "add", "ls", "rm", "stats", "verify", "compact", "export", "merge", "duplicates", "learn",
@@ -211,9 +211,8 @@ def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
 def interruptible() -> Iterator[None]:
     """Let Ctrl-C raise KeyboardInterrupt while the block runs, so that what is half done is cleared away.
 
-    Python cannot raise it everywhere: in a finalizer or in a callback from C, of which compiling
-    has many, it prints a traceback and goes on. There Ctrl-C is repeated; and an error that comes
-    after it counts as its consequence.
+    Python cannot raise it everywhere: in a finalizer or a callback from C it prints a traceback
+    and goes on. There Ctrl-C is repeated; and an error that comes after it counts as its consequence.
     """
     before, report = signal.getsignal(signal.SIGINT), sys.unraisablehook
     if not callable(before) or threading.current_thread() is not threading.main_thread():

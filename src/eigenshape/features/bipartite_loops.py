@@ -1,12 +1,17 @@
-"""Compiled loops of a maximum matching (Hopcroft and Karp 1973)."""
+"""Kernel of a maximum matching (Hopcroft and Karp 1973)."""
 
 import numpy as np
+from jaxtyping import Int, Int64
 
-from eigenshape._compile import njit
+from eigenshape._kernels import Out, kernel
+
+Indices = Int64[np.ndarray, " _"]
+Rows = Int64[np.ndarray, " n"]
 
 
-@njit
-def match_rows(starts, columns, n_columns, first):
+def match_rows(
+    starts: Int[np.ndarray, " _"], columns: Int[np.ndarray, " _"], n_columns: int, first: Rows
+) -> tuple[Rows, Rows]:
     """Match as many rows as possible with a column each.
 
     The columns of row i are columns[starts[i]:starts[i + 1]]. `first` is a matching to start from:
@@ -17,75 +22,25 @@ def match_rows(starts, columns, n_columns, first):
     """
     n = len(starts) - 1
     row_of, column_of = np.full(n_columns, -1), first.copy()
-    depth, following = np.full(n, -1), np.empty(n, dtype=np.int64)
-    queue, path = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    n_matched = 0
-    for row in range(n):
-        if column_of[row] >= 0:
-            row_of[column_of[row]] = row
-            n_matched += 1
-    while n_matched < n and _layer(starts, columns, row_of, column_of, depth, queue):
-        following[:] = starts[:-1]
-        for row in range(n):
-            if column_of[row] < 0 and _augment(
-                row, columns, starts, row_of, column_of, depth, following, path
-            ):
-                n_matched += 1
+    depth = np.full(n, -1)
+    scratch = np.empty((3, n), dtype=np.int64)
+    graph = starts.astype(np.int64, copy=False), columns.astype(np.int64, copy=False)
+    complete_matching(*graph, row_of, column_of, depth, *scratch)
     return column_of, depth
 
 
-@njit
-def _layer(starts, columns, row_of, column_of, depth, queue):
-    """Fill the distance of each row from a free row; return whether a free column is reached.
+@kernel("n")
+def complete_matching(
+    starts: Int64[np.ndarray, "n+1"],
+    columns: Indices,
+    row_of: Out[Indices],
+    column_of: Out[Rows],
+    depth: Out[Rows],
+    following: Out[Rows],
+    queue: Out[Rows],
+    path: Out[Rows],
+) -> None:
+    """Complete a matching, the column of each row, to a largest one; fill depths as in `match_rows`.
 
-    Distances are steps along alternating paths.
+    `row_of` comes filled with -1; it and the last three are scratch.
     """
-    height = 0
-    for row in range(len(depth)):
-        depth[row] = -1
-        if column_of[row] < 0:
-            depth[row] = 0
-            queue[height] = row
-            height += 1
-    place, last = 0, -1
-    while place < height:
-        row = queue[place]
-        place += 1
-        if depth[row] == last:
-            break
-        for entry in range(starts[row], starts[row + 1]):
-            other = row_of[columns[entry]]
-            if other < 0:
-                last = depth[row] + 1
-            elif depth[other] < 0:
-                depth[other] = depth[row] + 1
-                queue[height] = other
-                height += 1
-    return last >= 0
-
-
-@njit
-def _augment(free, columns, starts, row_of, column_of, depth, following, path):
-    """Find a path through the layers from a free row to a free column, and flip its edges."""
-    height = 1
-    path[0] = free
-    while height:
-        row = path[height - 1]
-        if following[row] == starts[row + 1]:
-            height -= 1
-            if height:
-                following[path[height - 1]] += 1
-            continue
-        other = row_of[columns[following[row]]]
-        if other < 0:
-            for step in range(height - 1, -1, -1):
-                column = columns[following[path[step]]]
-                row_of[column], column_of[path[step]] = path[step], column
-                following[path[step]] += 1
-            return True
-        if depth[other] == depth[row] + 1:
-            path[height] = other
-            height += 1
-        else:
-            following[row] += 1
-    return False

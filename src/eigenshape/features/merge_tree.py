@@ -119,8 +119,7 @@ def _join_basins(
         The vertex of each rank.
     """
     n, n_faces = mesh.n_vertices, mesh.n_faces
-    # Half the memory traffic, where 32 bits are enough.
-    kind = np.int32 if max(n, n_faces) < 2**31 else np.int64
+    kind = np.int32  # half the memory traffic; twice as many faces take 100 GB
     vertex = np.argsort(height, kind="stable")
     rank = np.empty(n, dtype=kind)
     rank[vertex] = np.arange(n)

@@ -4,8 +4,10 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.polygon_loops import ROUNDING, clip_ears
+from eigenshape.geometry.polygon_loops import clip_ears
 
+# Points nearer than this to a line lie on it, up to rounding of their coordinates, which have size 1.
+ROUNDING = 64 * 2.0**-52
 # A fan is taken if each of its triangles has more than this share of its longest side squared as
 # area. Corners on a line have 1e-7 in single precision, a regular polygon of 1,000 corners 8e-4.
 THINNEST = 1e-6
@@ -90,14 +92,18 @@ def cut_polygons(
                 spokes *= np.ldexp(1.0, -np.frexp(np.abs(spokes).max(axis=(0, 1)))[1])
                 flat = _flatten(spokes)
                 is_left = ~_are_covered(flat) & np.isfinite(flat).all(axis=0)
-            for place in np.flatnonzero(is_left).tolist():
-                cut, is_simple = clip_ears(flat[:, place].copy())
-                number = numbers[place]
-                if is_simple:
-                    places[first_triangles[number] :][: length - 2] = starts[number] + cut
-                # A polygon on a line, or nearly so, stays a fan.
-                else:
-                    crossed[number] = np.linalg.matrix_rank(spokes[:, :, place], THINNEST) > 1
+            left = np.flatnonzero(is_left)
+            cut = np.empty((left.size, length - 2, 3), dtype=np.int64)
+            is_simple = np.empty(left.size, dtype=bool)
+            outlines = np.stack([flat.real[:, left].T, flat.imag[:, left].T], axis=2)
+            neighbors, shapes = np.empty((2, length), dtype=np.int64), np.empty(length)
+            clip_ears(outlines, ROUNDING, cut, is_simple, neighbors, shapes)
+            simple, others = numbers[left[is_simple]], left[~is_simple]
+            rows = first_triangles[simple][:, None] + np.arange(length - 2)
+            places[rows] = starts[simple][:, None, None] + cut[is_simple]
+            # A polygon on a line, or nearly so, stays a fan.
+            ranks = np.linalg.matrix_rank(spokes[:, :, others].transpose(2, 0, 1), THINNEST)
+            crossed[numbers[others]] = ranks > 1
     return corners[places], owners, np.flatnonzero(crossed)
 
 

@@ -74,7 +74,7 @@ def assign_far_points(
             kinds = region[old] * N_REGIONS + region[new[one]]
         else:
             # No assignment has more than N_ALIKE extensions among the best N_ALIKE of its kind.
-            best = nearest_rows(np.ascontiguousarray(-worth.T), min(N_ALIKE, count))
+            best = nearest_rows(-worth.T, min(N_ALIKE, count))
             one = best.ravel()
             old = np.repeat(np.arange(len(worth)), len(one) // len(worth))
             kept = _best_of_kinds(worth[old, one], kind[old])[:BEAM_WIDTH]

@@ -202,11 +202,11 @@ def _fit(
         factor, _ = cho_factor(matrix, check_finite=False)
         weight = stiffness * 2 / len(plan.one)  # as in `graph`
         for _ in range(N_FIRST if step == 0 else N_NEXT):
-            right = np.zeros_like(places)
+            right = np.zeros(places.shape)
             add_pulls(turns, carriers, portions, plan.arms, pull, targets, right)
             add_tensions(turns, plan.one, plan.two, plan.links, weight, right)
             # LAPACK itself: the checks of `cho_solve` take as long as the solve.
-            places, _ = dpotrs(factor, right)
+            places = np.ascontiguousarray(dpotrs(factor, right)[0])
             turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)
 
     points, normals = _carry(plan, turns, places, plan.compared)

@@ -95,7 +95,7 @@ def descriptor_costs(differences: Float[np.ndarray, "m k"]) -> Float[np.ndarray,
 
 def first_candidates(costs: Float[np.ndarray, "m k"]) -> tuple[np.ndarray, np.ndarray]:
     """Return the best partners of each point by descriptors alone: points and partners."""
-    partners = nearest_rows(np.ascontiguousarray(costs.T), min(N_CANDIDATES, costs.shape[1]))
+    partners = nearest_rows(costs.T, min(N_CANDIDATES, costs.shape[1]))
     return np.repeat(np.arange(len(costs)), partners.shape[1]), partners.ravel()
 
 
@@ -172,7 +172,7 @@ def grow_pairs(
         far = (part.between[:, pairs.points] > BLOCKED * CROWDED).astype(np.float32)
         taken = (whole.between[:, pairs.partners] < CROWDED).astype(np.float32)
         wanted = costs + (moves / reach) ** 2 + OCCUPIED * (far @ taken.T > 0)
-        partners = nearest_rows(np.ascontiguousarray(wanted.T), N_NEARBY)
+        partners = nearest_rows(wanted.T, N_NEARBY)
         nearby = np.take_along_axis(moves, partners, axis=1)
         allowed = nearby <= np.maximum(2 * reach, nearby.min(axis=1, keepdims=True))
         points = np.repeat(np.arange(n_points), allowed.sum(axis=1))
@@ -217,7 +217,7 @@ def _continuous(part: Surface, whole: Surface, pairs: Pairs) -> Pairs:
     n = len(pairs.points)
     ours = part.between[np.ix_(pairs.points, pairs.points)]
     theirs = whole.between[np.ix_(pairs.partners, pairs.partners)]
-    near = nearest_rows(np.ascontiguousarray(ours.T), min(N_NEIGHBORS + 1, n))[:, 1:]
+    near = nearest_rows(ours.T, min(N_NEIGHBORS + 1, n))[:, 1:]
     one, two = np.repeat(np.arange(n), near.shape[1]), near.ravel()
     longest = np.maximum(ours[one, two], theirs[one, two])
     with np.errstate(invalid="ignore"):  # infinite on both sides: other components

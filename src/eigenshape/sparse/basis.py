@@ -9,11 +9,11 @@ from jaxtyping import Float, Int
 from eigenshape._threads import free_threads, map_in_threads, share_units
 from eigenshape.sparse.basis_loops import (
     CHUNK,
+    LANES,
     add_products,
     multiply_lanes,
     subtract_combination,
 )
-from eigenshape.sparse.lane_loops import LANES
 
 COMBINED_ROWS = 512  # rows of a combination that are computed at once
 # Multiplications that are worth a thread: below, starting it costs more than it saves.

@@ -70,7 +70,7 @@ def dissect(indptr: Indices, indices: Indices, leaf: int = LEAF) -> Indices:
     becomes of one does not depend on the others.
 
     Segments are taken one after the other, some hundred points each, so only the functions that do
-    something to all points of one are compiled.
+    something to all points of one are in C.
 
     Parameters
     ----------

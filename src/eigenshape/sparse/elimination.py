@@ -7,7 +7,6 @@ from jaxtyping import Int
 from eigenshape._arrays import record
 from eigenshape.sparse import front_loops as fronts
 from eigenshape.sparse import symbolic_loops as symbolic
-from eigenshape.sparse.dense_loops import LONG, NARROW
 from eigenshape.sparse.dissection import DENSE, dissect
 from eigenshape.sparse.dissection_loops import LEAF
 from eigenshape.sparse.tasks import Tasks, divide_fronts
@@ -222,9 +221,9 @@ def _count_roundings(widths: Indices, heights: Indices, above: Indices) -> Indic
     size = len(above)
     children = np.bincount(above[above >= 0], minlength=size)
     # Blocks of NARROW columns are doubled until they are as wide as the front.
-    doublings = np.ceil(np.log2(np.maximum(widths / NARROW, 1))).astype(np.int64)
-    own = np.where(heights > fronts.SMALL, widths // LONG + 2 + doublings, widths) + children
-    longest = [LONG] * size
+    doublings = np.ceil(np.log2(np.maximum(widths / fronts.NARROW, 1))).astype(np.int64)
+    own = np.where(heights > fronts.SMALL, widths // fronts.LONG + 2 + doublings, widths) + children
+    longest = [fronts.LONG] * size
     for s, (parent, roundings) in enumerate(zip(above.tolist(), own.tolist(), strict=True)):
         longest[s] += roundings
         if parent >= 0:

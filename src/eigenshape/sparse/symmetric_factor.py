@@ -12,9 +12,9 @@ from eigenshape._threads import (
     one_blas_thread,
 )
 from eigenshape.sparse import front_loops as fronts
-from eigenshape.sparse.blas_loops import addresses
+from eigenshape.sparse.basis_loops import LANES
+from eigenshape.sparse.blas import blas_routines
 from eigenshape.sparse.elimination import Elimination, analyze_pattern
-from eigenshape.sparse.lane_loops import LANES
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -176,7 +176,9 @@ def factorize_symmetric(
         begin, end = int(e.tasks.first[task]), int(e.tasks.first[task + 1])
         with memory.rooms.lend() as room:
             given = tree, lower, panels, pivots, updates, room
-            return bool(fronts.factor_fronts(*given, begin, end, int(e.stacks[task]), addresses()))
+            return bool(
+                fronts.factor_fronts(*given, begin, end, int(e.stacks[task]), blas_routines())
+            )
 
     with memory.updates.lend() as updates:
         for tasks in e.tasks.rounds:

@@ -46,8 +46,8 @@ class Tasks:
     to: Indices
 
     @property
-    def arrays(self) -> tuple[Indices, ...]:
-        """What compiled loops need of the tasks."""
+    def arrays(self) -> tuple[Indices, Indices, Indices, Indices, Indices, Indices]:
+        """What kernels need of the tasks."""
         return self.first, self.rows, self.own_rows, self.fetches, self.fetched, self.to
 
     @property

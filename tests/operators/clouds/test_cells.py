@@ -11,7 +11,7 @@ from eigenshape.operators.clouds.cell_grid import (
     gaussian_differences,
     gaussian_rows,
 )
-from eigenshape.operators.clouds.pair_loops import component_labels, sort_part
+from eigenshape.operators.clouds.pair_loops import component_labels
 
 
 def dense_kernel(points, weights, t, reach):
@@ -88,9 +88,10 @@ def test_powers_of_two_change_no_digit(scale):
     np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 5, 40, 3000])
-def test_a_part_is_sorted_and_nothing_beside_it(count):
-    values = np.random.default_rng(count).permutation(count + 20)
-    expected = np.concatenate([values[:7], np.sort(values[7 : 7 + count]), values[7 + count :]])
-    sort_part(values, 7, 7 + count)
-    np.testing.assert_array_equal(values, expected)
+@pytest.mark.parametrize("n", [1, 2, 5, 40, 1500])
+def test_columns_ascend_where_cells_hold_many_points(n):
+    points = np.random.default_rng(n).random((n, 3))
+    found, expected = (make(points, np.ones(n), 1.0, 0.7) for make in (sparse_kernel, dense_kernel))
+    rows, columns = np.nonzero(expected)
+    np.testing.assert_array_equal(found.indices, columns)
+    np.testing.assert_array_equal(np.diff(found.indptr), np.bincount(rows))

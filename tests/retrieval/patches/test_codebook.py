@@ -138,6 +138,13 @@ def test_packed_codes_have_the_same_distances():
     assert packed_distances(query, packed) == pytest.approx(expected, rel=1e-12)
     for rows, other in zip(packed, others, strict=True):
         assert np.array_equal(unpack_codes(rows), other.reshape(-1, 64))
+
+
+def test_packed_codes_of_another_width_are_named():
+    query = np.ones((1, 3, 3, 64), dtype=np.int8)
+    packed = [np.zeros((9, 32), np.uint8), np.zeros((9, 31), np.uint8)]
+    with pytest.raises(ValueError, match=r"each_of_others must .*; its shape is \(9, 31\)"):
+        packed_distances(query, packed)
     assert packed_distances(query, []).shape == (0,)
 
 

@@ -133,8 +133,8 @@ def test_agreement_by_hand():
     )
     assert rows.tolist() == [1, 2]
     assert columns.tolist() == [0, 1]
-    ours = np.array([[0.0, 1, 2], [1, 0, 2], [2, 2, 0]])
-    theirs = np.array([[0.0, 2.2, 9], [2.2, 0, np.inf], [9, np.inf, 0]])
+    ours = np.array([[0, 1, 2], [1, 0, 2], [2, 2, 0]], dtype=np.float32)
+    theirs = np.array([[0, 2.2, 9], [2.2, 0, np.inf], [9, np.inf, 0]], dtype=np.float32)
     value, support = leading(ours, theirs, np.array([0.25, 0.25, 0.5]), 2.0, 0.2, 0.05)
     assert value == pytest.approx(0.25 * (1 - (0.2 / 2.2 / 0.2) ** 2))
     assert support == pytest.approx([np.sqrt(2), np.sqrt(2), 0])

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape.retrieval.patches import patch_loops
 from eigenshape.retrieval.patches import patches as patches_module
-from eigenshape.retrieval.patches.patch_loops import HEIGHT_BINS, NUMBERS, RING_NUMBERS, TURN_BINS
+from eigenshape.retrieval.patches.patch_loops import (
+    HEIGHT_BINS,
+    RING_NUMBERS,
+    RINGS,
+    TURN_BINS,
+    sort_by_distance,
+)
 from eigenshape.retrieval.patches.patches import RADII, extract_patches, surface_patches
 from eigenshape.scans.partial import viewpoint
 
@@ -92,7 +97,7 @@ def test_size_and_rigid_motion_change_nothing(scale):
 def test_weights_are_shares_of_the_surface():
     mesh = es.make_creature("hand", n_vertices=1500)
     found = surface_patches(mesh, n_samples=60)
-    assert found.numbers.shape == (60, len(RADII), NUMBERS)
+    assert found.numbers.shape == (60, len(RADII), RINGS * RING_NUMBERS)
     assert found.weights.sum(axis=0) == pytest.approx(1)
     assert np.isfinite(found.numbers).all()
     assert not found.numbers.flags.writeable
@@ -163,8 +168,7 @@ def test_vertices_are_sorted_by_distance_and_equals_by_index():
     ]
     for distances in cases:
         order = np.empty(len(distances), dtype=np.int64)
-        starts = np.empty(patch_loops.BUCKETS + 1, dtype=np.int64)
-        total = patch_loops.sort_by_distance(distances, 0.6, order, starts)
+        total = sort_by_distance(distances, 0.6, order)
         near = np.flatnonzero(distances <= 0.6)
         expected = near[np.argsort(distances[near], kind="stable")]
         np.testing.assert_array_equal(order[:total], expected)

@@ -16,7 +16,8 @@ pytestmark = pytest.mark.long
 
 def grown(laplacian, size):
     matrix = laplacian.stiffness
-    return grow_aggregates(matrix.indptr, matrix.indices, matrix.data, size)
+    starts, columns = (part.astype(np.int32) for part in (matrix.indptr, matrix.indices))
+    return grow_aggregates(starts, columns, matrix.data, size)
 
 
 def test_a_path_is_cut_into_runs_by_hand():

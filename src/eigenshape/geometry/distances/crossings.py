@@ -8,7 +8,7 @@ from eigenshape.geometry.distances.crossing_loops import crossing_pairs, curve_p
 from eigenshape.geometry.simplices import scaled_corners
 
 # Coordinates are rounded to multiples of 2^-300 of the largest, so that a product of three of them
-# does not underflow and the signs of `predicate_loops` are exact.
+# does not underflow and the signs of `predicates.h` are exact.
 FINEST = 300
 
 
@@ -72,5 +72,5 @@ def self_intersections(mesh: MeshLike) -> Int[np.ndarray, "p 2"]:
 
 
 def round_finely(coordinates: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """Round coordinates of size 1 so that no product of three underflows in `predicate_loops`."""
+    """Round coordinates of size 1 so that no product of three underflows in `predicates.h`."""
     return np.ldexp(np.rint(np.ldexp(coordinates, FINEST)), -FINEST)

@@ -84,7 +84,7 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
     def waves_from(first: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         sources = np.arange(first, min(first + SOURCES_PER_TASK, n))
         scratch, counts = _scratch(fans, 1), np.empty(len(sources), dtype=np.int64)
-        # Room for the longest wave, and for many short ones in each compiled call.
+        # Room for the longest wave, and for many short ones in each call.
         reached, distances = (
             np.empty(WAVES_OF_ROOM * n, dtype=np.int64),
             np.empty(WAVES_OF_ROOM * n),
@@ -400,7 +400,7 @@ def average_geodesic_distance(
     return shares @ distances
 
 
-def _scratch(fans: Fans, n_sources: int) -> tuple[np.ndarray, ...]:
+def _scratch(fans: Fans, n_sources: int) -> Any:
     """Return the memory that `spread_wave` needs while it runs."""
     n, n_waves = len(fans[0]) - 1, len(fans[1]) + n_sources
     vertices, settled = np.empty((2, n), dtype=np.int64), np.zeros(n, dtype=np.bool_)

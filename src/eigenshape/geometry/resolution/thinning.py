@@ -64,7 +64,7 @@ def thin_out(mesh: TriangleMesh, n_vertices: int) -> tuple[TriangleMesh, Int[np.
             break
         cosine = LEAST_COSINE if length < STRICT_LENGTH * usual else -1.0
         limits = length, MOST_NEIGHBORS, cosine
-        n_left -= collapse_short_edges(points, faces, alive, heads, links, kinds, marks, limits)
+        n_left -= collapse_short_edges(points, faces, alive, heads, links, kinds, marks, *limits)
         length *= LENGTH_GROWTH
     thin, source = submesh(TriangleMesh(mesh.vertices, faces), alive)
     return thin, source

@@ -213,7 +213,9 @@ def _cell_volumes(neighbors: Float[np.ndarray, "r k m"]) -> Float[np.ndarray, " 
     if dim == 2:
         places = np.concatenate([neighbors, np.zeros_like(neighbors[:, :1])], axis=1)
         by_x = np.lexsort((places[:, :, 1], places[:, :, 0]))
-        return cell_areas(np.take_along_axis(places, by_x[:, :, None], axis=1))
+        areas, polygons = np.empty(len(places)), np.empty((2, 2 * places.shape[1] + 4, 2))
+        cell_areas(np.take_along_axis(places, by_x[:, :, None], axis=1), areas, polygons)
+        return areas
     return np.array([_cell_volume(row) for row in neighbors])
 
 

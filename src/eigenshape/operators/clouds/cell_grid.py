@@ -1,4 +1,4 @@
-"""Sums over all pairs of points that a Gaussian reaches: a grid of cells, walked by compiled loops.
+"""Sums over all pairs of points that a Gaussian reaches: a grid of cells, walked by kernels in C.
 
 Points are sorted by cell. A point's partners lie in runs of that order, one run for each
 neighboring column of cells, so that no list of pairs is ever stored. Each row is computed by
@@ -14,13 +14,15 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import record
+from eigenshape._kernels import math_functions
 from eigenshape._threads import map_in_threads
-from eigenshape.operators.clouds import pair_loops
+from eigenshape.operators.clouds.pair_loops import count_pairs, fill_pairs, sum_differences
 
 AXES = 3  # axes that are cut into cells, those along which the points spread most
 # Cells along an axis at most: 2^60 cells have numbers that fit 64 bits.
 CELLS_PER_AXIS = 2**20
 CHUNK = 64  # cells a task
+EXPONENTIAL = math_functions("exp")
 
 
 @record
@@ -85,8 +87,8 @@ def count_partners(
     if chosen is not None:
         wanted[:] = False
         wanted[chosen] = True
-    known = grid.points, grid.order, grid.cells, grid.runs, grid.reach**2
-    _each_cell(grid, partial(pair_loops.count, *known, wanted, counts))
+    known = (grid.points, grid.cells, grid.runs), grid.order, grid.reach**2
+    _each_cell(grid, partial(count_pairs, *known, wanted, counts))
     return counts
 
 
@@ -98,18 +100,16 @@ def gaussian_rows(
     `weights` are in the order before sorting, and so are the rows; row i fills starts[i] to
     starts[i + 1].
     """
-    kind = np.int32 if max(len(weights), starts[-1]) < 2**31 else np.int64
-    columns, values = np.empty(starts[-1], dtype=kind), np.empty(starts[-1])
+    columns, values = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1])
     place = np.empty_like(grid.order)
     place[grid.order] = np.arange(len(place))
     most = int(np.diff(grid.runs, axis=2).sum(axis=(1, 2)).max())  # points that one cell may reach
+    known = (grid.points, grid.cells, grid.runs), grid.order, place, grid.reach**2
+    kernel = 1 / (4 * t), EXPONENTIAL, weights
 
     def fill(first: int, last: int) -> None:
         scratch = np.empty(most, dtype=np.int64), np.empty((most, grid.points.shape[1]))
-        known = grid.points, grid.order, grid.cells, grid.runs, grid.reach**2, place
-        pair_loops.fill(
-            *known, weights, 1 / (4 * t), starts, columns, values, *scratch, first, last
-        )
+        fill_pairs(*known, *kernel, starts, columns, values, *scratch, first, last)
 
     _each_cell(grid, fill)
     return columns, values
@@ -121,15 +121,17 @@ def gaussian_differences(
     """Return w_i Σ_j w_j exp(-|x_i - x_j|²/4t) (f_i - f_j) for each column f, storing nothing between pairs."""
     sorted_values = np.ascontiguousarray(values[grid.order])
     sums = np.empty_like(sorted_values)
-    known = grid.points, grid.cells, grid.runs, grid.reach**2, weights[grid.order], 1 / (4 * t)
-    _each_cell(grid, partial(pair_loops.difference, *known, sorted_values, sums))
+    arrays = weights[grid.order], sorted_values, sums
+    cells = grid.points, grid.cells, grid.runs
+    work = partial(sum_differences, cells, grid.reach**2, 1 / (4 * t), EXPONENTIAL, *arrays)
+    _each_cell(grid, work)
     result = np.empty_like(sums)
     result[grid.order] = sums
     return result
 
 
 def _each_cell(grid: CellGrid, work: Callable[[int, int], Any]) -> None:
-    """Share the cells among threads; the compiled loops hold no lock, and no two write to one place."""
+    """Share the cells among threads; the kernels hold no lock, and no two write to one place."""
     n_cells = len(grid.cells) - 1
     chunks = range(0, n_cells, CHUNK)
     map_in_threads(lambda first: work(first, min(first + CHUNK, n_cells)), chunks)

@@ -1,7 +1,7 @@
 """Local Delaunay triangulations of point clouds, and their tufted cover."""
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from eigenshape._arguments import require_type
@@ -11,7 +11,7 @@ from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import require_different_points
 from eigenshape.geometry.simplices import require_span, size_one
-from eigenshape.operators.clouds import pair_loops
+from eigenshape.operators.clouds.pair_loops import local_rings
 from eigenshape.operators.tufted import (
     MOLLIFY,
     Triangulation,
@@ -96,8 +96,7 @@ def local_triangles(
     first = axes[:, :, 2]
     frames = np.stack([first, np.cross(normals, first)], axis=1)
     coordinates = np.einsum("nkd,nad->nka", offsets, frames)
-    rings = np.empty((cloud.n_points, count + 1), dtype=np.int64)
-    pair_loops.local_rings(np.ascontiguousarray(coordinates), rings)
+    rings = _rings(coordinates)
     # Join each two that follow each other in a ring with the middle, but across its opening.
     n, k = neighbors.shape
     lengths = (rings >= 0).sum(axis=1)
@@ -120,6 +119,27 @@ def local_triangles(
             f"({bare.size} such). Try more n_neighbors."
         )
     return triangles
+
+
+def _rings(coordinates: Float[np.ndarray, "n k 2"]) -> Int[np.ndarray, "n k1"]:
+    """Find the neighbors of the origin in the Delaunay triangulation of it and points around it.
+
+    The inversion p -> p / |p|² takes circles through the origin to lines. So a circle through the
+    origin and two points is empty if and only if all inverted points lie on one side of a line:
+    the ring is the convex hull of the inverted points and the origin.
+
+    Each row is the ring of k points, in counter-clockwise order, then -1. A position k stands for
+    the origin itself: it is on the hull, and so the ring is open there.
+    """
+    n, k, _ = coordinates.shape
+    scaled = coordinates / np.abs(coordinates).max(axis=(1, 2), keepdims=True)
+    squares = np.maximum((scaled**2).sum(axis=2), 1e-300)
+    inverted = np.zeros((2, n, k + 1))
+    inverted[:, :, :k] = scaled.transpose(2, 0, 1) / squares
+    x, y = inverted
+    rings = np.empty((n, k + 1), dtype=np.int64)
+    local_rings(x, y, np.lexsort((y, x), axis=1), rings, np.empty(2 * k + 4, dtype=np.int64))
+    return rings
 
 
 def cloud_cover(

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int, Int8, UInt8
 from eigenshape.retrieval.patches.code_loops import (
     distances_to,
     lengths,
-    packed_view_distance,
+    packed_view_distances,
 )
 
 # Added to a distance for each step of 1.25 in relative size, so that of equally good steps the
@@ -71,22 +71,13 @@ def packed_distances(
     (k,) float
     """
     (rows, row_lengths), n_bases, n_sizes = _rows(query), *query.shape[1:3]
-    most = max(map(len, others), default=0)
-    codes, code_lengths = np.empty((most, query.shape[-1]), dtype=np.int8), np.empty(most)
-    found = [
-        packed_view_distance(
-            rows,
-            row_lengths,
-            np.asarray(other),
-            codes,
-            code_lengths,
-            n_bases * n_sizes,
-            n_sizes,
-            SIZE_PRICE,
-        )
-        for other in others
-    ]
-    return np.array(found, dtype=np.float64)
+    n_rows = np.array([len(other) for other in others], dtype=np.int64)
+    most = n_rows.max(initial=0)
+    scratch = np.empty((most, query.shape[-1]), dtype=np.int8), np.empty(most)
+    sizes, found = (n_bases * n_sizes, n_sizes), np.empty(len(others))
+    packed = list(map(np.ascontiguousarray, others))
+    packed_view_distances(rows, row_lengths, packed, n_rows, *scratch, *sizes, SIZE_PRICE, found)
+    return found
 
 
 def _rows(

@@ -148,7 +148,7 @@ def distances_by_landmarks(lengths: Float32[np.ndarray, "m a"]) -> Float32[np.nd
     to any landmark. The mean of the least sum and the largest difference is exact for a landmark.
     """
     distances = np.empty((len(lengths), len(lengths)), dtype=np.float32)
-    between_landmarks(lengths, distances)
+    between_landmarks(np.ascontiguousarray(lengths), distances)
     # Of rounded lengths the bounds may cross, so those that are known are copied.
     n_landmarks = lengths.shape[1]
     distances[:, :n_landmarks] = lengths

@@ -1,14 +1,20 @@
-"""Compiled loops of `matching`: matches that agree, and distances by landmarks."""
+"""Kernels of `matching`: matches that agree, and distances by landmarks."""
 
 import numpy as np
+from jaxtyping import Float32, Float64
 
-from eigenshape._compile import njit
+from eigenshape._kernels import Out, kernel
+from eigenshape.sparse.blas import blas_routine
 
-ROUNDS = 20  # of the power method
 
-
-@njit
-def leading(ours, theirs, shares, ratio, slack, least):
+def leading(
+    ours: Float32[np.ndarray, "n n"],
+    theirs: Float32[np.ndarray, "n n"],
+    shares: Float64[np.ndarray, " n"],
+    ratio: float,
+    slack: float,
+    shortest: float,
+) -> tuple[float, Float64[np.ndarray, " n"]]:
     """Return the largest eigenvalue of the agreement of matches, and the support of each match.
 
     `ours` and `theirs` are distances between matched points; the first are multiplied by `ratio`.
@@ -16,39 +22,33 @@ def leading(ours, theirs, shares, ratio, slack, least):
     distance. For the matrix √s A √s with the shares s, and its eigenvector v, the support is
     A √s v over the eigenvalue: this is v / √s, but finite even if a share is 0.
     """
-    count = len(ours)
-    agreeing = np.zeros((count, count))
-    for one in range(count):
-        for two in range(one):
-            a, b = ratio * ours[one, two], theirs[one, two]
-            if np.isinf(a) or np.isinf(b):
-                continue
-            error = abs(a - b) / max(a, b, least) / slack
-            if error < 1:
-                agreeing[one, two] = agreeing[two, one] = 1 - error * error
-    roots, vector = np.sqrt(shares), np.ones(count)
-    support, value = np.zeros(count), 0.0
-    for _ in range(ROUNDS):
-        support = agreeing @ (roots * vector)
-        image = roots * support
-        value = np.sqrt((image * image).sum())
-        if value == 0:
-            break
-        vector, support = image / value, support / value
+    n = len(shares)
+    agreeing, (vector, scaled), support = np.empty((n, n)), np.empty((2, n)), np.empty(n)
+    scratch, blas = (agreeing, vector, scaled), (blas_routine("dgemv"),)
+    value = find_leading(ours, theirs, shares, ratio, slack, shortest, *scratch, support, blas)
     return value, support
 
 
-@njit
-def between_landmarks(lengths, found):
+@kernel("n")
+def find_leading(
+    ours: Float32[np.ndarray, "n n"],
+    theirs: Float32[np.ndarray, "n n"],
+    shares: Float64[np.ndarray, " n"],
+    ratio: float,
+    slack: float,
+    shortest: float,
+    agreeing: Out[Float64[np.ndarray, "n n"]],
+    vector: Out[Float64[np.ndarray, " n"]],
+    scaled: Out[Float64[np.ndarray, " n"]],
+    support: Out[Float64[np.ndarray, " n"]],
+    blas: tuple[int],
+) -> float:
+    """Return the value of `leading`, and fill the support; the other arrays are scratch."""
+
+
+@kernel("n_points", "n_landmarks")
+def between_landmarks(
+    lengths: Float32[np.ndarray, "n_points n_landmarks"],
+    found: Out[Float32[np.ndarray, "n_points n_points"]],
+) -> None:
     """Write the mean of the bounds of each distance that distances to landmarks give."""
-    n_points, n_landmarks = lengths.shape
-    for one in range(n_points):
-        found[one, one] = 0.0
-        for two in range(one):
-            most, least = np.inf, 0.0
-            for landmark in range(n_landmarks):
-                a, b = lengths[one, landmark], lengths[two, landmark]
-                most = min(most, a + b)
-                if a != b:  # two infinite distances have no difference
-                    least = max(least, abs(a - b))
-            found[one, two] = found[two, one] = (most + least) / 2

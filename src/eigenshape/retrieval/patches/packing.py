@@ -23,7 +23,7 @@ def pack_codes(codes: Int8[np.ndarray, "m v"]) -> UInt8[np.ndarray, "m h"]:
     """Return codes from -7 to 7, two to a byte.
 
     A byte has an entry of the first half of a code in its low half, and one of the second half in
-    its high half, each raised by 8: so compiled loops read a row from end to end.
+    its high half, each raised by 8: so kernels read a row from end to end.
     """
     raised = (codes + 8).astype(np.uint8)
     half = codes.shape[-1] // 2

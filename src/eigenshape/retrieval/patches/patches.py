@@ -24,10 +24,10 @@ from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_vertices, is_closed, submesh
 from eigenshape.operators.smoothing import denoise
 from eigenshape.retrieval.patches.patch_loops import (
-    BUCKETS,
-    NUMBERS,
+    AREA,
+    RING_NUMBERS,
     RINGS,
-    describe_discs_of,
+    fill_discs,
 )
 from eigenshape.scans.depth_camera import simulate_scan
 from eigenshape.scans.partial import view_number, view_of, viewpoint
@@ -44,6 +44,7 @@ MOST_VERTICES = 30_000
 # off, but never less than LEAST_WEIGHT of a whole one.
 AT_BOUNDARY = 0.5
 LEAST_WEIGHT = 0.02
+LEAST_AREA = 1e-3  # share of a flat disc's area, added before the logarithm
 DISCS_PER_TASK = 16  # that a thread describes in a row: with them a task takes some milliseconds
 
 
@@ -226,22 +227,20 @@ def describe_discs(
 
     Normals and areas are those of the vertices; radii ascend.
     """
-    numbers = np.empty((len(points), len(radii), NUMBERS), dtype=np.float32)
+    discs = len(points), len(radii)
+    numbers = np.empty((*discs, RINGS, RING_NUMBERS), dtype=np.float32)
+    covered = np.empty((*discs, RINGS))
     surface = mesh.vertices, normals, areas
 
     def describe_task(first: int) -> None:
-        scratch = (
-            np.empty(mesh.n_vertices, dtype=np.int64),
-            np.empty(BUCKETS + 1, dtype=np.int64),
-            np.empty(RINGS),
-            np.empty(RINGS),
-        )
-        for number in range(first, min(first + DISCS_PER_TASK, len(points))):
-            center = mesh.vertices[points[number]]
-            describe_discs_of(rows[number], center, surface, radii, scratch, numbers[number])
+        some = slice(first, first + DISCS_PER_TASK)
+        order = np.empty(mesh.n_vertices, dtype=np.int64)
+        results = numbers[some], covered[some]
+        fill_discs(rows[some], points[some], surface, radii, order, *results)
 
     map_in_threads(describe_task, range(0, len(points), DISCS_PER_TASK))
-    return numbers
+    numbers[:, :, :, AREA] = np.log(LEAST_AREA + covered)
+    return numbers.reshape(*discs, -1)
 
 
 def whole_shares(

@@ -1,168 +1,169 @@
-"""Compiled loops of `aggregation` and `vcycle`: aggregates, sparse products, and smoothing."""
+"""Kernels of `aggregation` and `vcycle`: aggregates, sparse products, and smoothing."""
+
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float32, Float64, Int32, Int64
 
-from eigenshape._compile import njit
+from eigenshape._kernels import Out, kernel
 
-STRONG = 0.25  # share of a row's strongest coupling below which points do not count as neighbors
-FRAGMENT = 0.25  # share of the target size below which an aggregate is split among its neighbors
+Starts = Int32[np.ndarray, " _"]
+Columns = Int32[np.ndarray, " n_values"]
+Values = Float64[np.ndarray, " n_values"]
+SingleValues = Float32[np.ndarray, " n_values"]
+Matrix = tuple[Int32[np.ndarray, " _"], Int32[np.ndarray, " _"], Float64[np.ndarray, " _"]]
+Block = Float64[np.ndarray, "_ width"]
+SingleBlock = Float32[np.ndarray, "_ width"]
+Rows = Float32[np.ndarray, "n width"]
+Diagonal = Float32[np.ndarray, "n 1"]
 
 
-@njit
-def grow_aggregates(starts, columns, values, size):
+def grow_aggregates(
+    starts: Int32[np.ndarray, " n1"],
+    columns: Int32[np.ndarray, " e"],
+    values: Float64[np.ndarray, " e"],
+    size: int,
+) -> tuple[Int32[np.ndarray, " n"], int]:
     """Label points by aggregates of about `size` points; return the labels and their number.
 
-    Aggregates grow along strong negative couplings.
+    Aggregates grow along strong negative couplings. Points of those that stay small are moved to
+    the aggregate that they are most strongly coupled to.
     """
     n = len(starts) - 1
-    labels, strongest = np.full(n, -1, dtype=np.int32), np.zeros(n)
-    for i in range(n):
-        for entry in range(starts[i], starts[i + 1]):
-            if columns[entry] != i and -values[entry] > strongest[i]:
-                strongest[i] = -values[entry]
-    members, counts = np.empty(size, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    n_aggregates = 0
-    for first in range(n):
-        if labels[first] >= 0:
-            continue
-        labels[first] = n_aggregates
-        members[0] = first
-        height, at = 1, 0
-        while at < height < size:
-            i = members[at]
-            best, chosen = STRONG * strongest[i], -1
-            for entry in range(starts[i], starts[i + 1]):
-                if labels[columns[entry]] < 0 and -values[entry] > best:
-                    best, chosen = -values[entry], columns[entry]
-            if chosen < 0:
-                at += 1
-                continue
-            labels[chosen] = n_aggregates
-            members[height] = chosen
-            height += 1
-        counts[n_aggregates] = height
-        n_aggregates += 1
-    return _join_fragments(starts, columns, values, labels, counts[:n_aggregates], FRAGMENT * size)
+    labels, strongest = np.empty(n, dtype=np.int32), np.empty(n)
+    counts, members = np.empty(n, dtype=np.int64), np.empty(size, dtype=np.int64)
+    return labels, fill_aggregates(starts, columns, values, labels, strongest, counts, members)
 
 
-@njit
-def _join_fragments(starts, columns, values, labels, counts, least):
-    """Move each point of a fragment to its most strongly coupled aggregate; renumber the others."""
-    for i in range(len(labels)):
-        if counts[labels[i]] >= least:
-            continue
-        best, chosen = 0.0, -1
-        for entry in range(starts[i], starts[i + 1]):
-            other = labels[columns[entry]]
-            if counts[other] >= least and -values[entry] > best:
-                best, chosen = -values[entry], other
-        if chosen >= 0:
-            labels[i] = chosen
-    numbers = np.full(len(counts), -1, dtype=np.int32)
-    n_left = 0
-    for i in range(len(labels)):
-        if numbers[labels[i]] < 0:
-            numbers[labels[i]] = n_left
-            n_left += 1
-        labels[i] = numbers[labels[i]]
-    return labels, n_left
+@kernel("n_starts", "size")
+def fill_aggregates(
+    starts: Int32[np.ndarray, " n_starts"],
+    columns: Columns,
+    values: Values,
+    labels: Out[Int32[np.ndarray, " n_starts-1"]],
+    strongest: Out[Float64[np.ndarray, " n_starts-1"]],
+    counts: Out[Int64[np.ndarray, " n_starts-1"]],
+    members: Out[Int64[np.ndarray, " size"]],
+) -> int:
+    """Fill the labels that `grow_aggregates` returns, and return their number; the rest is scratch."""
 
 
-@njit
-def multiply_sparse(left, right, n_columns, begin, end):
+def multiply_sparse(
+    left: Matrix, right: Matrix, n_columns: int, begin: int, end: int
+) -> tuple[Int32[np.ndarray, " r"], Int32[np.ndarray, " e"], Float64[np.ndarray, " e"]]:
     """Return rows begin to end - 1 of the product of two matrices by rows: their lengths, columns and values.
 
     Columns of a row come in any order, and in a row of `left` several times if need be.
     """
-    (starts, columns, values), (right_starts, right_columns, right_values) = left, right
-    lengths = np.empty(end - begin, dtype=np.int32)
-    room = 2 * len(right_values) * (end - begin) // (len(starts) - 1)
-    new_columns, new_values = np.empty(room, dtype=np.int32), np.empty(room)
-    places, height = np.full(n_columns, -1, dtype=np.int64), 0
-    for i in range(begin, end):
-        first = height
-        if height + n_columns > len(new_values):
-            room = 0
-            for entry in range(starts[i], starts[i + 1]):
-                room += right_starts[columns[entry] + 1] - right_starts[columns[entry]]
-            if height + room > len(new_values):
-                new_columns, new_values = (
-                    _double_array(new_columns, room),
-                    _double_array(new_values, room),
-                )
-        for entry in range(starts[i], starts[i + 1]):
-            j, share = columns[entry], values[entry]
-            for place in range(right_starts[j], right_starts[j + 1]):
-                c = right_columns[place]
-                if places[c] < first:
-                    places[c] = height
-                    new_columns[height], new_values[height] = c, 0.0
-                    height += 1
-                new_values[places[c]] += share * right_values[place]
-        lengths[i - begin] = height - first
-    return lengths, new_columns[:height], new_values[:height]
+    # In runs of as many rows as there is room for, since their lengths are not known before
+    runs = []
+    room = max(n_columns, 2 * len(right[2]) * (end - begin) // (len(left[0]) - 1))
+    while begin < end:
+        lengths = np.empty(end - begin, dtype=np.int32)
+        columns, values = np.empty(room, dtype=np.int32), np.empty(room)
+        places = np.full(n_columns, -1)
+        done = fill_products(left, right, begin, end, lengths, columns, values, places)
+        total = lengths[:done].sum()
+        runs.append((lengths[:done], columns[:total], values[:total]))
+        begin += done
+    lengths, columns, values = (np.concatenate(parts) for parts in zip(*runs, strict=True))
+    return lengths, columns, values
 
 
-@njit
-def _double_array(array, more):
-    longer = np.empty(2 * len(array) + more, dtype=array.dtype)
-    longer[: len(array)] = array
-    return longer
+@kernel("room", "n_columns")
+def fill_products(
+    left: Matrix,
+    right: Matrix,
+    begin: int,
+    end: int,
+    lengths: Out[Int32[np.ndarray, " end-begin"]],
+    columns: Out[Int32[np.ndarray, " room"]],
+    values: Out[Float64[np.ndarray, " room"]],
+    places: Out[Int64[np.ndarray, " n_columns"]],
+) -> int:
+    """Fill rows of a product, and return for how many there was room.
 
-
-@njit
-def multiply_rows(starts, columns, values, block, product, begin, end, first):
-    """Write rows begin to end - 1 of a sparse matrix times columns to `product`, from row `first` on."""
-    sums = np.empty(block.shape[1], dtype=product.dtype)
-    for i in range(begin, end):
-        _row_product(starts, columns, values, block, i, sums)
-        for c in range(len(sums)):
-            product[first + i - begin, c] = sums[c]
-
-
-@njit
-def _row_product(starts, columns, values, block, i, sums):
-    """Write row i of the product to `sums`, in the order of the entries.
-
-    Four entries at a time, and a row of its own in place of one of the product: the compiler then
-    keeps more in registers, which takes 0.8 of the time.
+    There is always room for one row if there is room for all columns. `places` comes as -1.
     """
-    width = len(sums)
-    for c in range(width):
-        sums[c] = 0
-    entry, end = starts[i], starts[i + 1]
-    while entry + 4 <= end:
-        j, k, m, n = columns[entry], columns[entry + 1], columns[entry + 2], columns[entry + 3]
-        v, w, x, y = values[entry], values[entry + 1], values[entry + 2], values[entry + 3]
-        for c in range(width):
-            total = sums[c] + v * block[j, c]
-            total += w * block[k, c]
-            total += x * block[m, c]
-            sums[c] = total + y * block[n, c]
-        entry += 4
-    while entry < end:
-        value, j = values[entry], columns[entry]
-        for c in range(width):
-            sums[c] += value * block[j, c]
-        entry += 1
 
 
-@njit
-def smoothing_step(matrix, scales, terms, block, step, moved, old, new, begin, end):
+def multiply_rows(
+    starts: Int32[np.ndarray, " n1"],
+    columns: Int32[np.ndarray, " e"],
+    values: np.ndarray,
+    block: np.ndarray,
+    product: np.ndarray,
+    begin: int,
+    end: int,
+    first: int,
+) -> None:
+    """Write rows begin to end - 1 of a sparse matrix times columns to `product`, from row `first` on.
+
+    Columns in single precision are multiplied by values in single or double precision.
+    """
+    multiply: Any = multiply_single if values.dtype == np.float32 else multiply_double
+    if block.dtype != values.dtype:
+        multiply = multiply_mixed
+    multiply(starts, columns, values, block, product, begin, end, first)
+
+
+@kernel("width")
+def multiply_single(
+    starts: Starts,
+    columns: Columns,
+    values: SingleValues,
+    block: SingleBlock,
+    product: Out[SingleBlock],
+    begin: int,
+    end: int,
+    first: int,
+) -> None:
+    """Multiply as `multiply_rows` does, all in single precision."""
+
+
+@kernel("width")
+def multiply_mixed(
+    starts: Starts,
+    columns: Columns,
+    values: Values,
+    block: SingleBlock,
+    product: Out[Block],
+    begin: int,
+    end: int,
+    first: int,
+) -> None:
+    """Multiply as `multiply_rows` does, columns in single precision with values in double."""
+
+
+@kernel("width")
+def multiply_double(
+    starts: Starts,
+    columns: Columns,
+    values: Values,
+    block: Block,
+    product: Out[Block],
+    begin: int,
+    end: int,
+    first: int,
+) -> None:
+    """Multiply as `multiply_rows` does, all in double precision."""
+
+
+@kernel("width")
+def smoothing_step(
+    matrix: tuple[Starts, Columns, SingleValues],
+    scales: tuple[Diagonal, Diagonal],
+    terms: tuple[Rows, Float32[np.ndarray, " width"]],
+    block: Rows,
+    step: Out[Rows],
+    moved: Out[Rows],
+    old: float,
+    new: float,
+    begin: int,
+    end: int,
+) -> None:
     """Compute rows begin to end - 1 of one Chebyshev step in place, and of the block after it.
 
     step = old step + new D⁻¹ (r - (A - θ M) block), and moved = block + step. The diagonals M and
-    D⁻¹ are in `scales`.
+    D⁻¹ are in `scales`. All is in single precision.
     """
-    starts, columns, values = matrix
-    weights, inverse = scales
-    right, shifts = terms
-    width = block.shape[1]
-    sums = np.empty(width, dtype=block.dtype)
-    for i in range(begin, end):
-        _row_product(starts, columns, values, block, i, sums)
-        weight, factor = weights[i, 0], inverse[i, 0] * new
-        for c in range(width):
-            rest = (right[i, c] - sums[c]) + (weight * shifts[c]) * block[i, c]
-            step[i, c] = old * step[i, c] + factor * rest
-            moved[i, c] = block[i, c] + step[i, c]

@@ -85,13 +85,11 @@ def smooth(
     matrix = level.rough.indptr, level.rough.indices, level.rough.data
     block = np.zeros_like(residual) if start is None else start
     step, moved = np.zeros_like(block), np.empty_like(block)
-    precision = block.dtype.type
     shares = share_units(len(block), ROWS_A_THREAD, free_threads())
     for _ in range(steps):
         given = matrix, level.rough_scales, (residual, shifts), block, step, moved
-        factors = precision(old), precision(new)
 
-        def smooth_rows(share: tuple[int, int], given: Any = (*given, *factors)) -> None:
+        def smooth_rows(share: tuple[int, int], given: Any = (*given, old, new)) -> None:
             smoothing_step(*given, *share)
 
         map_in_threads(smooth_rows, shares)

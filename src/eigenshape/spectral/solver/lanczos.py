@@ -21,7 +21,7 @@ from eigenshape.sparse.basis import (
     sparse_rows,
     subtract,
 )
-from eigenshape.sparse.lane_loops import LANES
+from eigenshape.sparse.basis_loops import LANES
 from eigenshape.sparse.symmetric_factor import Scratch
 from eigenshape.spectral.solver.chebyshev import ChebyshevFilter
 from eigenshape.spectral.solver.factor import Factor

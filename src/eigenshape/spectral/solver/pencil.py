@@ -293,7 +293,7 @@ def _sums(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return φᵀWφ / φᵀBφ, φᵀBφ, and Σ (Wφ - λBφ)² / D of each column, λ as given or that quotient."""
     sums = np.empty((3, vectors.shape[1]))
-    # One type of indices, whatever SciPy chose, so that the loop is compiled once.
+    # One type of indices, whatever SciPy chose, as the kernel takes it.
     matrices = tuple(
         (part.indptr.astype(np.int64), part.indices.astype(np.int64), part.data)
         for part in (pencil.stiffness, pencil.mass)

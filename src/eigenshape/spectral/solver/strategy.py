@@ -10,7 +10,7 @@ import scipy.linalg as sl
 from eigenshape._errors import ConvergenceError
 from eigenshape._memory import require_memory
 from eigenshape._progress import Progress
-from eigenshape.sparse.lane_loops import LANES
+from eigenshape.sparse.basis_loops import LANES
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.solver.certify import in_user_units, prove, take_pairs
 from eigenshape.spectral.solver.chebyshev import chebyshev_filter

@@ -137,8 +137,8 @@ def _draw(mesh: es.TriangleMesh) -> Picture:
     return Picture(file.getvalue(), places, drawing.visible)
 
 
-def _load_loops(recipe: Recipe) -> None:
-    """Load or compile what the first mesh takes, so that this does not count as its time."""
+def _load_modules(recipe: Recipe) -> None:
+    """Load what the first mesh takes, so that this does not count as its time."""
     with suppress(Exception):  # the first mesh will meet the same error, and report it
         mesh = es.make_creature("fish", n_vertices=500)
         es.describe(mesh, recipe)
@@ -162,7 +162,7 @@ class Describers:
     ) -> None:
         self._workers, self._describe = workers, describe
         self._uploads = tempfile.TemporaryDirectory(prefix="eigenshape-uploads-")
-        self._pool = start_pool(workers, workers.count, partial(_load_loops, recipe))
+        self._pool = start_pool(workers, workers.count, partial(_load_modules, recipe))
 
     async def describe(
         self, suffix: str, data: bytes, recipe: Recipe, *, with_picture: bool

@@ -1,7 +1,7 @@
 """A mesh, and what is computed of it in the background."""
 
 import copy
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -182,7 +182,6 @@ class Analysis:
 
     def _prepare_rig(self, solved: Job[es.Spectrum]) -> es.deformation.EigenRig:
         self._upright.wait()
-        warm_up()  # while the spectrum is computed
         solved.wait()
         if solved.result is None:
             raise es.EigenshapeError(solved.message or "The spectrum was cancelled.")
@@ -236,20 +235,6 @@ def upright_view(
         towards = towards + PAST_UP * np.sign(towards @ upward) * down
         towards /= np.linalg.norm(towards)
     return {"up": upward.tolist(), "towards": towards.tolist()}
-
-
-@cache
-def warm_up() -> None:
-    """Load or compile the loops that the first drag takes, on a small shape, once a process.
-
-    Without this the first drag took 11 s where nothing was compiled before, and then 1 s.
-    """
-    ball = es.icosphere(1)
-    session = es.DeformationSession(es.rig_shape(ball))
-    session.drag(ball.vertices[:, 2] > 0, es.Translation([0.0, 0.0, 0.1]))
-    bent = session.commit()
-    es.geometry.self_intersections(bent)
-    es.geometry.geodesic_waves(bent)(0, 1.0)
 
 
 def assess_health(mesh: es.TriangleMesh) -> dict[str, Any]:

@@ -1,0 +1,24 @@
+"""Where SciPy's BLAS lies in memory, for kernels that call it on parts of arrays in place."""
+
+import ctypes
+from functools import cache
+
+from scipy.linalg import cython_blas
+
+
+def blas_routines() -> tuple[int, int]:
+    """Return the addresses of dgemm and dtrsm in this process."""
+    return blas_routine("dgemm"), blas_routine("dtrsm")
+
+
+@cache
+def blas_routine(name: str) -> int:
+    """Return the address of a routine in this process.
+
+    SciPy exports its routines to Cython as capsules, each with the signature as its name.
+    """
+    name_of, address_of = ctypes.pythonapi.PyCapsule_GetName, ctypes.pythonapi.PyCapsule_GetPointer
+    name_of.argtypes, name_of.restype = [ctypes.py_object], ctypes.c_char_p
+    address_of.argtypes, address_of.restype = [ctypes.py_object, ctypes.c_char_p], ctypes.c_void_p
+    capsule = cython_blas.__pyx_capi__[name]
+    return int(address_of(capsule, name_of(capsule)))

@@ -1,0 +1,185 @@
+/* Loops of `dissection`: operations on one segment of a graph, whose points have its name as owner. */
+#include "kernels.h"
+
+enum {
+    WORD = 63,      /* bits of a word in a set of neighbors */
+    SMOOTHINGS = 4, /* smoothing passes over the keys: smooth keys have short cuts */
+};
+
+KERNEL int64_t breadth_first(const int64_t *indptr, const int64_t *indices, int64_t root,
+                             int64_t *owner, int64_t name, int64_t *distance, int64_t *queue) {
+    int64_t head = 0, tail = 0;
+    owner[root] = -name; /* visited */
+    distance[root] = 0;
+    queue[tail++] = root;
+    while (head < tail) {
+        int64_t node = queue[head++];
+        for (int64_t at = indptr[node]; at < indptr[node + 1]; at++) {
+            int64_t other = indices[at];
+            if (owner[other] != name) continue;
+            owner[other] = -name;
+            distance[other] = distance[node] + 1;
+            queue[tail++] = other;
+        }
+    }
+    for (int64_t i = 0; i < tail; i++) owner[queue[i]] = name;
+    return tail;
+}
+
+struct range {
+    int64_t low, high;
+};
+
+/* The mean of a point's key and the mean key of its neighbors within the segment. */
+static int64_t smooth_key(const int64_t *indptr, const int64_t *indices, const int64_t *owner,
+                          int64_t name, const int64_t *key, int64_t node) {
+    int64_t total = 0, degree = 0;
+    for (int64_t at = indptr[node]; at < indptr[node + 1]; at++) {
+        if (owner[indices[at]] != name) continue;
+        total += key[indices[at]];
+        degree++;
+    }
+    int64_t beside = degree ? floor_divide(total, degree) : key[node];
+    return floor_divide(key[node] + beside, 2);
+}
+
+KERNEL struct range smooth_keys(const int64_t *indptr, const int64_t *indices,
+                                const int64_t *segment, const int64_t *owner, int64_t name,
+                                int64_t *key, int64_t *smoothed, int64_t size) {
+    for (int pass = 0; pass < SMOOTHINGS; pass++) {
+        for (int64_t i = 0; i < size; i++)
+            smoothed[segment[i]] = smooth_key(indptr, indices, owner, name, key, segment[i]);
+        for (int64_t i = 0; i < size; i++) key[segment[i]] = smoothed[segment[i]];
+    }
+    struct range found = {key[segment[0]], key[segment[0]]};
+    for (int64_t i = 0; i < size; i++) {
+        found.low = lesser(found.low, key[segment[i]]);
+        found.high = greater(found.high, key[segment[i]]);
+    }
+    return found;
+}
+
+KERNEL int64_t count_cuts(const int64_t *indptr, const int64_t *indices, const int64_t *segment,
+                          const int64_t *owner, int64_t name, const int64_t *key, int64_t low,
+                          int64_t *below, int64_t *from_above, int64_t *from_below, int64_t size) {
+    int64_t joined = 0;
+    for (int64_t i = 0; i < size; i++) {
+        int64_t node = segment[i], least = key[node], most = key[node];
+        for (int64_t at = indptr[node]; at < indptr[node + 1]; at++) {
+            int64_t other = indices[at];
+            if (owner[other] != name) continue;
+            joined++;
+            least = lesser(least, key[other]);
+            most = greater(most, key[other]);
+        }
+        int64_t after = key[node] - low + 1;
+        below[after]++;
+        /* The point is on the cut from above at values in (least, key], from below in (key, most]. */
+        from_above[least - low + 1]++;
+        from_above[after]--;
+        from_below[after]++;
+        from_below[most - low + 1]--;
+    }
+    return joined;
+}
+
+struct cut {
+    int64_t place;
+    bool above;
+    double cost;
+};
+
+KERNEL struct cut cheapest_cut(int64_t size, const int64_t *below, const int64_t *from_above,
+                               const int64_t *from_below, int64_t count) {
+    struct cut best = {0, true, INFINITE};
+    int64_t under = 0, upper = 0, lower = 0;
+    for (int64_t i = 0; i < count; i++) {
+        under += below[i];
+        upper += from_above[i];
+        lower += from_below[i];
+        int64_t smaller = lesser(under, size - under);
+        double cost = (double)(lesser(upper, lower) + 1) / (double)greater(smaller, 1);
+        if (smaller > 0 && cost < best.cost) best = (struct cut){i, upper <= lower, cost};
+    }
+    return best;
+}
+
+KERNEL void take_sides(const int64_t *indptr, const int64_t *indices, const int64_t *segment,
+                       const int64_t *owner, int64_t name, const int64_t *key, int64_t level,
+                       bool above, int8_t *side, int64_t size) {
+    for (int64_t i = 0; i < size; i++) {
+        int64_t node = segment[i];
+        side[i] = key[node] >= level;
+        if ((side[i] == 1) != above) continue;
+        for (int64_t at = indptr[node]; at < indptr[node + 1]; at++) {
+            int64_t other = indices[at];
+            if (owner[other] == name && (key[other] < level) == above) side[i] = 2;
+        }
+    }
+}
+
+/* Sets of neighbors: WORD bits a word. Literals of 64 bits, since 1 << 40 of an int is another set. */
+static inline bool has(const int64_t *set, int64_t i) { return set[i / WORD] >> (i % WORD) & 1; }
+static inline void include(int64_t *set, int64_t i) { set[i / WORD] |= INT64_C(1) << (i % WORD); }
+static inline void exclude(int64_t *set, int64_t i) {
+    set[i / WORD] &= ~(INT64_C(1) << (i % WORD));
+}
+
+/* Unite two sets, and return how many are in both together without two points. */
+static int64_t unite(int64_t *set, const int64_t *others, int64_t words, int64_t one, int64_t two) {
+    for (int64_t word = 0; word < words; word++) set[word] |= others[word];
+    exclude(set, one);
+    exclude(set, two);
+    int64_t total = 0;
+    for (int64_t word = 0; word < words; word++) total += __builtin_popcountll((uint64_t)set[word]);
+    return total;
+}
+
+/* The point of least degree, the first of several; degrees are -1 where a point is eliminated. */
+static int64_t find_pivot(const int64_t *degree, int64_t count) {
+    int64_t pivot = -1;
+    for (int64_t i = 0; i < count; i++)
+        if (degree[i] >= 0 && (pivot < 0 || degree[i] < degree[pivot])) pivot = i;
+    return pivot;
+}
+
+KERNEL void order_leaf(const int64_t *indptr, const int64_t *indices, int64_t *nodes, int64_t start,
+                       int64_t stop, int64_t *owner, int64_t *place, int64_t *local, int64_t *order,
+                       int64_t *degree, int64_t *bits) {
+    /* Number the points of the leaf, then their outer neighbors. */
+    int64_t *leaf = nodes + start, count = stop - start, total = count;
+    for (int64_t i = 0; i < count; i++) local[leaf[i]] = i;
+    for (int64_t i = 0; i < count; i++)
+        for (int64_t at = indptr[leaf[i]]; at < indptr[leaf[i] + 1]; at++)
+            if (local[indices[at]] < 0) local[indices[at]] = total++;
+    int64_t words = (total + WORD - 1) / WORD;
+    for (int64_t i = 0; i < count * words; i++) bits[i] = 0;
+    for (int64_t i = 0; i < count; i++) {
+        degree[i] = 0;
+        for (int64_t at = indptr[leaf[i]]; at < indptr[leaf[i] + 1]; at++) {
+            int64_t j = local[indices[at]];
+            if (j == i) continue;
+            include(bits + i * words, j);
+            degree[i]++;
+        }
+    }
+    for (int64_t i = 0; i < count; i++) {
+        local[leaf[i]] = -1;
+        for (int64_t at = indptr[leaf[i]]; at < indptr[leaf[i] + 1]; at++) local[indices[at]] = -1;
+    }
+    for (int64_t step = 0; step < count; step++) {
+        int64_t pivot = find_pivot(degree, count);
+        const int64_t *neighbors = bits + pivot * words;
+        order[step] = leaf[pivot];
+        degree[pivot] = -1;
+        /* Its neighbors take over one another, but neither the pivot nor themselves. */
+        for (int64_t i = 0; i < count; i++)
+            if (degree[i] >= 0 && has(neighbors, i))
+                degree[i] = unite(bits + i * words, neighbors, words, pivot, i);
+    }
+    for (int64_t i = 0; i < count; i++) {
+        leaf[i] = order[i];
+        place[order[i]] = start + i;
+        owner[order[i]] = -1;
+    }
+}

@@ -1,0 +1,191 @@
+"""Kernels: what declarations say agrees with the sources in C, and wrong calls are named."""
+
+import importlib
+import os
+import re
+from pathlib import Path
+from typing import Annotated, get_args, get_origin
+
+import numpy as np
+import pytest
+
+import eigenshape
+from eigenshape import _kernels
+from eigenshape.sparse import basis_loops as basis
+from eigenshape.sparse import dissection_loops as dissection
+from eigenshape.sparse import symbolic_loops as symbolic
+
+PACKAGE = Path(eigenshape.__file__).parent
+SOURCES = sorted(PACKAGE.rglob("*_loops.c"))
+NUMBERS = {int: "int64_t", float: "double", bool: "bool", None: "void"}
+ENTRIES = {"float64": "double", "float32": "float", "bool": "bool"}
+
+
+def module_of(source):
+    name = ".".join(source.relative_to(PACKAGE).with_suffix("").parts)
+    return importlib.import_module(f"eigenshape.{name}")
+
+
+def text_of(source):
+    """Return the text of a source and of the headers that it includes, without comments."""
+    headers = re.findall(r'#include "(.*)"', source.read_text())
+    texts = [*(text_of(PACKAGE / header) for header in headers), source.read_text()]
+    return re.sub(r"/\*.*?\*/", "", "\n".join(texts), flags=re.DOTALL)
+
+
+def prototypes(text):
+    """Return what each kernel returns and takes, one space between words."""
+    found = {}
+    for kind, name, arguments in re.findall(
+        r"^KERNEL\s+([\w ]+?)\s+\**(\w+)\(([^{]*?)\)\s*\{", text, re.MULTILINE
+    ):
+        parts = re.split(r",(?![^()]*\))", arguments)
+        found[name] = kind, [" ".join(part.split()) for part in parts]
+    return found
+
+
+def members(text, struct):
+    """Return the types of the members of a struct; that of a function is its result's."""
+    body = re.search(rf"struct {struct} \{{(.*?)\}};", text, re.DOTALL)[1]
+    found = []
+    for line in filter(None, map(str.strip, body.split(";"))):
+        kind = re.match(r"(const )?\w+", line)[0]
+        found += [kind] if "(*" in line else [kind] * (line.count(",") + 1)
+    return found
+
+
+def type_of_entries(kind):
+    """Return the type of entries in C."""
+    written = get_origin(kind) is Annotated
+    dtype = str(np.dtype((get_args(kind)[0] if written else kind).dtypes[-1]))
+    return ("" if written else "const ") + ENTRIES.get(dtype, f"{dtype}_t")
+
+
+def agrees(kind, declared, text):
+    if kind in NUMBERS:
+        return re.fullmatch(rf"{NUMBERS[kind]} \w+", declared)
+    if get_origin(kind) is tuple:
+        struct = re.fullmatch(r"const struct (\w+) \*\w+", declared)
+        in_c = members(text, struct[1])
+        # A number is the address of a function
+        wanted = [in_c[i] if k is int else type_of_entries(k) for i, k in enumerate(get_args(kind))]
+        return in_c == wanted
+    if get_origin(kind) is list:
+        name = type_of_entries(get_args(kind)[0])
+        return re.fullmatch(rf"{name} \*const \*\w+", declared)
+    name = type_of_entries(kind)
+    # Rows of eight numbers have a type of their own
+    name = name.replace("double", "(?:double|eight)")
+    return re.fullmatch(rf"{name} (?:\*\w+|\(\*\w+\)(?:\[\w+\])+)", declared)
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
+def test_declarations_are_those_of_the_sources(source):
+    module, text = module_of(source), text_of(source)
+    declared = {
+        name: value.declaration
+        for name, value in vars(module).items()
+        if hasattr(value, "declaration") and value.__module__ == module.__name__
+    }
+    found = prototypes(text)
+    assert set(declared) == set(found)
+    for name, (stub, lengths) in declared.items():
+        kinds = dict(stub.__annotations__)
+        result = kinds.pop("return")
+        returned, arguments = found[name]
+        if get_origin(result) is tuple:
+            kinds_in_c = members(text, re.fullmatch(r"struct (\w+)", returned)[1])
+            assert kinds_in_c == [NUMBERS[kind] for kind in get_args(result)], name
+        else:
+            assert returned == NUMBERS[result], name
+        assert len(arguments) == len(kinds) + len(lengths), name
+        for (argument, kind), in_c in zip(kinds.items(), arguments[: len(kinds)], strict=True):
+            assert in_c.endswith(argument) or f"*{argument})" in in_c, (name, argument, in_c)
+            assert agrees(kind, in_c, text), (name, argument, in_c)
+        assert arguments[len(kinds) :] == [f"int64_t {length}" for length in lengths], name
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
+def test_constants_of_both_languages_are_equal(source):
+    module = module_of(source)
+    for name, value in re.findall(r"\b([A-Z][A-Z_]+) = ([\d.e-]+)", text_of(source)):
+        assert getattr(module, name, float(value)) == float(value), name
+
+
+def whole(n):
+    return np.zeros(n, dtype=np.int64)
+
+
+def join_runs(**changed):
+    """Call a kernel with arguments of which one is wrong."""
+    right = {
+        "parent": np.array([1, 2, -1]),
+        "first": whole(3),
+        "heights": whole(3),
+        "widths": whole(3),
+        "zeros": np.zeros(3),
+        "keep": np.ones(3, dtype=bool),
+    }
+    symbolic.join_runs(**(right | changed))
+
+
+READ_ONLY = whole(3)
+READ_ONLY.flags.writeable = False
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"zeros": np.zeros(3, np.float32)}, "zeros must be a contiguous array of float64 .*; it is float32"),
+        ({"first": [0, 1, 2]}, r"join_runs: first must .*; it is \[0, 1, 2\]"),
+        ({"first": None}, "join_runs: first must .*; it is None"),
+        ({"first": np.zeros(3, np.int32)}, "first must be a contiguous array of int64 .*; it is int32"),
+        ({"first": whole(6)[::2]}, r"first must .*; it is int64 of shape \(3,\), not contiguous"),
+        ({"first": whole((3, 1))}, r"first must .* with 1 dimensions, size; it is int64 of shape \(3, 1\)"),
+        ({"heights": READ_ONLY}, r"heights must .* be written to; it is .*, read-only"),
+        ({"widths": whole(4)}, r"widths must .*, here \(3,\); its shape is \(4,\)"),
+        ({"keep": np.ones(2, dtype=bool)}, r"keep must .*, here \(3,\); its shape is \(2,\)"),
+        ({"keep": whole(3)}, "keep must be a contiguous array of bool .*; it is int64"),
+        ({"more": 3}, "join_runs.* got an unexpected keyword argument 'more'"),
+    ],
+)  # fmt: skip
+def test_wrong_arguments_are_named(changed, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        join_runs(**changed)
+
+
+def test_lengths_may_be_expressions():
+    space, columns, parts = np.zeros((2, 5, 8)), np.zeros((1, 5, 8)), np.zeros((1, 15, 8))
+    with pytest.raises(ValueError, match=r"parts must .*slots\*8 8.*, here \(1, 16, 8\);"):
+        basis.add_products(space, columns, parts, 0, 2)
+
+
+def test_numbers_must_be_whole():
+    with pytest.raises(TypeError, match="'float' object cannot be interpreted as an integer"):
+        dissection.cheapest_cut(2.5, whole(2), whole(2), whole(2))
+
+
+def test_several_results_are_a_tuple():
+    counts = np.array([0, 1, 1]), np.array([1, 0, 0]), np.array([1, 1, 0])
+    assert dissection.cheapest_cut(2, *counts) == (1, True, 2.0)
+
+
+def test_kernels_that_are_missing_or_old_say_what_to_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(_kernels, "LIBRARIES", tmp_path)
+    with pytest.raises(ImportError, match=r"no kernels in .*; run `python hatch_build\.py`"):
+        _kernels.load_library.__wrapped__()
+    monkeypatch.setattr(_kernels, "load_library", lambda: (None, tmp_path))
+    os.utime(tmp_path, (1, 1))
+    monkeypatch.delenv(_kernels.VARIABLE, raising=False)
+    with pytest.raises(ImportError, match=r"older than their source .*\.[ch]; run"):
+        _kernels._find(dissection.order_leaf)
+
+
+def test_a_kernel_that_is_missing_is_named(monkeypatch):
+    def unknown_kernel(): ...
+
+    unknown_kernel.__module__ = dissection.__name__
+    with pytest.raises(
+        ImportError, match=r"has no kernel unknown_kernel; run `python hatch_build\.py`"
+    ):
+        _kernels._find(unknown_kernel)
