@@ -1,5 +1,6 @@
 """Kernels: what declarations say agrees with the sources in C, and wrong calls are named."""
 
+import ctypes
 import importlib
 import os
 import re
@@ -7,8 +8,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Annotated, get_args, get_origin
 
+import hatch_build
 import numpy as np
 import pytest
+from jaxtyping import Float64
 
 import eigenshape
 from eigenshape import _kernels
@@ -249,3 +252,30 @@ def test_a_kernel_that_is_missing_is_named(monkeypatch):
         ImportError, match=r"has no kernel unknown_kernel; run `python hatch_build\.py`"
     ):
         _kernels._find(unknown_kernel)
+
+
+def test_a_new_kernel_is_compiled_declared_and_called(tmp_path, monkeypatch):
+    pytest.importorskip("ziglang")
+    source = tmp_path / "new_loops.c"
+    source.write_text(
+        '#include "kernels.h"\n'
+        "KERNEL bool add_rows(const double (*rows)[3], double share, double *sums, int64_t n) {\n"
+        "    for (int64_t i = 0; i < n; i++)\n"
+        "        for (int c = 0; c < 3; c++) sums[c] += share * rows[i][c];\n"
+        "    return n > 0;\n}\n"
+    )
+    target = hatch_build.TARGETS[hatch_build.target_name()]
+    library = tmp_path / "new.so"
+    hatch_build.compile_library(target, min(target.processors), library, sources=[source])
+    monkeypatch.setattr(_kernels, "_load", lambda: (ctypes.CDLL(str(library)), library))
+
+    @_kernels.kernel("n")
+    def add_rows(
+        rows: Float64[np.ndarray, "n 3"],
+        share: float,
+        sums: _kernels.Out[Float64[np.ndarray, " 3"]],
+    ) -> bool: ...
+
+    rows, sums = np.random.default_rng(0).random((7, 3)), np.zeros(3)
+    assert add_rows(rows, 0.5, sums)
+    np.testing.assert_allclose(sums, rows.sum(axis=0) / 2)

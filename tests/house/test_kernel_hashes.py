@@ -6,14 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import hatch_build
 import pytest
 
 from eigenshape import _kernels
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "house" / "kernel_hashes.py"
-sys.path.insert(0, str(ROOT))
-import hatch_build  # noqa: E402
 
 BEYOND_THE_END = "KERNEL int64_t fault(const int64_t *values) { return values[8]; }"
 OVERFLOW = "KERNEL int64_t fault(const int64_t *values) { return values[0] + 1; }"
