@@ -22,7 +22,7 @@ AXES = 3  # axes that are cut into cells, those along which the points spread mo
 # Cells along an axis at most: 2^60 cells have numbers that fit 64 bits.
 CELLS_PER_AXIS = 2**20
 CHUNK = 64  # cells a task
-EXPONENTIAL = math_functions("exp")
+LIBM = (math_functions("exp")[0],)
 
 
 @record
@@ -105,11 +105,11 @@ def gaussian_rows(
     place[grid.order] = np.arange(len(place))
     most = int(np.diff(grid.runs, axis=2).sum(axis=(1, 2)).max())  # points that one cell may reach
     known = (grid.points, grid.cells, grid.runs), grid.order, place, grid.reach**2
-    kernel = 1 / (4 * t), EXPONENTIAL, weights
+    rows, rate = (weights, starts, columns, values), 1 / (4 * t)
 
     def fill(first: int, last: int) -> None:
         scratch = np.empty(most, dtype=np.int64), np.empty((most, grid.points.shape[1]))
-        fill_pairs(*known, *kernel, starts, columns, values, *scratch, first, last)
+        fill_pairs(*known, rate, LIBM, *rows, *scratch, first, last)
 
     _each_cell(grid, fill)
     return columns, values
@@ -123,7 +123,7 @@ def gaussian_differences(
     sums = np.empty_like(sorted_values)
     arrays = weights[grid.order], sorted_values, sums
     cells = grid.points, grid.cells, grid.runs
-    work = partial(sum_differences, cells, grid.reach**2, 1 / (4 * t), EXPONENTIAL, *arrays)
+    work = partial(sum_differences, cells, grid.reach**2, 1 / (4 * t), LIBM, *arrays)
     _each_cell(grid, work)
     result = np.empty_like(sums)
     result[grid.order] = sums

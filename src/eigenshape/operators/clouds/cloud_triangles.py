@@ -132,13 +132,13 @@ def _rings(coordinates: Float[np.ndarray, "n k 2"]) -> Int[np.ndarray, "n k1"]:
     the origin itself: it is on the hull, and so the ring is open there.
     """
     n, k, _ = coordinates.shape
-    scaled = coordinates / np.abs(coordinates).max(axis=(1, 2), keepdims=True)
-    squares = np.maximum((scaled**2).sum(axis=2), 1e-300)
-    inverted = np.zeros((2, n, k + 1))
-    inverted[:, :, :k] = scaled.transpose(2, 0, 1) / squares
-    x, y = inverted
+    u, v = (coordinates / np.abs(coordinates).max(axis=(1, 2), keepdims=True)).transpose(2, 0, 1)
+    squares = np.maximum(u * u + v * v, 1e-300)
+    x, y = np.zeros((2, n, k + 1))
+    x[:, :k], y[:, :k] = u / squares, v / squares
     rings = np.empty((n, k + 1), dtype=np.int64)
-    local_rings(x, y, np.lexsort((y, x), axis=1), rings, np.empty(2 * k + 4, dtype=np.int64))
+    scratch = np.empty(k + 1, dtype=np.int64), np.empty(2 * k + 4, dtype=np.int64)
+    local_rings(x, y, rings, *scratch)
     return rings
 
 

@@ -129,21 +129,45 @@ KERNEL void fill_labels(const int64_t *starts, const int32_t *columns, int64_t *
     }
 }
 
+/* Return whether a point comes before another by x, then y, then number. */
+static bool precedes(const double *x, const double *y, int64_t one, int64_t two) {
+    if (x[one] != x[two]) return x[one] < x[two];
+    if (y[one] != y[two]) return y[one] < y[two];
+    return one < two;
+}
+
+/* Write the numbers of points in that order, by Shell sort. */
+static void order_points(const double *x, const double *y, int64_t *order, int64_t n) {
+    int64_t gap = 1;
+    while (3 * gap < n) gap = 3 * gap + 1;
+    for (int64_t i = 0; i < n; i++) order[i] = i;
+    for (; gap > 0; gap /= 3) {
+        for (int64_t i = gap; i < n; i++) {
+            int64_t point = order[i], into = i;
+            for (; into >= gap && precedes(x, y, point, order[into - gap]); into -= gap)
+                order[into] = order[into - gap];
+            order[into] = point;
+        }
+    }
+}
+
 /* Return whether the path over three points turns left. */
 static bool turns_left(const double *x, const double *y, int64_t one, int64_t two, int64_t three) {
     return (x[two] - x[one]) * (y[three] - y[one]) > (y[two] - y[one]) * (x[three] - x[one]);
 }
 
-KERNEL void local_rings(const double *x, const double *y, const int64_t *order, int64_t *rings,
+KERNEL void local_rings(const double *x, const double *y, int64_t *rings, int64_t *order,
                         int64_t *hull, int64_t n_points, int64_t n) {
-    for (int64_t point = 0; point < n_points; point++) {
-        int64_t size = 0, offset = point * n;
+    for (int64_t offset = 0; offset < n_points * n; offset += n) {
+        const double *row_x = x + offset, *row_y = y + offset;
+        int64_t size = 0;
+        order_points(row_x, row_y, order, n);
         for (int upper = 0; upper < 2; upper++) {
             int64_t start = size;
             for (int64_t step = 0; step < n; step++) {
-                int64_t node = order[offset + (upper ? n - 1 - step : step)];
+                int64_t node = order[upper ? n - 1 - step : step];
                 while (size - start >= 2 &&
-                       !turns_left(x + offset, y + offset, hull[size - 2], hull[size - 1], node))
+                       !turns_left(row_x, row_y, hull[size - 2], hull[size - 1], node))
                     size--;
                 hull[size++] = node;
             }

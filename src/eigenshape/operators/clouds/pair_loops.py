@@ -95,12 +95,12 @@ def fill_labels(
 def local_rings(
     x: Float64[np.ndarray, "n_points n"],
     y: Float64[np.ndarray, "n_points n"],
-    order: Int64[np.ndarray, "n_points n"],
     rings: Out[Int64[np.ndarray, "n_points n"]],
+    order: Out[Int64[np.ndarray, " n"]],
     hull: Out[Int64[np.ndarray, " 2*n+2"]],
 ) -> None:
     """Write the convex hull of each row of points by Andrew's monotone chain (1979), then -1.
 
-    The numbers of its corners are in counter-clockwise order. `order` sorts a row by x, then y;
-    `hull` is scratch.
+    The numbers of its corners are in counter-clockwise order; of equal points one is a corner.
+    `order` and `hull` are scratch.
     """
