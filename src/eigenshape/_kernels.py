@@ -226,9 +226,3 @@ def _load() -> tuple[ctypes.CDLL, Path]:
     level = lowest.processor_level()
     path = libraries[max(each for each in libraries if each <= level or each == min(libraries))]
     return ctypes.CDLL(str(path)), path
-
-
-def library_function(name: str) -> int:
-    """Return the address of a function of C's mathematics library, for kernels that need it."""
-    library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)
-    return ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0

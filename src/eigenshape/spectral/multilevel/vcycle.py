@@ -90,7 +90,7 @@ def smooth(
         given = matrix, level.rough_scales, (residual, shifts), block, step, moved
 
         def smooth_rows(share: tuple[int, int], given: Any = (*given, old, new)) -> None:
-            smoothing_step(*given, *share)
+            smoothing_step(*given, begin=share[0], end=share[1])
 
         map_in_threads(smooth_rows, shares)
         block, moved = moved, block
