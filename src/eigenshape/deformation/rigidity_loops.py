@@ -1,11 +1,13 @@
 """Kernels of `rigidity`: the best rotation at each vertex, and the rotated edges."""
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float64, Int64
 
 from eigenshape._kernels import Out, kernel, math_functions
 
-CIRCLE = math_functions("atan2", "tan")
+CIRCLE: Any = math_functions("atan2", "tan")
 
 Vertices = Int64[np.ndarray, " n_vertices"]
 # Edges starts[i] to starts[i + 1] - 1 are those of vertex i.

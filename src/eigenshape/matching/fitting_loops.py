@@ -1,11 +1,13 @@
 """Kernels of `fitting`: the pull on frames, and their turns."""
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float64, Int64
 
 from eigenshape._kernels import Out, kernel, math_functions
 
-CIRCLE = math_functions("cos", "sin")
+CIRCLE: Any = math_functions("cos", "sin")
 
 
 @kernel("n_samples", "n_carriers")

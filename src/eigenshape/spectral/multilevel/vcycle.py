@@ -90,7 +90,8 @@ def smooth(
         given = matrix, level.rough_scales, (residual, shifts), block, step, moved
 
         def smooth_rows(share: tuple[int, int], given: Any = (*given, old, new)) -> None:
-            smoothing_step(*given, *share)
+            arguments = *given, *share
+            smoothing_step(*arguments)
 
         map_in_threads(smooth_rows, shares)
         block, moved = moved, block
