@@ -111,14 +111,14 @@ class _CallWriter:
         return f"_struct_{name}({', '.join(passed)})"
 
     def _pass_array(self, name: str, kind: Any, *, is_written: bool) -> str:
-        dtype, lengths = np.dtype(kind.dtypes[-1]), kind.dim_str.split()
+        dtype, lengths = kind.dtypes[-1].rstrip("_"), kind.dim_str.split()
         wanted = (
             f"{self.kernel}: {name} must be a contiguous array of {dtype} "
             f"with {len(lengths)} dimensions, {kind.dim_str.strip()}"
         )
         if is_written:
             wanted += ", that can be written to"
-        self.scope[f"_{dtype}"] = dtype
+        self.scope[f"_{dtype}"] = np.dtype(dtype)
         flag = "carray" if is_written else "c_contiguous"
         self.types.append(
             f"if not isinstance({name}, _ndarray) or {name}.dtype != _{dtype} "
@@ -199,8 +199,7 @@ def _find(stub: Callable[..., Any]) -> Any:
     remedy = "run `python hatch_build.py` in the folder of the sources, or `pip install -e .` again"
     # In an editable install the sources may have changed since the library was built.
     folder = Path(str(sys.modules[stub.__module__].__file__)).parent
-    newest = max((file.stat().st_mtime for file in folder.glob("*.[ch]")), default=0)
-    if VARIABLE not in os.environ and newest > path.stat().st_mtime:
+    if VARIABLE not in os.environ and _newest_source(folder) > path.stat().st_mtime:
         raise ImportError(
             f"The kernels in {path} are older than their sources in {folder}; {remedy}."
         )
@@ -208,6 +207,11 @@ def _find(stub: Callable[..., Any]) -> Any:
         return library[stub.__name__]
     except AttributeError as err:
         raise ImportError(f"{path} has no kernel {stub.__name__}; {remedy}.") from err
+
+
+@cache
+def _newest_source(folder: Path) -> float:
+    return max((file.stat().st_mtime for file in folder.glob("*.[ch]")), default=0.0)
 
 
 @cache
