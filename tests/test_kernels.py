@@ -129,7 +129,7 @@ def example(kind, sizes):
     if get_origin(kind) in (tuple, list):
         return get_origin(kind)(example(part, sizes) for part in get_args(kind))
     if kind in NUMBERS:
-        return kind(sizes["number"])
+        return kind(20)
     if get_origin(kind) is Annotated:
         kind = get_args(kind)[0]
     shape = [5 if name == "_" else eval(name, {}, sizes) for name in kind.dim_str.split()]
@@ -145,7 +145,7 @@ class Sizes(dict):
 
 def damaged(array):
     """Return arrays that differ from one in type, in the number of dimensions and in order."""
-    yield array.astype(np.complex64)
+    yield array.astype(np.complex128)
     yield array[None]
     yield np.zeros([*array.shape[:-1], 2 * array.shape[-1]], array.dtype)[..., ::2]
 
@@ -160,9 +160,12 @@ def test_every_kernel_refuses_wrong_arrays(kernel, monkeypatch):
     )
     stub, lengths = kernel.declaration
     kinds = {name: kind for name, kind in stub.__annotations__.items() if name != "return"}
-    sizes = Sizes(number=20)
-    sizes.update({name: 20 for name, kind in kinds.items() if kind is int})
-    right = [example(kind, sizes) for kind in kinds.values()]
+    # Ascending, so that a length such as end-begin is one of several entries
+    wholes = [name for name, kind in kinds.items() if kind is int]
+    sizes = Sizes({name: 4 * place for place, name in enumerate(wholes, 1)})
+    right = [
+        sizes[name] if name in wholes else example(kind, sizes) for name, kind in kinds.items()
+    ]
     kernel(*right)
     assert calls.pop()[len(kinds) :] == tuple(sizes[length] for length in lengths)
 
@@ -270,7 +273,7 @@ def test_a_new_kernel_is_compiled_declared_and_called(tmp_path, monkeypatch):
     target = hatch_build.TARGETS[hatch_build.target_name()]
     library = tmp_path / "new.so"
     hatch_build.compile_library(target, min(target.processors), library, sources=[source])
-    monkeypatch.setattr(_kernels, "_load", lambda: (ctypes.CDLL(str(library)), library))
+    monkeypatch.setattr(_kernels, "load_library", lambda: (ctypes.CDLL(str(library)), library))
 
     @_kernels.kernel("n")
     def add_rows(
