@@ -56,10 +56,17 @@ FLAGS = [
     *["-std=c11", "-shared", "-fPIC", "-fvisibility=hidden", *WARNINGS],
     "-fno-math-errno",  # otherwise roots of negative numbers call the library
     "-ffp-contract=off",  # the same digits from any compiler; lanes.h says where it may fuse
+]
+RELEASE = [
+    *["-O3", "-s"],
+    "-fno-sanitize=undefined",  # which zig turns on by itself
     "-nostdlib",  # otherwise zig builds parts of the C library first, for eight seconds
 ]
-RELEASE = ["-O3", "-s", "-fno-sanitize=undefined"]  # which zig turns on by itself
-SANITIZED = ["-O1", "-g", "-fsanitize=undefined", "-fno-sanitize-recover=all"]
+# With checks that end the process, and name the line
+UNDEFINED = [
+    *["-O1", "-g", "-fsanitize=undefined"],
+    *["-fno-sanitize-trap=all", "-fno-sanitize-recover=all"],
+]
 
 
 class KernelBuildHook(BuildHookInterface):  # type: ignore[misc, valid-type]

@@ -1,13 +1,17 @@
 """Kernels: what declarations say agrees with the sources in C, and wrong calls are named."""
 
+import ctypes
 import importlib
 import os
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, get_args, get_origin
 
+import hatch_build
 import numpy as np
 import pytest
+from jaxtyping import Float64
 
 import eigenshape
 from eigenshape import _kernels
@@ -112,6 +116,68 @@ def test_constants_of_both_languages_are_equal(source):
         assert getattr(module, name, float(value)) == float(value), name
 
 
+KERNELS = [
+    value
+    for source in SOURCES
+    for value in vars(module_of(source)).values()
+    if hasattr(value, "declaration")
+]
+
+
+def example(kind, sizes):
+    """Return an argument of a kind: arrays of zeros, with lengths by name."""
+    if get_origin(kind) in (tuple, list):
+        return get_origin(kind)(example(part, sizes) for part in get_args(kind))
+    if kind in NUMBERS:
+        return kind(sizes["number"])
+    if get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
+    shape = [5 if name == "_" else eval(name, {}, sizes) for name in kind.dim_str.split()]
+    return np.zeros(shape, np.dtype(kind.dtypes[-1]))
+
+
+class Sizes(dict):
+    """Lengths of examples: another one for each name."""
+
+    def __missing__(self, name):
+        return self.setdefault(name, 16 + len(self))
+
+
+def damaged(array):
+    """Return arrays that differ from one in type, in the number of dimensions and in order."""
+    yield array.astype(np.complex64)
+    yield array[None]
+    yield np.zeros([*array.shape[:-1], 2 * array.shape[-1]], array.dtype)[..., ::2]
+
+
+@pytest.mark.parametrize("kernel", KERNELS, ids=lambda kernel: kernel.__name__)
+def test_every_kernel_refuses_wrong_arrays(kernel, monkeypatch):
+    calls = []
+    monkeypatch.setitem(
+        kernel.__globals__,
+        "_function",
+        lambda *passed: calls.append(passed) or SimpleNamespace(values=tuple),
+    )
+    stub, lengths = kernel.declaration
+    kinds = {name: kind for name, kind in stub.__annotations__.items() if name != "return"}
+    sizes = Sizes(number=20)
+    sizes.update({name: 20 for name, kind in kinds.items() if kind is int})
+    right = [example(kind, sizes) for kind in kinds.values()]
+    kernel(*right)
+    assert calls.pop()[len(kinds) :] == tuple(sizes[length] for length in lengths)
+
+    for place, argument in enumerate(right):
+        together = isinstance(argument, tuple | list)
+        parts = list(argument) if together else [argument]
+        for part, array in enumerate(parts):
+            for wrong in damaged(array) if isinstance(array, np.ndarray) else ():
+                others = [*parts[:part], wrong, *parts[part + 1 :]]
+                changed = type(argument)(others) if together else wrong
+                with pytest.raises(TypeError, match=rf"{kernel.__name__}: .* must be a contiguous"):
+                    kernel(*right[:place], changed, *right[place + 1 :])
+    assert not calls
+
+
 def whole(n):
     return np.zeros(n, dtype=np.int64)
 
@@ -189,3 +255,30 @@ def test_a_kernel_that_is_missing_is_named(monkeypatch):
         ImportError, match=r"has no kernel unknown_kernel; run `python hatch_build\.py`"
     ):
         _kernels._find(unknown_kernel)
+
+
+def test_a_new_kernel_is_compiled_declared_and_called(tmp_path, monkeypatch):
+    pytest.importorskip("ziglang")
+    source = tmp_path / "new_loops.c"
+    source.write_text(
+        '#include "kernels.h"\n'
+        "KERNEL bool add_rows(const double (*rows)[3], double share, double *sums, int64_t n) {\n"
+        "    for (int64_t i = 0; i < n; i++)\n"
+        "        for (int c = 0; c < 3; c++) sums[c] += share * rows[i][c];\n"
+        "    return n > 0;\n}\n"
+    )
+    target = hatch_build.TARGETS[hatch_build.target_name()]
+    library = tmp_path / "new.so"
+    hatch_build.compile_library(target, min(target.processors), library, sources=[source])
+    monkeypatch.setattr(_kernels, "load_library", lambda: (ctypes.CDLL(str(library)), library))
+
+    @_kernels.kernel("n")
+    def add_rows(
+        rows: Float64[np.ndarray, "n 3"],
+        share: float,
+        sums: _kernels.Out[Float64[np.ndarray, " 3"]],
+    ) -> bool: ...
+
+    rows, sums = np.random.default_rng(0).random((7, 3)), np.zeros(3)
+    assert add_rows(rows, 0.5, sums)
+    np.testing.assert_allclose(sums, rows.sum(axis=0) / 2)

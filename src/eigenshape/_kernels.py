@@ -125,14 +125,14 @@ class _CallWriter:
         return f"_addresses(_{name})"
 
     def _pass_array(self, name: str, kind: Any, *, is_written: bool) -> str:
-        dtype, lengths = np.dtype(kind.dtypes[-1]), kind.dim_str.split()
+        dtype, lengths = kind.dtypes[-1].rstrip("_"), kind.dim_str.split()
         wanted = (
             f"{self.kernel}: {name} must be a contiguous array of {dtype} "
             f"with {len(lengths)} dimensions, {kind.dim_str.strip()}"
         )
         if is_written:
             wanted += ", that can be written to"
-        self.scope[f"_{dtype}"] = dtype
+        self.scope[f"_{dtype}"] = np.dtype(dtype)
         flag = "carray" if is_written else "c_contiguous"
         self.types.append(
             f"if not isinstance({name}, _ndarray) or {name}.dtype != _{dtype} "
@@ -213,14 +213,19 @@ def _find(stub: Callable[..., Any]) -> Any:
     remedy = "run `python hatch_build.py` in the folder of the sources, or `pip install -e .` again"
     # In an editable install the sources may have changed since the library was built.
     folder = Path(str(sys.modules[stub.__module__].__file__)).parent
-    sources = [*folder.glob("*.[ch]"), *LIBRARIES.parent.glob("*.h")]
-    newest = max(sources, key=lambda file: file.stat().st_mtime, default=path)
-    if VARIABLE not in os.environ and newest.stat().st_mtime > path.stat().st_mtime:
+    newest = _newest_source(folder)
+    if VARIABLE not in os.environ and newest and newest.stat().st_mtime > path.stat().st_mtime:
         raise ImportError(f"The kernels in {path} are older than their source {newest}; {remedy}.")
     try:
         return library[stub.__name__]
     except AttributeError as err:
         raise ImportError(f"{path} has no kernel {stub.__name__}; {remedy}.") from err
+
+
+@cache
+def _newest_source(folder: Path) -> Path | None:
+    sources = [*folder.glob("*.[ch]"), *LIBRARIES.parent.glob("*.h")]
+    return max(sources, key=lambda file: file.stat().st_mtime, default=None)
 
 
 @cache

@@ -3,6 +3,7 @@
     python tests/house/kernel_hashes.py                 compare all with kernel_hashes.json; a minute
     python tests/house/kernel_hashes.py --check front   compare the loops of front_loops.py alone; seconds
     python tests/house/kernel_hashes.py --write         keep what is computed now
+    python tests/house/kernel_hashes.py --run           run the cases alone, under a sanitizer for example
 
 A case calls public functions. A loop is hashed by all its arrays after each call, and what it
 returns, on one thread; what the functions return is hashed on one, two and four threads. A loop may
@@ -423,8 +424,13 @@ def main() -> None:
     )
     parser.add_argument("--check", metavar="FILE", help="the loops of FILE_loops.py alone")
     parser.add_argument("--write", action="store_true")
+    parser.add_argument("--run", action="store_true")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
+    if options.run:
+        for case in CASES.values():
+            case()
+        return
     if options.write:
         made = {case: {"result": hash_results(case), "loops": hash_loops(case)} for case in CASES}
         KEPT.write_text(json.dumps(made, indent=1) + "\n")

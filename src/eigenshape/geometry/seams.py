@@ -3,8 +3,8 @@
 from decimal import Decimal
 
 import numpy as np
+import scipy  # which loads scipy.spatial where it is used: it takes 0.1 s
 from jaxtyping import Float, Int
-from scipy.spatial import cKDTree
 
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.facets import boundary_facets
@@ -59,7 +59,9 @@ def _round_places(mesh: Mesh, used: Int[np.ndarray, " k"]) -> Int[np.ndarray, " 
     lengths = side_lengths(points[mesh.simplices])
     shortest = lengths.min(initial=np.inf, where=lengths > 0)
     tolerance = np.minimum(tolerance, shortest / SIDES_PER_GAP)
-    near = cKDTree(spots).query_pairs(tolerance.max(), p=np.inf, output_type="ndarray")
+    near = scipy.spatial.cKDTree(spots).query_pairs(
+        tolerance.max(), p=np.inf, output_type="ndarray"
+    )
     within = (np.abs(spots[near[:, 0]] - spots[near[:, 1]]) <= tolerance).all(axis=1)
     _, joined = label_components(len(spots), *near[within].T)
     return joined[place]
