@@ -33,7 +33,6 @@ SOURCES = {
     "eigenshape": ROOT / "src",
     "eigenshape-studio": ROOT / "studio" / "src",
 }
-MADE_LATER = (".pyc", ".nbi", ".nbc")
 MB = 1e6
 
 
@@ -44,7 +43,7 @@ def files_of(package: Distribution) -> list[Path]:
         paths = list(source.rglob("*"))
     else:
         paths = [Path(str(package.locate_file(file))) for file in package.files or []]
-    return [path for path in paths if path.is_file() and path.suffix not in MADE_LATER]
+    return [path for path in paths if path.is_file() and path.suffix != ".pyc"]
 
 
 def all_needed(names: tuple[str, ...]) -> dict[str, Distribution]:

@@ -36,7 +36,7 @@ def run(*arguments, **variables):
 
 @pytest.mark.long
 def test_the_digits_are_those_of_before():
-    if _kernels._load()[0].processor_level() < 3:
+    if _kernels.load_library()[0].processor_level() < 3:
         pytest.skip("The digits are those of processors with AVX2.")
     done = run(SCRIPT)
     assert done.returncode == 0, done.stdout + done.stderr
