@@ -127,7 +127,7 @@ def test_links_to_folders_are_followed_once(folder, tmp_path_factory):
     ("text", "message"),
     [
         ("title,label\na,b\n", "must have a column 'name'; its columns are 'title', 'label'"),
-        ("", "its columns are none"),
+        ("", "must hold a table; it is empty"),
         ("name,label\ncats/tom,x\n", "none of them, and line 2 names 'cats/tom'. .* 'cats/felix'"),
         ("name,label\n,x\n", "line 2 does not"),
         ("name,label\ncats/felix,a,b\n", "must have 2 cells a line; line 2 has more"),

@@ -123,8 +123,8 @@ def parse_header(data: bytes) -> Header:
     mark = END.search(data, 0, LONGEST_LINE)
     if mark is None:
         raise FileFormatError(
-            "A PLY header must end with end_header; there is no such line in the first "
-            f"{LONGEST_LINE} bytes."
+            "A PLY header must end with end_header; there is no such line in its first "
+            f"{min(len(data), LONGEST_LINE)} bytes."
         )
     lines = data[: mark.start()].splitlines()
     order, elements = _declarations(lines)
