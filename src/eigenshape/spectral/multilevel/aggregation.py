@@ -164,11 +164,11 @@ def _multiply(left: sp.csr_array, right: sp.csr_array) -> sp.csr_array:
 
     Threads share them. SciPy's product takes one thread, and a pass before it that counts entries.
     """
-    parts = [(each.indptr, each.indices, each.data) for each in (left, right)]
+    one, two = ((each.indptr, each.indices, each.data) for each in (left, right))
     shape = left.shape[0], right.shape[1]
 
     def fill(share: tuple[int, int]) -> tuple[np.ndarray, ...]:
-        return multiply_sparse(*parts, shape[1], *share)
+        return multiply_sparse(one, two, shape[1], *share)
 
     found = map_in_threads(fill, share_units(shape[0], ROWS_A_THREAD, free_threads()))
     lengths, columns, values = (np.concatenate(each) for each in zip(*found, strict=True))

@@ -294,7 +294,7 @@ def _sums(
     """Return φᵀWφ / φᵀBφ, φᵀBφ, and Σ (Wφ - λBφ)² / D of each column, λ as given or that quotient."""
     sums = np.empty((3, vectors.shape[1]))
     # One type of indices, whatever SciPy chose, as the kernel takes it.
-    matrices = tuple(
+    stiffness, mass = (
         (part.indptr.astype(np.int64), part.indices.astype(np.int64), part.data)
         for part in (pencil.stiffness, pencil.mass)
     )
@@ -306,11 +306,11 @@ def _sums(
         weights, own = pencil.mass_diagonal, np.zeros((3, k))
         if values is None:
             unused = np.zeros(k)
-            add_sums(*matrices, part, unused, weights, False, *scratch, own)
+            add_sums(stiffness, mass, part, unused, weights, False, *scratch, own)
             given, own = own[0] / own[1], np.zeros((3, k))
         else:
             given = values[columns]
-        add_sums(*matrices, part, given, weights, True, *scratch, own)
+        add_sums(stiffness, mass, part, given, weights, True, *scratch, own)
         sums[:, columns] = own
 
     map_in_threads(measure, column_chunks(vectors.shape[1]))
