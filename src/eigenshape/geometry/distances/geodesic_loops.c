@@ -1,9 +1,8 @@
 /* A wave that starts at some vertices and crosses unfolded triangles. Documented in geodesic_loops.py. */
 #include "kernels.h"
 
-enum {
-    FRONT = -1
-}; /* stands for the source of a vertex that a straight front of several sources reached */
+/* Stands for the source of a vertex that a straight front of several sources reached. */
+enum { FRONT = -1 };
 
 /* Entries starts[v] to starts[v + 1] are the triangles at vertex v. */
 struct fans {

@@ -81,8 +81,8 @@ def refine(
     values, k, m = below[1], goal.k, len(below[1])
     level = tower.levels[0]
     # M and A of the level below are PᵀMP and PᵀAP: P keeps orthonormality and Ritz values.
-    columns, added = (np.empty((level.n, m), dtype=level.prolong.dtype) for _ in range(2))
-    multiply(level.prolong, below[0].astype(columns.dtype), columns)
+    columns = np.empty((level.n, m), dtype=level.prolong.dtype)
+    multiply(level.prolong, np.ascontiguousarray(below[0], dtype=columns.dtype), columns)
 
     # The coarser level cannot improve its vectors further. So they are smoothed first, and replaced
     # by the Ritz vectors of their span.
@@ -125,11 +125,12 @@ def refine(
         late = np.flatnonzero(residuals > enough * scale)
         needed = 0.5 * np.sqrt(level.spread) * np.log(8 * max(worst / bound, 1.0))
         steps = int(np.clip(np.ceil(needed), *SMOOTHING_STEPS))
+        added = np.empty((level.n, len(late)), dtype=columns.dtype)
         for some, start in zip(_blocks(late), range(0, len(late), WIDTH), strict=True):
             solve, scales = partial(correct, tower, steps=steps), 1 / residuals[some]
             step, _ = _corrections(tower, columns, values, some, scales, solve)
             added[:, start : start + len(some)] = step
-        before, values = values, _ritz(tower, columns, values, added[:, : len(late)])
+        before, values = values, _ritz(tower, columns, values, added)
     raise ConvergenceError(
         f"The error must be estimated at no more than {goal.accuracy:.1e} of the last eigenvalue, and no residual be "
         f"above {goal.bound:.1e}; after {goal.rounds} rounds these are {left:.1e} and {worst:.1e}. "
