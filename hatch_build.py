@@ -78,13 +78,16 @@ class KernelBuildHook(BuildHookInterface):  # type: ignore[misc, valid-type]
         """Compile, and give the wheel the name of its platform, for any Python 3."""
         if self.target_name != "wheel":
             return
+        self.folder = tempfile.TemporaryDirectory()
+        # zig keeps results in the home otherwise, which cannot be written to in some containers.
+        for name in ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"):
+            os.environ.setdefault(name, self.folder.name)
         if version == "editable":
             build_in_place()
             return
         target = TARGETS[target_name()]
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{target.wheel}"
-        self.folder = tempfile.TemporaryDirectory()
         for level in target.processors:
             library = Path(self.folder.name) / LIBRARY.format(level)
             compile_library(target, level, library)

@@ -196,7 +196,7 @@ def _choose_address() -> Callable[[np.ndarray], int]:
 
 
 @cache
-def math_functions(*names: str) -> tuple[int, ...]:
+def math_functions(*names: str) -> Any:  # a tuple of as many addresses as names
     """Return the addresses of functions of the C library, such as exp, for kernels that take them.
 
     A kernel that called them itself would be tied to one C library.

@@ -1,6 +1,7 @@
 """Corrections of approximate eigenvectors by a V-cycle through all levels."""
 
-from typing import Any
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -87,11 +88,12 @@ def smooth(
     step, moved = np.zeros_like(block), np.empty_like(block)
     shares = share_units(len(block), ROWS_A_THREAD, free_threads())
     for _ in range(steps):
-        given = matrix, level.rough_scales, (residual, shifts), block, step, moved
+        terms = residual, shifts
+        arrays = matrix, level.rough_scales, terms, block, step, moved
+        work = partial(smoothing_step, *arrays, old, new)
 
-        def smooth_rows(share: tuple[int, int], given: Any = (*given, old, new)) -> None:
-            arguments = *given, *share
-            smoothing_step(*arguments)
+        def smooth_rows(share: tuple[int, int], work: Callable[..., None] = work) -> None:
+            work(*share)
 
         map_in_threads(smooth_rows, shares)
         block, moved = moved, block
