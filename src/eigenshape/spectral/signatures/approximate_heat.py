@@ -165,7 +165,7 @@ def approximate_heat_signature(
     goal = Goal(wanted, float(accuracy), np.inf, pencil.level / pencil.n, MOST_ROUNDS, strict=True)
     # Eigenvectors of the second level may be good enough as they are.
     columns: Interpolated | Stored
-    columns = Interpolated(start.tower, start.below[0].astype(np.float32))
+    columns = Interpolated(start.tower, np.ascontiguousarray(start.below[0], np.float32))
     ritz = start.below[1]
     estimate = _estimate(pencil, columns, ritz[:wanted], clock)
     bound = goal.accuracy * goal.scale(ritz)
