@@ -122,7 +122,7 @@ def finite_rows(value: ArrayLike, name: str, columns: int | None = None) -> NDAr
         raise InvalidShapeError(f"{name} must be real numbers; the type is {rows.dtype}.")
     # Long doubles that overflow become infinite, which raises the error below.
     with np.errstate(over="ignore"):
-        rows = rows.astype(np.float64)
+        rows = rows.astype(np.float64, order="C")  # as kernels take them
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
         raise InvalidShapeError(
@@ -152,7 +152,7 @@ def index_rows(
         raise InvalidShapeError(
             f"{name} must index {indexed} 0..{n_vertices - 1}; {_first(name, rows, outside)}."
         )
-    return rows.astype(np.int64)
+    return rows.astype(np.int64, order="C")
 
 
 def _table(value: ArrayLike, name: str, columns: int | None) -> NDArray[Any]:
@@ -275,7 +275,7 @@ def face_labels(value: ArrayLike, name: str, n_faces: int) -> NDArray[Any]:
 
 
 def _all_finite(values: NDArray[Any], name: str) -> NDArray[np.float64]:
-    numbers = values.astype(np.float64)
+    numbers = values.astype(np.float64, order="C")
     bad = np.argwhere(~np.isfinite(numbers))
     if len(bad):
         place = tuple(bad[0].tolist())

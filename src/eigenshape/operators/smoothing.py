@@ -112,7 +112,7 @@ def denoise(mesh: MeshLike, *, reach: float | None = None) -> TriangleMesh:
     )
     if edges == 0:
         return mesh
-    if edges > mesh.n_vertices:
+    if reach is not None and edges > mesh.n_vertices:
         raise InvalidParameterError(
             f"reach must be at most the number of vertices, {mesh.n_vertices}; it is {edges:g}."
         )
