@@ -168,13 +168,13 @@ class SlowWorkspace:
         return Answer(encode({"call": call}), 200)
 
 
-def test_the_work_of_one_tab_does_not_stop_another():
+def test_the_work_of_one_tab_does_not_stop_another(tmp_path):
     slow = SlowWorkspace()
     rules = Rules("secret", local_hosts(5000), 5000)
     cookie = {"cookie": "eigenshape-studio-5000=secret", "content-type": "application/octet-stream"}
 
     async def run():
-        transport = httpx.ASGITransport(make_app(slow, rules))
+        transport = httpx.ASGITransport(make_app(slow, rules, tmp_path))
         async with httpx.AsyncClient(
             transport=transport, base_url="http://127.0.0.1:5000", headers=cookie
         ) as client:

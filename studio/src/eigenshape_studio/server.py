@@ -85,7 +85,7 @@ class Tabs:
                 del self._calls[tab]
 
 
-def make_app(first: Workspace, rules: Rules, folder: Path | None = None) -> App:
+def make_app(first: Workspace, rules: Rules, folder: Path) -> App:
     """Return the application: the page, its bundle, and the five calls, behind the guard.
 
     Parameters
@@ -93,11 +93,11 @@ def make_app(first: Workspace, rules: Rules, folder: Path | None = None) -> App:
     first : Workspace
         What new tabs show.
     rules : Rules
-    folder : Path, optional
-        Where the sessions are kept, which the caller owns; by default in the user's cache.
+    folder : Path
+        Where the sessions are kept, which the caller owns.
     """
     first.most_bytes = rules.most_bytes
-    tabs = Tabs(first, folder or sessions_folder(rules.port))
+    tabs = Tabs(first, folder)
     limiter = anyio.CapacityLimiter(N_THREADS)
 
     async def show_file(request: Request) -> Response:
