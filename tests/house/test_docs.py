@@ -21,7 +21,7 @@ PAGES = [
     *sorted((ROOT / "experiments").rglob("*.md")),
 ]
 # What stands for the names of files.
-PATTERNS = {"number/recipe/view/", "run.py"}
+PATTERNS = {"number/recipe/view/", "run.py", "x_loops.py"}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
