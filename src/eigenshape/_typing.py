@@ -1,5 +1,6 @@
 """Annotations that `help` shows by their names, where it would show unions or protocols."""
 
+from os import PathLike
 from pathlib import Path
 from typing import Protocol, SupportsIndex, runtime_checkable
 
@@ -20,3 +21,15 @@ class BinaryFile(Protocol):
 
 
 FileLike = TypeAliasType("FileLike", str | Path | bytes | BinaryFile)
+
+
+@runtime_checkable
+class Stored(Protocol):
+    """A `ShapeIndex`, which stands for its folder."""
+
+    @property
+    def folder(self) -> Path:
+        """Return where it is kept."""
+
+
+IndexLike = TypeAliasType("IndexLike", str | PathLike[str] | Stored)

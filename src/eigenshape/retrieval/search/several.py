@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from eigenshape._arguments import require_type
 from eigenshape._arrays import whole_number
 from eigenshape._errors import InvalidParameterError
 from eigenshape._files import as_path
-from eigenshape._typing import Integer
+from eigenshape._typing import IndexLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import Descriptor, describe
 from eigenshape.retrieval.patches.verification import N_VERIFIED
@@ -24,21 +24,12 @@ from eigenshape.retrieval.search.reader import IndexReader
 from eigenshape.retrieval.store.database import DATABASE
 from eigenshape.retrieval.store.filters import choose_shapes
 
-
-@runtime_checkable
-class _Index(Protocol):
-    """A `ShapeIndex`, which stands for its folder."""
-
-    @property
-    def folder(self) -> Path: ...
-
-
 MOST_OPEN = 256  # readers that a process keeps open between queries
 
 
 def query_indexes(
     shape: MeshLike | Descriptor,
-    folders: Sequence[str | PathLike[str] | _Index] | _Index,
+    folders: Sequence[IndexLike] | IndexLike,
     *,
     n_matches: Integer = 5,
     where: Mapping[str, Any] | None = None,
