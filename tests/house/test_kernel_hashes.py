@@ -35,6 +35,7 @@ def run(*arguments, **variables):
 
 
 @pytest.mark.long
+@pytest.mark.sweep
 def test_the_digits_are_those_of_before():
     if _kernels.load_library()[0].processor_level() < 3:
         pytest.skip("The digits are those of processors with AVX2.")
@@ -72,6 +73,7 @@ def compile_with_gcc(library, sources=()):
 
 
 @pytest.mark.long
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("compile_with", "fault", "message"),
     [
