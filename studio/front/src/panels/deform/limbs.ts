@@ -58,10 +58,12 @@ export class Limbs implements PointerTool {
     const { backend, state } = this.app;
     if (this.labels || state.parts.status !== "ready") return this.labels !== null;
     const names = ["parts/labels", "parts/cuts"];
-    const [finest, cuts] = await Promise.all(names.map((name) => backend.array<Int32Array>(name)));
-    if (state.shape !== this.app.state.shape) return false;
+    const wanted = Promise.all(names.map((name) => backend.array<Int32Array>(name)));
+    // A server that was started anew meanwhile finds them again.
+    const [finest, cuts] = await wanted.catch(() => []);
+    if (!finest || state.shape !== this.app.state.shape) return false;
     const { levels, n_regions } = state.parts;
-    this.labels = cutParts(finest!, cuts!, levels.length, n_regions);
+    this.labels = cutParts(finest, cuts!, levels.length, n_regions);
     const sizes = new Uint32Array(levels.length);
     for (const label of this.labels) sizes[label]!++;
     this.body = sizes.indexOf(Math.max(...sizes));
