@@ -115,7 +115,10 @@ def simple(rows="3 0 1 2\n", corners="list uchar int vertex_indices", axes="xyz"
     [
         ("", "A PLY file must begin with ply; it begins with ''"),
         ("plyx\n", "A PLY file must begin with ply; it begins with 'plyx'"),
-        ("ply\nformat ascii 1.0\n", "must end with end_header; there is no such line in its first [0-9]+ bytes"),
+        (
+            "ply\nformat ascii 1.0\n",
+            "must end with end_header; there is no such line in its first [0-9]+ bytes",
+        ),
         ("ply\nelement vertex 3\nend_header\n", "must name its format; it has no such line"),
         (
             "ply\nformat morse 1.0\nend_header\n",
