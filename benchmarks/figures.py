@@ -83,6 +83,9 @@ FIGURES = {
     "start": Figure("bench_start.py", ("__init__.py", "cli")),
     "size": Figure("bench_size.py --repeats 1", ("../../pyproject.toml",)),
     "threads": Figure("bench_threads.py", ("_threads.py", "sparse", "spectral/solver")),
+    "soak_service": Figure(
+        "soak.py service", (*STORE, "../../studio/src/eigenshape_studio/service")
+    ),
     "search": Figure("bench_search.py --queries 20 --qdrant 0", STORE),
     "retrieval": Figure("bench_retrieval.py --repeats 1", DESCRIBING),
     "deform": Figure("bench_deform.py --repeats 1", ("deformation",)),
