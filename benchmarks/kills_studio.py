@@ -36,8 +36,8 @@ from eigenshape_studio.wire import decode, encode
 LEAST, GROWN, SHRUNK = 0.3, 1.15, 0.9
 TURN = {"type": "rotation", "pivot": [0, 0.9, 0], "axis": [0, 0, 2], "angle": 0.6}
 PULL = {"type": "translation", "vector": [0, 0.4, 0.1]}
-# Starts a studio for each line it reads. A child has all that the parent has imported and compiled, so
-# it is there within a tenth of a second.
+# Starts a studio for each line it reads. A child has all that the parent has imported, so it is there
+# within a tenth of a second.
 SERVERS = """
 import os, signal, sys
 from pathlib import Path

@@ -11,7 +11,7 @@ import json
 import os
 import secrets
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -167,6 +167,8 @@ def committed_changes(kind: Kind, path: Path) -> int:
 
     Read it before a transaction begins, so that the state is not older.
     """
+    if not kind.changes:
+        return 0
     try:
         return int(path.with_name(kind.changes).read_text())
     except (OSError, ValueError):
@@ -196,26 +198,50 @@ def require_changes(
         )
 
 
-def whole_rows(database: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
-    """Yield the rows of a table that agree with their checksums, as far as SQLite can read them."""
-    with suppress(*DAMAGE):
-        for row in database.execute(f"SELECT * FROM {table} NOT INDEXED"):
-            if checksum(*row[:-1]) == row[-1]:
+def whole_rows(
+    database: sqlite3.Connection, table: str, numbers: Iterable[int] | None = None
+) -> Iterator[tuple[Any, ...]]:
+    """Yield those rows of a table, by default of all, that agree with their checksums, which stand last."""
+    if numbers is None:
+        found: list[int] = []
+        with suppress(*DAMAGE):  # rows behind a page that cannot be read are lost
+            for (number,) in database.execute(f"SELECT rowid FROM {table} NOT INDEXED"):
+                found.append(number)
+        numbers = found
+    for number in numbers:
+        with suppress(*DAMAGE):
+            query = f"SELECT * FROM {table} WHERE rowid = ?"
+            row = database.execute(query, (number,)).fetchone()
+            if row is not None and checksum(*row[:-1]) == row[-1]:
                 yield row
 
 
 def read_table(
-    kind: Kind, path: Path, database: sqlite3.Connection, table: str
+    kind: Kind,
+    path: Path,
+    database: sqlite3.Connection,
+    table: str,
+    n_columns: int | None = None,
 ) -> list[tuple[Any, ...]]:
-    """Return all rows of a table; raise DamagedFileError if one is damaged or lost."""
-    rows = list(whole_rows(database, table))
+    """Return all rows of a table, or their first columns; raise DamagedFileError if one is damaged or lost."""
+    rows, total = [], 0
+    for row in whole_rows(database, table):
+        rows.append(row[:n_columns])
+        total += row[-1]
     seal = read_seals(kind, path, database)[table]
-    if (len(rows), sum(row[-1] for row in rows)) != seal[:2]:
+    if (len(rows), total) != seal[:2]:
         raise DamagedFileError(
             f"{path} must hold what was written; of {seal.n_rows} rows of table {table} {len(rows)} "
             f"do. {kind.rescue}"
         )
     return rows
+
+
+def insert_row(database: sqlite3.Connection, table: str, *values: Any) -> None:
+    """Write a row with its checksum, unless it is there."""
+    marks = ", ".join("?" * (len(values) + 1))
+    query = f"INSERT OR IGNORE INTO {table} VALUES ({marks})"
+    database.execute(query, (*values, checksum(*values)))
 
 
 # ---- files
@@ -282,8 +308,7 @@ def mend(kind: Kind, path: Path) -> None:
         _make_tables(kind, fresh)
         for table in kind.tables:
             for row in whole_rows(database, table):
-                marks = ", ".join("?" * len(row))
-                fresh.execute(f"INSERT OR IGNORE INTO {table} VALUES ({marks})", row)
+                insert_row(fresh, table, *row[:-1])
         fresh.backup(database)
     if kind.changes:
         path.with_name(kind.changes).unlink(missing_ok=True)
@@ -418,11 +443,11 @@ def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
                 database.execute("SELECT count(*) FROM sqlite_master")
         except sqlite3.OperationalError as err:
             log, reserve = _beside(path, "wal"), _beside(path, "reserve")
-            if _code(err) in NO_SPACE and _size(reserve) >= SHARED_BYTES:
+            if error_code(err) in NO_SPACE and _size(reserve) >= SHARED_BYTES:
                 # On a full disk SQLite gets the memory that readers share from the reserve.
                 os.truncate(reserve, _size(reserve) - SHARED_BYTES)
                 return open_to_read(kind, path)
-            if _code(err) in NO_SPACE:
+            if error_code(err) in NO_SPACE:
                 # Without that memory, this one reads the log alone, and others wait.
                 database = connect(path, "mode=rw")
                 database.execute("PRAGMA locking_mode = EXCLUSIVE")
@@ -451,10 +476,11 @@ def open_to_read(kind: Kind, path: Path) -> sqlite3.Connection:
 
 @contextmanager
 def reading(kind: Kind, path: Path) -> Iterator[sqlite3.Connection]:
-    """Open a file to read one state of it, all of whose changes are there."""
+    """Open a file to read one state of it, all of whose changes are there, where they are counted."""
     committed = committed_changes(kind, path)
     with explained(kind, path), closing(open_to_read(kind, path)) as database:
-        require_changes(kind, path, "read", committed, read_seals(kind, path, database))
+        if kind.changes:
+            require_changes(kind, path, "read", committed, read_seals(kind, path, database))
         yield database
 
 
@@ -483,7 +509,7 @@ def explained(kind: Kind, path: Path) -> Iterator[None]:
         yield
     except (*DAMAGE, OSError) as err:
         kind_of_error = StoreError
-        code = _code(err)
+        code = error_code(err)
         is_full = code in NO_SPACE or getattr(err, "errno", 0) in NO_ROOM
         if isinstance(err, OSError) and not is_full:
             raise
@@ -509,7 +535,8 @@ def explained(kind: Kind, path: Path) -> Iterator[None]:
         raise kind_of_error(text) from err
 
 
-def _code(err: Exception) -> int:
+def error_code(err: BaseException | None) -> int:
+    """Return the code of an error of SQLite; 0 of all else."""
     return getattr(err, "sqlite_errorcode", 0) & 0xFF  # the extended code has more bits
 
 

@@ -442,7 +442,7 @@ def test_a_copy_without_its_log_is_named(index, tmp_path):
     rest = ShapeIndex.create(tmp_path / "rest")
     with pytest.warns(StoreWarning, match=lost):
         assert rest.merge([ShapeIndex(part)]) == 1
-    (whole / store.CHANGES).unlink()
+    (whole / store.INDEX.changes).unlink()
     assert len(ShapeIndex.open(whole).records()) == 2
 
 

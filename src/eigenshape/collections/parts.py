@@ -5,7 +5,6 @@ each is a digest of all that it was made of, so a fit is used for nothing else.
 """
 
 import json
-import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
@@ -18,7 +17,7 @@ import numpy as np
 from eigenshape import _sealed
 from eigenshape._errors import StoreError
 from eigenshape._files import remove_leftovers
-from eigenshape._sealed import DamagedFileError, checksum, read_table, reading, writing
+from eigenshape._sealed import DamagedFileError, insert_row, read_table, reading, writing
 from eigenshape.collections.surface_fit import SurfaceFit
 from eigenshape.geometry.mesh import TriangleMesh
 
@@ -72,7 +71,7 @@ def _whole_fits(path: Path) -> tuple[dict[str, SurfaceFit], str | None]:
 def keep_fit(folder: Path, key: str, kind: str, name: str, fit: SurfaceFit) -> None:
     """Keep a fit of a kind, which is the round that made it."""
     with writing(COLLECTION, folder / DATABASE) as database:
-        _insert(database, "part", key, kind, name, _pack(**asdict(fit)))
+        insert_row(database, "part", key, kind, name, _pack(**asdict(fit)))
 
 
 def write_state(
@@ -99,12 +98,12 @@ def write_state(
         kept = {key for (key,) in database.execute("SELECT key FROM part NOT INDEXED")}
         for row, fit in zip(facts["specimens"], fits, strict=True):
             if row["key"] not in kept:  # another build, which ended meanwhile, did not use it
-                _insert(database, "part", row["key"], "last", row["name"], _pack(**asdict(fit)))
+                insert_row(database, "part", row["key"], "last", row["name"], _pack(**asdict(fit)))
         unused = "DELETE FROM part WHERE key NOT IN (SELECT value FROM json_each(?))"
         database.execute(unused, (json.dumps([*used]),))
         database.execute("DELETE FROM state")
         packed = _pack(vertices=mean.vertices, faces=mean.faces)
-        _insert(database, "state", 1, json.dumps(facts), packed)
+        insert_row(database, "state", 1, json.dumps(facts), packed)
         database.execute("PRAGMA incremental_vacuum").fetchall()  # gives space back to the disk
 
 
@@ -151,13 +150,6 @@ def read_state(folder: Path) -> tuple[dict[str, Any], TriangleMesh, list[Surface
 
 def _unfinished(what: str) -> StoreError:
     return StoreError(f"A finished collection must be in the folder; {what}")
-
-
-def _insert(database: sqlite3.Connection, table: str, *values: Any) -> None:
-    """Write a row that is not there yet."""
-    marks = ", ".join("?" * len(values))
-    query = f"INSERT OR IGNORE INTO {table} VALUES ({marks}, ?)"
-    database.execute(query, (*values, checksum(*values)))
 
 
 def _pack(**arrays: Any) -> bytes:

@@ -9,7 +9,7 @@ from pathlib import Path
 import platformdirs
 
 import eigenshape as es
-from eigenshape._sealed import BUSY, closed_on_error, connect, explained
+from eigenshape._sealed import BUSY, closed_on_error, connect, error_code, explained
 from eigenshape_studio.tab.sessions import SESSION, remove_old
 
 
@@ -52,7 +52,7 @@ def own(folder: Path, address: str, patience: float = 2.0) -> sqlite3.Connection
             # Others can read the name beside this lock, which the system takes from a process that dies.
             database.execute("BEGIN IMMEDIATE")
         except sqlite3.OperationalError as error:
-            if error.sqlite_errorcode & 0xFF not in BUSY:
+            if error_code(error) not in BUSY:
                 raise
             (owner,) = database.execute("SELECT name FROM owner").fetchone()
             raise es.StoreError(

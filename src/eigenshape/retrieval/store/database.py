@@ -11,7 +11,6 @@ from jaxtyping import Int64
 
 from eigenshape import _sealed
 from eigenshape._errors import StoreError
-from eigenshape._sealed import CHANGES as CHANGES  # noqa: PLC0414 - beside the database
 from eigenshape._sealed import DAMAGE, Seal, checksum
 from eigenshape.retrieval.kinds import AnyRecipe, recipe_from_text
 from eigenshape.retrieval.store.damage import Damage

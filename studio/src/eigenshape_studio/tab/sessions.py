@@ -7,8 +7,9 @@ import json
 import pickle
 import shutil
 import sqlite3
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from time import time
@@ -18,11 +19,13 @@ import eigenshape as es
 from eigenshape import _sealed
 from eigenshape._sealed import (
     BUSY,
-    DAMAGE,
     NO_SPACE,
     NOT_WRITABLE,
-    checksum,
-    explained,
+    error_code,
+    insert_row,
+    read_table,
+    reading,
+    whole_rows,
 )
 from eigenshape.deformation.edits import mesh_fingerprint
 
@@ -107,15 +110,12 @@ class SessionFile:
         return self.read()
 
     def _read_all(self) -> dict[str, Rows]:
-        tables = {}
-        with self._reading() as database:
-            seals = _sealed.read_seals(SESSION, self.path, database)
-            for table, n_read in N_READ.items():
-                rows = [(*row[:n_read], row[-1]) for row in _whole_rows(database, table)]
-                if (len(rows), sum(row[-1] for row in rows)) != seals[table][:2]:
-                    raise es.StoreError(f"Rows of {table} are lost or differ from their checksums.")
-                tables[table] = {row[0]: row[:-1] for row in rows}
-        return tables
+        with reading(SESSION, self.path) as database:
+            read = partial(read_table, SESSION, self.path, database)
+            return {
+                table: {row[0]: row for row in read(table, n_read)}
+                for table, n_read in N_READ.items()
+            }
 
     def _rescue(self, damage: es.StoreError) -> None:
         """Put a damaged file aside, and make one of its whole rows."""
@@ -125,9 +125,9 @@ class SessionFile:
         lost = ["everything"]
         _sealed.create(SESSION, fresh)
         try:
-            with self._reading() as source, _sealed.writing(SESSION, fresh) as database:
+            with reading(SESSION, self.path) as source, _sealed.writing(SESSION, fresh) as database:
                 for table in N_READ:
-                    for row in _whole_rows(source, table):
+                    for row in whole_rows(source, table):
                         _put(database, table, row[:-1])
                 for statement in DANGLING:
                     database.execute(statement)
@@ -138,10 +138,7 @@ class SessionFile:
         except es.StoreError as error:  # as a whole
             require_damage(error)
         shutil.copyfile(self.path, aside)  # so that there is a session at any time
-        for ending in (
-            "-wal",
-            "-shm",
-        ):  # what SQLite keeps beside a file belongs to the damaged one
+        for ending in ("-wal", "-shm"):  # what SQLite keeps beside a file is of the damaged one
             with suppress(FileNotFoundError):
                 Path(f"{self.path}{ending}").replace(f"{aside}{ending}")
         fresh.replace(self.path)
@@ -198,52 +195,24 @@ class SessionFile:
         StoreError
             If it is damaged.
         """
-        with self._reading() as database:
-            for row in _whole_rows(database, table, [number]):
+        with reading(SESSION, self.path) as database:
+            for row in whole_rows(database, table, [number]):
                 return row[:-1]
         raise es.StoreError(
             f"{self.path} must hold what was written; row {number} of {table} differs from its "
             f"checksum. {SESSION.rescue}"
         )
 
-    @contextmanager
-    def _reading(self) -> Iterator[sqlite3.Connection]:
-        with (
-            explained(SESSION, self.path),
-            closing(_sealed.open_to_read(SESSION, self.path)) as database,
-        ):
-            yield database
-
-
-def _whole_rows(
-    database: sqlite3.Connection, table: str, numbers: Iterable[int] | None = None
-) -> Iterator[Row]:
-    """Yield those rows of a table, by default of all, that agree with their checksums, which stand last."""
-    if numbers is None:
-        found: list[int] = []
-        with suppress(*DAMAGE):  # rows behind a page that cannot be read are lost
-            for (number,) in database.execute(f"SELECT id FROM {table} NOT INDEXED"):
-                found.append(number)
-        numbers = found
-    for number in numbers:
-        with suppress(*DAMAGE):
-            query = f"SELECT * FROM {table} WHERE id = ?"
-            row = database.execute(query, (number,)).fetchone()
-            if row is not None and checksum(*row[:-1]) == row[-1]:
-                yield row
-
 
 def _put(database: sqlite3.Connection, table: str, row: Row) -> None:
     """Write a row in place of that of its number, if there is one."""
     database.execute(f"DELETE FROM {table} WHERE id = ?", row[:1])
-    holes = ", ".join("?" * (len(row) + 1))
-    database.execute(f"INSERT INTO {table} VALUES ({holes})", (*row, checksum(*row)))
+    insert_row(database, table, *row)
 
 
 def require_damage(error: es.StoreError) -> None:
     """Raise an error again that a later call may not meet: the disk is full, or a file is in use."""
-    code = getattr(error.__cause__, "sqlite_errorcode", 0) & 0xFF
-    if code in (*BUSY, *NO_SPACE, *NOT_WRITABLE):
+    if error_code(error.__cause__) in (*BUSY, *NO_SPACE, *NOT_WRITABLE):
         raise error
 
 
