@@ -83,6 +83,7 @@ FIGURES = {
     "start": Figure("bench_start.py", ("__init__.py", "cli")),
     "size": Figure("bench_size.py --repeats 1", ("../../pyproject.toml",)),
     "threads": Figure("bench_threads.py", ("_threads.py", "sparse", "spectral/solver")),
+    "soak_calls": Figure("soak.py calls", ("_kernels.py", "_sealed.py", "matching", "deformation")),
     "soak_service": Figure(
         "soak.py service", (*STORE, "../../studio/src/eigenshape_studio/service")
     ),
