@@ -35,7 +35,7 @@ def require_square(matrix: Any, name: str, wanted: str = "a square sparse matrix
         )
 
 
-def as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
+def as_symmetric(name: str, value: Any) -> sp.csr_array:
     """Return a read-only copy of a matrix, or raise an error if it is not finite and symmetric."""
     require_square(value, name)
     matrix = freeze_sparse(sp.csr_array(value, dtype=np.float64))
