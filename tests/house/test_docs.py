@@ -1,6 +1,7 @@
 """What the docs mention is there, and all that is public is mentioned."""
 
 import re
+import shlex
 from operator import attrgetter
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 
 import eigenshape as es
 from eigenshape.cli import app
+from eigenshape.cli.verbs import load_verb
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -18,6 +20,7 @@ PAGES = [
     ROOT / "CONTRIBUTING.md",
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "docs" / "coming_from").glob("*.md")),
+    *sorted((ROOT / "docs" / "decisions").glob("*.md")),
     *sorted((ROOT / "experiments").rglob("*.md")),
 ]
 # What stands for the names of files.
@@ -41,6 +44,17 @@ def test_files_in_docs_are_there(page):
         and not list(source.rglob(name))
     }
     assert not missing - PATTERNS
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_in_docs_are_understood(page):
+    """Verbs and options are parsed; nothing runs."""
+    for block in re.findall(r"```sh\n(.*?)```", page.read_text(), re.DOTALL):
+        for line in re.findall(r"^ *(?:.*&& )?eigenshape (.*?)(?: &)?$", block, re.MULTILINE):
+            verb, *options = shlex.split(line, comments=True)
+            if verb == "index":
+                verb += f" {options.pop(0)}"
+            load_verb(verb).make_context(verb, options)
 
 
 def test_experiments_that_comments_name_are_there():
