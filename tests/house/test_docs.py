@@ -80,6 +80,25 @@ def test_the_page_of_modes_runs():
 
 @pytest.mark.long
 @pytest.mark.sweep
+def test_the_page_of_first_steps_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    biped = es.make_creature("biped", n_vertices=800)
+    tall = es.TriangleMesh(2 * biped.vertices, biped.faces)  # as the page's region supposes
+    es.write_mesh(tall, "scan.ply")
+    es.write_mesh(tall, "other.ply")
+    es.write_mesh(es.TriangleMesh(1.01 * tall.vertices, tall.faces), "noisy.ply")
+    es.io.write_fields(es.shapes.ball(4), "brain.vtu", {})
+    page = (ROOT / "docs" / "first_steps.md").read_text()
+    names: dict[str, object] = {}
+    exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), names)
+    assert names["match"].name == "scan"
+    assert np.abs(names["bent"].vertices - names["longer"].vertices).max() > 0.1
+    for written in ("parts.png", "bent.ply", "report.png"):
+        assert Path(written).stat().st_size > 1000
+
+
+@pytest.mark.long
+@pytest.mark.sweep
 def test_the_page_from_a_cortex_to_a_figure_runs(tmp_path, monkeypatch):
     pytest.importorskip("neuromodes", reason="the cortices of neuromodes are missing")
     monkeypatch.chdir(tmp_path)
