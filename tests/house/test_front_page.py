@@ -11,6 +11,12 @@ import eigenshape as es
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+SHOWN = [
+    path.with_name("README.md")
+    for path in [ROOT / "pyproject.toml", *ROOT.glob("*/pyproject.toml")]
+]
+# The target of [text](target), of [name]: target, and of src="target" and href="target".
+LINK = re.compile(r"(?:\]\(|^\[[^]]+\]: |\b(?:src|href)=\")([^\s)\"]+)", re.MULTILINE)
 SCRIPTS = sorted((ROOT / "gallery").glob("*/*.py"))
 
 
@@ -24,18 +30,18 @@ def test_readme_is_short_and_shows_one_picture():
     assert len(re.findall(r"!\[|<img", README)) == 1
 
 
-def test_links_of_the_readme_are_absolute_and_lead_to_files_of_the_repository():
-    """PyPI shows the README, too, and has no files beside it."""
+@pytest.mark.parametrize("page", SHOWN, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_of_a_readme_are_absolute_and_lead_to_files_of_the_repository(page):
+    """PyPI shows the README of each package, without the files beside it."""
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     (address,) = re.findall(r'^repository-code: "(.*)"', citation, re.MULTILINE)
-    targets = re.findall(
-        r"\]\(([^)]*)\)|^\[.*\]: (\S+)|(?:src|href)=\"(.*?)\"", README, re.MULTILINE
-    )
-    assert len(targets) == README.count("](")
-    for target in ("".join(each) for each in targets):
-        place = re.fullmatch(rf"{address}/(?:blob|raw)/main/([\w./]+)", target)
-        assert place, f"{target} does not begin with {address}"
-        assert (ROOT / place[1]).is_file(), target
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        assert target.startswith("https://"), target
+        place = target.removeprefix(address)
+        if place not in (target, ""):
+            file = re.fullmatch(r"/(?:blob|raw)/main/([\w./]+)", place)
+            assert file, target
+            assert (ROOT / file[1]).is_file(), target
 
 
 @pytest.mark.long
