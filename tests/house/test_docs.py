@@ -57,6 +57,14 @@ def test_commands_in_docs_are_understood(page):
             load_verb(verb).make_context(verb, options)
 
 
+def test_the_architecture_is_a_map_and_each_decision_has_a_date():
+    assert (ROOT / "docs" / "architecture.md").stat().st_size <= 8000
+    for page in (ROOT / "docs" / "decisions").glob("*.md"):
+        assert page.name == "index.md" or re.match(
+            r"# .*\n\n\*\d+ \w+ 20\d\d\*\n\n", page.read_text()
+        ), page.name
+
+
 def test_experiments_that_comments_name_are_there():
     for path in (ROOT / "src").rglob("*.py"):
         for name in re.findall(r"\b(?:experiments|benchmarks)/\w+", path.read_text()):
