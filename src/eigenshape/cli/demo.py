@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli.console import escape_text, out, progress_bar
 from eigenshape.cli.index import Workers, add
 from eigenshape.cli.query import query

@@ -13,8 +13,9 @@ from typing import Annotated, Any
 import typer
 
 import eigenshape as es
-from eigenshape._errors import EigenshapeError, InvalidParameterError, StoreError
-from eigenshape._text import literal
+from certeig.kit.errors import CerteigError, InvalidParameterError
+from certeig.kit.text import literal
+from eigenshape._errors import StoreError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
@@ -125,7 +126,7 @@ def query(
                     try:
                         mesh = steps.load_surface(item.path, repair)
                         answers.append(_ask(reader, title, mesh, recipe, options))
-                    except (EigenshapeError, OSError) as error:
+                    except (CerteigError, OSError) as error:
                         if not is_folder:
                             raise
                         failed.append((item.name, str(error)))

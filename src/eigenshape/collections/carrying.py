@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._files import as_path, replace_file
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.files import as_path, replace_file
+from certeig.kit.threads import one_blas_thread
 from eigenshape.collections.collection import Collection
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.measure import mean_radius

@@ -10,9 +10,10 @@ from jaxtyping import Float, Int
 from scipy.linalg import solve
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import EigenshapeError, InvalidShapeError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import CerteigError
+from certeig.kit.threads import one_blas_thread
+from eigenshape._errors import InvalidShapeError
 from eigenshape.collections.alignment import (
     MIRROR,
     ON_SURFACE,
@@ -234,7 +235,7 @@ def _posed_fits(
 ) -> list[SurfaceFit]:
     """Bend a source, or its mirror image, onto a target in another pose, from where `match_shapes` puts it."""
     fits = []
-    with suppress(EigenshapeError):  # what it refuses, such as needles, is no fault here
+    with suppress(CerteigError):  # what it refuses, such as needles, is no fault here
         whole = prepare_target(target)
         for mirrored in sides:
             if mirrored:

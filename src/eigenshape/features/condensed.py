@@ -3,10 +3,11 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, real_numbers, record, require_finite_rows
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import ReadOnly, real_numbers, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import require_finite_rows
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.requirements import require_sound

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_loops

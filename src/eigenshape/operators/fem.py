@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import whole_number
-from eigenshape._typing import Integer
+from certeig.kit.arrays import whole_number
+from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.requirements import require_sound

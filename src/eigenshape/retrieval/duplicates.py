@@ -4,9 +4,9 @@ from functools import partial
 
 import numpy as np
 
-from eigenshape._arguments import require_type
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress
+from certeig.kit.arguments import require_type
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress
 from eigenshape.retrieval.index import ShapeIndex
 
 # Of five kinds of synthetic creatures and eight real shapes, with six views each: moved and scaled,

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from certeig.kit.files import replace_file
 from eigenshape._extras import import_extra
-from eigenshape._files import replace_file
 from eigenshape._workers import run_in_workers
 from eigenshape.cli.steps.writing import require_output
 from eigenshape.features.condensed import condense

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.hole_loops import triangulate
 from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns

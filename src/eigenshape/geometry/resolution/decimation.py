@@ -3,10 +3,11 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, as_array, record, whole_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.arrays import ReadOnly, as_array, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
-from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.face_turns import orient_consistently

@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from scipy.sparse.csgraph import shortest_path
 
-from eigenshape._arrays import ReadOnly, record, whole_number
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.threads import map_in_threads, one_blas_thread
+from certeig.kit.typing import Integer
 from eigenshape._errors import InvalidShapeError
-from eigenshape._threads import map_in_threads, one_blas_thread
-from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
