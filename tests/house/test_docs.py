@@ -35,13 +35,13 @@ def test_names_in_docs_are_there(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_files_in_docs_are_there(page):
-    source = ROOT / "src" / "eigenshape"
+    sources = (ROOT / "src" / "eigenshape", ROOT / "certeig" / "src", ROOT / "certeig")
     files = re.findall(r"`(?:python )?([\w./]+\.py|[a-z_]+(?:/[a-z_]+)*/)`", page.read_text())
     missing = {
         name
         for name in files
         if not any((folder / name).exists() for folder in (ROOT, ROOT / "studio", page.parent))
-        and not list(source.rglob(name))
+        and not any(list(source.rglob(name)) for source in sources)
     }
     assert not missing - PATTERNS
 
