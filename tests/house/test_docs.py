@@ -49,12 +49,20 @@ def test_files_in_docs_are_there(page):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_commands_in_docs_are_understood(page):
     """Verbs and options are parsed; nothing runs."""
-    for block in re.findall(r"```sh\n(.*?)```", page.read_text(), re.DOTALL):
-        for line in re.findall(r"^ *(?:.*&& )?eigenshape (.*?)(?: &)?$", block, re.MULTILINE):
-            verb, *options = shlex.split(line, comments=True)
-            if verb == "index":
-                verb += f" {options.pop(0)}"
-            load_verb(verb).make_context(verb, options)
+    text = page.read_text()
+    lines = [
+        line
+        for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+        for line in block.splitlines()
+    ]
+    lines += re.findall(r"\| `(eigenshape .*?)` \|", text)
+    for words in re.findall(
+        r"^ *(?:.*&& )?eigenshape (.*?)(?: &)?$", "\n".join(lines), re.MULTILINE
+    ):
+        verb, *options = shlex.split(words, comments=True)
+        if verb == "index":
+            verb += f" {options.pop(0)}"
+        load_verb(verb).make_context(verb, options)
 
 
 def test_the_architecture_is_a_map_and_each_decision_has_a_date():
