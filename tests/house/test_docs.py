@@ -50,15 +50,10 @@ def test_files_in_docs_are_there(page):
 def test_commands_in_docs_are_understood(page):
     """Verbs and options are parsed; nothing runs."""
     text = page.read_text()
-    lines = [
-        line
-        for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
-        for line in block.splitlines()
-    ]
-    lines += re.findall(r"\| `(eigenshape .*?)` \|", text)
-    for words in re.findall(
-        r"^ *(?:.*&& )?eigenshape (.*?)(?: &)?$", "\n".join(lines), re.MULTILINE
-    ):
+    blocks = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    cells = re.findall(r"\| `(eigenshape .*?)` \|", text)
+    commands = r"^ *(?:.*&& )?eigenshape (.*?)(?: &)?$"
+    for words in re.findall(commands, "\n".join(blocks + cells), re.MULTILINE):
         verb, *options = shlex.split(words, comments=True)
         if verb == "index":
             verb += f" {options.pop(0)}"
