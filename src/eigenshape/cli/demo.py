@@ -25,7 +25,7 @@ Read next:
   eigenshape index add my-index FOLDER                the same for a folder of your own meshes
   eigenshape query my-index SCAN --picture sheet.png  and a scan of yours
   eigenshape studio {scan} --index {index}            a window in the browser: bend it, and search
-  README.md, docs/glossary.md                         the same steps in Python, and the terms
+  docs/first_steps.md, docs/glossary.md               the same steps in Python, and the terms
 """
 
 

@@ -78,7 +78,7 @@ def query(
     Parameters
     ----------
     scan
-        File to search for: a mesh, a point cloud or a frame of a depth camera (.pcd), of a whole
+        File to search for: a mesh, a point cloud or a depth scan (.pcd), of a whole
         shape or a part of one, in any pose; a folder of such files; or the name of a shape of the
         index, which is left out of the answer.
     n_matches

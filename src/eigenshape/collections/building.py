@@ -139,7 +139,7 @@ def build_collection(
 
     See Also
     --------
-    carry_landmarks : Landmarks of some specimens, carried to all.
+    carry_landmarks : Landmarks of some specimens, transferred to all.
     open_collection : Open it later.
 
     Examples

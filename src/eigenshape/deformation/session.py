@@ -363,7 +363,7 @@ def replay(
     edits : sequence of Edit
     source : MeshLike, optional
         The undeformed mesh on which the edits were made, if it is not the mesh of the rig. Regions
-        are carried over by nearest vertices.
+        are transferred by nearest vertices.
 
     Returns
     -------

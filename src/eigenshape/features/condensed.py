@@ -1,4 +1,4 @@
-"""Regions of like values on a surface, and the means of the values over them."""
+"""Regions of similar values on a surface, and the means of the values over them."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -53,7 +53,7 @@ class CondensedFeatures(ReadOnly):
 
 @one_blas_thread()
 def condense(mesh: MeshLike, values: ArrayLike, tolerance: float = LOST) -> CondensedFeatures:
-    """Join neighboring vertices with like values into regions, and average over these.
+    """Join neighboring vertices with similar values into regions, and average over these.
 
     With the logarithm of a heat kernel signature these are the condensed features of connectomics
     (Pedigo and others 2025), from which spines, shafts and cell bodies of neurons are told apart:

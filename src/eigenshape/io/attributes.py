@@ -51,7 +51,7 @@ class Material:
 class MeshAttributes(ReadOnly):
     r"""What a mesh file holds besides positions and faces.
 
-    `read_mesh(path, attributes=True)` returns it, `carry_attributes` carries it to a repaired mesh,
+    `read_mesh(path, attributes=True)` returns it, `carry_attributes` transfers it to a repaired mesh,
     and `write_mesh(mesh, path, attributes=...)` writes it.
 
     Attributes

@@ -67,7 +67,7 @@ class FusedScan(ReadOnly):
 
 @one_blas_thread()
 def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -> FusedScan:
-    """Join scans of one rigid shape, such as frames of a depth camera, to one surface.
+    """Join scans of one rigid shape, such as depth scans, to one surface.
 
     Each two scans are registered (`register_scans`). The pairs with the best scores that connect
     most scans place them, and the surface that fits the points and normals of all is computed

@@ -180,8 +180,8 @@ def dirichlet_laplacian(
     --------
     >>> import eigenshape as es
     >>> square = es.shapes.grid(3, 3)
-    >>> rim = es.geometry.boundary_vertices(square)
-    >>> inner, free = es.operators.dirichlet_laplacian(es.cotangent_laplacian(square), rim)
+    >>> boundary = es.geometry.boundary_vertices(square)
+    >>> inner, free = es.operators.dirichlet_laplacian(es.cotangent_laplacian(square), boundary)
     >>> inner.n_points, free.tolist()
     (4, [5, 6, 9, 10])
     """

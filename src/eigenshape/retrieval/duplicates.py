@@ -25,7 +25,7 @@ def find_duplicates(
     """Find pairs of shapes that are nearly the same, wherever they lie and whatever their size.
 
     Each shape is searched for in the index, as it is stored. Unlike those of `ShapeIndex.query`,
-    scores are not scaled by how isolated a shape is, so they depend on the two shapes alone.
+    scores are not corrected for hubness, so they depend on the two shapes alone.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Regions of like heat of one file, in a worker, and the table of those of all."""
+"""Regions of similar heat of one file, in a worker, and the table of the regions of all."""
 
 import csv
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Decimation: the same surface by fewer faces, and what lay on the many carried over to the few."""
+"""Decimation: the same surface by fewer faces, and what lay on the many transferred to the few."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -127,7 +127,7 @@ def decimate(
     Returns
     -------
     DecimatedMesh
-        The new mesh, and its places on the original, by which values and labels are carried over.
+        The new mesh, and its places on the original, by which values and labels are transferred.
 
     Raises
     ------

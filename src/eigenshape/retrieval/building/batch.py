@@ -131,7 +131,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
         Files, with the names and labels of their shapes.
     read : callable
         Return the mesh of a path: ``es.read_mesh``; ``es.io.read_surface``, which also makes
-        surfaces of point clouds and of frames of depth cameras; or a function of yours that a new
+        surfaces of point clouds and of depth scans; or a function of yours that a new
         process can import by name. It may return a `RepairedMesh`, whose report is kept.
     recipes : sequence of HeatRecipe or PatchRecipe, optional
         By default that of `ShapeIndex.default_recipe`.

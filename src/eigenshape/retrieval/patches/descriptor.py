@@ -39,7 +39,7 @@ class PatchRecipe(Shown):
         sevenths of it.
     n_frames : int
         Sides from which an index describes a closed shape as a depth camera sees it, beside its
-        views. Six find more for queries that are single frames of a depth camera, and take 35 KB
+        views. Six find more for queries that are single depth scans, and take 35 KB
         and 1 CPU second a shape.
 
     Raises

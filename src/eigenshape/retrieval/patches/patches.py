@@ -114,7 +114,7 @@ def extract_patches(
         Viewpoints, spread evenly around the shape, if it is closed. An open shape has none.
     n_frames : int
         Of these viewpoints, how many are described once more as a depth camera sees the shape from
-        there (`simulate_scan`), with its noise and its gaps, so that single frames find the shape.
+        there (`simulate_scan`), with its noise and its gaps, so that single depth scans find the shape.
     clean : bool
         Whether to describe a copy that is turned outward (`orient_outward`) and smoothed as far as
         its noise requires (`denoise`), so that a scan compares with clean shapes. If False, faces
@@ -123,7 +123,7 @@ def extract_patches(
     Returns
     -------
     list of Patches
-        The whole first, then the views, then the frames. All points lie at vertices of the whole.
+        The whole first, then the views, then the depth scans. All points lie at vertices of the whole.
 
     Raises
     ------

@@ -230,7 +230,7 @@ class IndexReader:
         exact : bool
             Whether all are compared.
         is_scaled : bool
-            Whether scores are scaled by how isolated each shape is; otherwise they depend on the two
+            Whether scores are corrected for hubness; otherwise they depend on the two
             shapes alone.
 
         Returns

@@ -39,7 +39,7 @@ def query_indexes(
 ) -> Matches:
     """Ask several indexes, and return nearly what one index of all their shapes would have answered.
 
-    Each index scales scores by how isolated its shapes are among its own (`Match.distance`), which
+    Each index corrects scores for hubness among its own shapes (`Match.distance`), which
     one index of them all would do among all.
 
     The workers of an executor each ask some of the indexes: processes of this machine, or a

@@ -113,8 +113,8 @@ def apply_heat(
 
     >>> import numpy as np
     >>> square = es.shapes.grid(8, 8)
-    >>> laplacian, rim = es.cotangent_laplacian(square), es.geometry.boundary_vertices(square)
-    >>> inner, free = es.operators.dirichlet_laplacian(laplacian, rim)
+    >>> laplacian, boundary = es.cotangent_laplacian(square), es.geometry.boundary_vertices(square)
+    >>> inner, free = es.operators.dirichlet_laplacian(laplacian, boundary)
     >>> values, warm = np.ones(square.n_vertices), np.zeros(square.n_vertices)
     >>> warm[free] = es.spectral.apply_heat(inner, values[free], 0.1)
     >>> bool(laplacian.mass.diagonal() @ warm < 0.1)  # it was the area, 1

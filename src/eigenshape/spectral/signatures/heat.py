@@ -146,9 +146,9 @@ def reflection_free_signature(
     --------
     >>> import eigenshape as es
     >>> mesh = es.shapes.grid(20, 20)
-    >>> laplacian, rim = es.cotangent_laplacian(mesh), es.geometry.boundary_vertices(mesh)
+    >>> laplacian, boundary = es.cotangent_laplacian(mesh), es.geometry.boundary_vertices(mesh)
     >>> free = es.solve_spectrum(laplacian, 60)
-    >>> fixed = es.solve_spectrum(laplacian, 60, fixed=rim)
+    >>> fixed = es.solve_spectrum(laplacian, 60, fixed=boundary)
     >>> es.spectral.reflection_free_signature(free, fixed, [0.02]).shape
     (441, 1)
     """
