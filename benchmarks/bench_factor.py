@@ -21,8 +21,8 @@ from report import Report, Row, in_process, options_of
 from scipy.sparse.linalg import splu
 
 import eigenshape as es
-from eigenshape.sparse.elimination import analyze_pattern
-from eigenshape.sparse.symmetric_factor import factorize_symmetric
+from certeig.sparse.elimination import analyze_pattern
+from certeig.sparse.symmetric_factor import factorize_symmetric
 
 PACKAGES = [
     "eigenshape",

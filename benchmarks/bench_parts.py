@@ -20,10 +20,10 @@ from report import Report, Row, one_core, options_of
 from threadpoolctl import threadpool_limits
 
 import eigenshape as es
-from eigenshape.sparse.symmetric_factor import SymmetricFactor
-from eigenshape.spectral.solver import eigenpairs, factor, lanczos, pencil
-from eigenshape.spectral.solver import inertia as count
-from eigenshape.spectral.solver import strategy as roads
+from certeig.solver import eigenpairs, factor, lanczos, pencil
+from certeig.solver import inertia as count
+from certeig.solver import strategy as roads
+from certeig.sparse.symmetric_factor import SymmetricFactor
 
 COLUMNS = ("shape", "part", "calls", "CPU s", "share", "bound s", "set by", "times the bound")
 REAL = 8  # bytes

@@ -19,9 +19,9 @@ import numpy as np
 from report import Report, Row, options_of
 
 import eigenshape as es
-from eigenshape._threads import map_in_threads, one_blas_thread, usable_cores
-from eigenshape.sparse.elimination import analyze_pattern
-from eigenshape.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
+from certeig.kit.threads import map_in_threads, one_blas_thread, usable_cores
+from certeig.sparse.elimination import analyze_pattern
+from certeig.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
 
 COLUMNS = ("case", "one thread s", "two threads s", "one / two", "all cores s", "one / all")
 Work = Callable[[], Sequence[np.ndarray]]  # what is timed; the arrays are compared

@@ -67,7 +67,7 @@ class Figure:
 
 
 SOURCE = "src/eigenshape/"
-SOLVER = ("spectral/solver", "spectral/solve.py", "sparse")
+SOLVER = ("spectral/solve.py", "../../certeig/src/certeig")
 HEAT = ("spectral/multilevel", "spectral/signatures", "features")
 DESCRIBING = ("retrieval/patches", "retrieval/heat")
 STORE = ("retrieval/store", "retrieval/search")
@@ -82,8 +82,8 @@ FIGURES = {
     "calls": Figure("bench_calls.py", ("operators", "matching", "spectral")),
     "start": Figure("bench_start.py", ("__init__.py", "cli")),
     "size": Figure("bench_size.py --repeats 1", ("../../pyproject.toml",)),
-    "threads": Figure("bench_threads.py", ("_threads.py", "sparse", "spectral/solver")),
-    "soak_calls": Figure("soak.py calls", ("_kernels.py", "_sealed.py", "matching", "deformation")),
+    "threads": Figure("bench_threads.py", SOLVER),
+    "soak_calls": Figure("soak.py calls", ("_sealed.py", "matching", "deformation", *SOLVER)),
     "soak_service": Figure(
         "soak.py service", (*STORE, "../../studio/src/eigenshape_studio/service")
     ),
@@ -98,13 +98,13 @@ FIGURES = {
     ),
     "transport": Figure("bench_transport.py --repeats 1", ("calculus", "geometry")),
     "calculus": Figure("bench_calculus.py --repeats 1", ("calculus",)),
-    "factor": Figure("bench_factor.py --sizes 5 6 160000", ("sparse",)),
+    "factor": Figure("bench_factor.py --sizes 5 6 160000", SOLVER),
     "parts": Figure("bench_parts.py", SOLVER),
     "merge": Figure("bench_merge.py --repeats 1", ("features",)),
     "tetrahedra": Figure("bench_tetrahedra.py --repeats 1", ("operators", *SOLVER)),
     "growth": Figure("bench_growth.py --only points pairs kernel --repeats 1", SOLVER),
     "features": Figure("bench_features.py --repeats 1", (*HEAT, *SOLVER)),
-    "first_call": Figure("bench_first_call.py --repeats 1", ("_kernels.py", "spectral/solver")),
+    "first_call": Figure("bench_first_call.py --repeats 1", SOLVER),
     "peers": Figure(
         "bench_approximate.py --peers --cases sphere-20k-20 sphere-100k-20 dragon-20",
         ("spectral/multilevel",),

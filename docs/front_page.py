@@ -65,8 +65,8 @@ def neck_of_giraffe(
     neck = es.deformation.BoxRegion(
         [-np.inf, low[1] + 0.62 * (high - low)[1], -np.inf], [np.inf, np.inf, np.inf]
     )
-    rim = es.deformation.region_boundary(giraffe, es.deformation.region_mask(giraffe, neck))
-    return giraffe, neck, giraffe.vertices[rim].mean(axis=0)
+    boundary = es.deformation.region_boundary(giraffe, es.deformation.region_mask(giraffe, neck))
+    return giraffe, neck, giraffe.vertices[boundary].mean(axis=0)
 
 
 def draw_bend(path: Path, n_vertices: int) -> None:

@@ -1,4 +1,4 @@
-"""Types in docstrings lead to their pages: ours, and those of other libraries without asking their sites."""
+"""Types in docstrings lead to their pages: ours, and pages of other libraries without asking their sites."""
 
 import inspect
 import re

@@ -49,8 +49,8 @@ def giraffe() -> dict[str, object]:
     shape = es.make_creature("giraffe", n_vertices=3000)
     low, high = shape.vertices[:, 1].min(), shape.vertices[:, 1].max()
     neck = es.deformation.BoxRegion([-np.inf, low + 0.62 * (high - low), -np.inf], [np.inf] * 3)
-    rim = es.deformation.region_boundary(shape, es.deformation.region_mask(shape, neck))
-    turn = es.Rotation(shape.vertices[rim].mean(axis=0), axis=[1, 0, 0], angle=np.deg2rad(60))
+    boundary = es.deformation.region_boundary(shape, es.deformation.region_mask(shape, neck))
+    turn = es.Rotation(shape.vertices[boundary].mean(axis=0), axis=[1, 0, 0], angle=np.deg2rad(60))
     bent = es.deform(es.rig_shape(shape), neck, turn)
     moved = np.linalg.norm(bent.vertices - shape.vertices, axis=1)
     return {"mesh": bent, "values": {"how far it moved": moved / moved.max()}}

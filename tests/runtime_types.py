@@ -38,7 +38,7 @@ callers: dict[str, Counter[str]] = {}
 
 def install() -> None:
     """Check the types of all functions and dataclasses of the package, which must not be loaded yet."""
-    jaxtyping.install_import_hook("eigenshape", "runtime_types.checked")
+    jaxtyping.install_import_hook(["certeig", "eigenshape"], "runtime_types.checked")
     jaxtyping.jaxtyped = lambda typechecker: checked  # type: ignore[assignment]
 
 

@@ -13,27 +13,31 @@ import numpy as np
 import pytest
 from jaxtyping import Float64
 
+import certeig
 import eigenshape
-from eigenshape import _kernels
-from eigenshape.sparse import basis_loops as basis
-from eigenshape.sparse import dissection_loops as dissection
-from eigenshape.sparse import symbolic_loops as symbolic
+from certeig.kit import kernels
+from certeig.sparse import basis_loops as basis
+from certeig.sparse import dissection_loops as dissection
+from certeig.sparse import symbolic_loops as symbolic
 
-PACKAGE = Path(eigenshape.__file__).parent
-SOURCES = sorted(PACKAGE.rglob("*_loops.c"))
+PACKAGES = [Path(package.__file__).parent for package in (certeig, eigenshape)]
+FOLDERS = [PACKAGES[0] / "kit", *PACKAGES]  # where sources look for headers
+SOURCES = [source for package in PACKAGES for source in sorted(package.rglob("*_loops.c"))]
 NUMBERS = {int: "int64_t", float: "double", bool: "bool", None: "void"}
 ENTRIES = {"float64": "double", "float32": "float", "bool": "bool"}
 
 
 def module_of(source):
-    name = ".".join(source.relative_to(PACKAGE).with_suffix("").parts)
-    return importlib.import_module(f"eigenshape.{name}")
+    package = next(each for each in PACKAGES if source.is_relative_to(each))
+    name = ".".join(source.relative_to(package.parent).with_suffix("").parts)
+    return importlib.import_module(name)
 
 
 def text_of(source):
     """Return the text of a source and of the headers that it includes, without comments."""
-    headers = re.findall(r'#include "(.*)"', source.read_text())
-    texts = [*(text_of(PACKAGE / header) for header in headers), source.read_text()]
+    names = re.findall(r'#include "(.*)"', source.read_text())
+    headers = [next(f / name for f in FOLDERS if (f / name).exists()) for name in names]
+    texts = [*map(text_of, headers), source.read_text()]
     return re.sub(r"/\*.*?\*/", "", "\n".join(texts), flags=re.DOTALL)
 
 
@@ -241,14 +245,15 @@ def test_several_results_are_a_tuple():
 
 
 def test_kernels_that_are_missing_or_old_say_what_to_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(_kernels, "LIBRARIES", tmp_path)
-    with pytest.raises(ImportError, match=r"no kernels in .*; run `python hatch_build\.py`"):
-        _kernels.load_library.__wrapped__()
-    monkeypatch.setattr(_kernels, "load_library", lambda: (None, tmp_path))
+    with pytest.raises(
+        ImportError, match=r"no kernels in .*; run `python certeig/hatch_build\.py`"
+    ):
+        kernels.load_library.__wrapped__(tmp_path)
+    monkeypatch.setattr(kernels, "load_library", lambda package: (None, tmp_path))
     os.utime(tmp_path, (1, 1))
-    monkeypatch.delenv(_kernels.VARIABLE, raising=False)
+    monkeypatch.delenv(kernels.VARIABLE, raising=False)
     with pytest.raises(ImportError, match=r"older than their source .*\.[ch]; run"):
-        _kernels._find(dissection.order_leaf)
+        kernels._find(dissection.order_leaf)
 
 
 def test_a_kernel_that_is_missing_is_named(monkeypatch):
@@ -256,9 +261,9 @@ def test_a_kernel_that_is_missing_is_named(monkeypatch):
 
     unknown_kernel.__module__ = dissection.__name__
     with pytest.raises(
-        ImportError, match=r"has no kernel unknown_kernel; run `python hatch_build\.py`"
+        ImportError, match=r"has no kernel unknown_kernel; run `python certeig/hatch_build\.py`"
     ):
-        _kernels._find(unknown_kernel)
+        kernels._find(unknown_kernel)
 
 
 def test_a_new_kernel_is_compiled_declared_and_called(tmp_path, monkeypatch):
@@ -273,14 +278,16 @@ def test_a_new_kernel_is_compiled_declared_and_called(tmp_path, monkeypatch):
     )
     target = hatch_build.TARGETS[hatch_build.target_name()]
     library = tmp_path / "new.so"
-    hatch_build.compile_library(target, min(target.processors), library, sources=[source])
-    monkeypatch.setattr(_kernels, "load_library", lambda: (ctypes.CDLL(str(library)), library))
+    hatch_build.compile_library(target, min(target.processors), library, [tmp_path])
+    monkeypatch.setattr(
+        kernels, "load_library", lambda package: (ctypes.CDLL(str(library)), library)
+    )
 
-    @_kernels.kernel("n")
+    @kernels.kernel("n")
     def add_rows(
         rows: Float64[np.ndarray, "n 3"],
         share: float,
-        sums: _kernels.Out[Float64[np.ndarray, " 3"]],
+        sums: kernels.Out[Float64[np.ndarray, " 3"]],
     ) -> bool: ...
 
     rows, sums = np.random.default_rng(0).random((7, 3)), np.zeros(3)

@@ -25,7 +25,7 @@ def always_sparse() -> None:
     They are no public names. So no more than one case in ten may lean on this: most are large enough to
     be solved sparsely anyway, and `Ours` counts the solves of whole operators that were dense all the same.
     """
-    roads = import_module("eigenshape.spectral.solver.strategy")
+    roads = import_module("certeig.solver.strategy")
     for name, value in DENSE_SWITCHES.items():
         getattr(roads, name)  # renamed, it would be set in vain
         setattr(roads, name, value)

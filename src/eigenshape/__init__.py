@@ -35,6 +35,8 @@ from types import ModuleType
 
 import lazy_loader
 
+from eigenshape import _makers  # noqa: F401  what messages suggest
+
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 _load = __getattr__
 

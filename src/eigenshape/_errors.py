@@ -8,25 +8,14 @@ EigenshapeError
 ├── StoreError(RuntimeError)           an index on disk cannot be opened, read or written
 └── MissingExtraError(ImportError)     an optional package is needed and not installed
 
-A message states the rule, the fact with index and value, and the remedy if there is one.
+A message states the rule, the fact with index and value, and the remedy if there is one. The base
+class and those that are not about shapes are classes of certeig, whose solver raises them, too.
 """
 
-
-class EigenshapeError(Exception):
-    """Base class of all errors that eigenshape raises on purpose.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> try:
-    ...     es.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 7]])
-    ... except es.EigenshapeError as err:
-    ...     print(err)
-    faces must index vertices 0..2; face 0 is [0, 1, 7].
-    """
+from certeig.kit.errors import CerteigError
 
 
-class InvalidShapeError(EigenshapeError, ValueError):
+class InvalidShapeError(CerteigError, ValueError):
     """A mesh or point cloud is not valid for the operation.
 
     See Also
@@ -44,48 +33,7 @@ class InvalidShapeError(EigenshapeError, ValueError):
     """
 
 
-class InvalidParameterError(EigenshapeError, ValueError):
-    """An argument has a wrong type or is out of range.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> try:
-    ...     es.icosphere(-1)
-    ... except es.InvalidParameterError as err:
-    ...     print(err)
-    level must lie in 0..9; it is -1.
-    """
-
-
-class FileFormatError(EigenshapeError, ValueError):
-    """A file does not follow its format, or its format is not supported.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> import eigenshape as es
-    >>> with tempfile.NamedTemporaryFile(suffix=".off") as file:
-    ...     try:
-    ...         es.read_mesh(file.name)
-    ...     except es.FileFormatError:
-    ...         print("not a mesh")
-    not a mesh
-    """
-
-
-class ConvergenceError(EigenshapeError, RuntimeError):
-    """A solver stopped before its result was certified.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> issubclass(es.ConvergenceError, RuntimeError)
-    True
-    """
-
-
-class StoreError(EigenshapeError, RuntimeError):
+class StoreError(CerteigError, RuntimeError):
     """An index on disk cannot be opened, read or written.
 
     See Also
@@ -103,7 +51,7 @@ class StoreError(EigenshapeError, RuntimeError):
     """
 
 
-class MissingExtraError(EigenshapeError, ImportError):
+class MissingExtraError(CerteigError, ImportError):
     """An optional package is needed and not installed.
 
     The message names the package and the command that installs it.

@@ -19,8 +19,8 @@ from shutil import disk_usage
 from typing import Any, NamedTuple
 from zlib import crc32
 
+from certeig.kit.files import remove_leftovers
 from eigenshape._errors import StoreError
-from eigenshape._files import remove_leftovers
 
 APPLICATION = 0x65696773  # "eigs", by which SQLite files tell whose they are
 # Of 4, 8, 16 and 64 KB, pages of 64 KB return 1,600 shapes of an index at random in 11 ms of CPU time,

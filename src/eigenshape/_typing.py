@@ -2,14 +2,9 @@
 
 from os import PathLike
 from pathlib import Path
-from typing import Protocol, SupportsIndex, runtime_checkable
+from typing import Protocol, runtime_checkable
 
-import numpy.typing as npt
 from typing_extensions import TypeAliasType
-
-ArrayLike = TypeAliasType("ArrayLike", npt.ArrayLike)
-# int and the integers of NumPy.
-Integer = TypeAliasType("Integer", SupportsIndex)
 
 
 @runtime_checkable

@@ -21,11 +21,11 @@ from typing import Generic, TypeVar
 from pebble import ProcessExpired, ProcessPool
 from threadpoolctl import threadpool_limits
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, whole_number
-from eigenshape._errors import EigenshapeError
-from eigenshape._text import html_repr, repr_of_changes
-from eigenshape._threads import set_threads, thread_count
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import positive_values, whole_number
+from certeig.kit.errors import CerteigError
+from certeig.kit.text import html_repr, repr_of_changes
+from certeig.kit.threads import set_threads, thread_count
 
 T = TypeVar("T")
 P = TypeVar("P")
@@ -154,7 +154,7 @@ def run_in_workers(
     A new process must be able to import `work` by name. Close the generator to stop all workers at
     once.
 
-    Raise EigenshapeError if no worker can start, as in a script without a main guard.
+    Raise CerteigError if no worker can start, as in a script without a main guard.
     """
     if workers.executor is not None:
         yield from _run_in_executor(work, items, workers.executor, workers)
@@ -283,7 +283,7 @@ def _ctrl_c_held() -> Iterator[None]:
 
 def _require_started(first: "Future[Outcome[T]]") -> None:
     if isinstance(first.exception(), BrokenProcessPool):
-        raise EigenshapeError(NO_WORKERS) from first.exception()
+        raise CerteigError(NO_WORKERS) from first.exception()
 
 
 def _memory_of_each(workers: Workers) -> int | None:
@@ -323,7 +323,7 @@ def _work(work: Callable[[Path], T], path: Path) -> Outcome[T]:
     except MemoryError:
         return Outcome(error="it needs more memory than a worker may use")
     except Exception as err:  # noqa: BLE001  one that cannot be pickled would break the whole pool
-        known = isinstance(err, EigenshapeError | OSError)
+        known = isinstance(err, CerteigError | OSError)
         return Outcome(error=str(err) if known else f"{type(err).__name__}: {err}")
 
 
@@ -377,7 +377,7 @@ def run_apart(order: bytes) -> bytes:
         command, input=order, stdout=subprocess.PIPE, env=environment, check=False
     )
     if done.returncode:
-        raise EigenshapeError(
+        raise CerteigError(
             "A task must run in a process of its own; the process ended with exit code "
             f"{done.returncode}. See the log of the worker for its error. The function that reads "
             "files must be in a module that workers can import."

@@ -6,7 +6,7 @@ clouds. `help(es.types.MeshLike)` says what an annotation stands for.
 
 from contextlib import suppress
 
-from eigenshape._progress import Progress
+from certeig.kit.progress import Progress
 from eigenshape.deformation.handles import Handle
 from eigenshape.deformation.region import Region
 from eigenshape.geometry.cloud import Shape

@@ -1,4 +1,4 @@
-"""Draw the film of the README: twenty seconds of the studio, moved by the mouse alone.
+"""Draw the film of the page on the studio: twenty seconds of the studio, moved by the mouse alone.
 
     python studio/tests/film.py docs/pictures/film.gif
 

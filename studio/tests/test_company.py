@@ -12,7 +12,7 @@ from test_sessions import full_disk
 from test_workspace import Page, file_of
 
 import eigenshape as es
-from eigenshape._files import content_digest
+from certeig.kit.files import content_digest
 from eigenshape.collections.parts import kept_fits, write_state
 from eigenshape.matching.spectral_refinement import corners_of_faces
 from eigenshape_studio.calls import RequestError

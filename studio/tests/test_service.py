@@ -784,7 +784,7 @@ def test_the_container_copies_what_there_is_and_installs_as_the_readme_says():
             assert (ROOT / source).exists(), source
             copied.add(source.rstrip("/"))
     # What pip needs to build both packages, of each pyproject.
-    assert {"pyproject.toml", "hatch_build.py", "README.md", "LICENSE", "src", "studio"} <= copied
+    assert {"pyproject.toml", "certeig", "README.md", "LICENSE", "src", "studio"} <= copied
     # All of it is let through to the builder, and caches are not.
     lines = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
     assert {line[1:] for line in lines if line.startswith("!")} == copied
@@ -792,8 +792,8 @@ def test_the_container_copies_what_there_is_and_installs_as_the_readme_says():
     assert {"*", *caches} <= set(lines)
     runs = " && ".join(text for name, text in steps if name == "RUN")
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert "pip install -c deploy/constraints.txt . ./studio" in runs
-    assert "pip install . ./studio" in readme
+    assert "pip install -c deploy/constraints.txt ./certeig . ./studio" in runs
+    assert "pip install ./certeig . ./studio" in readme
     assert [text for name, text in steps if name == "USER"][-1] not in ("root", "0")
     # Versions are locked, of all packages that the two need.
     locked = (ROOT / "deploy" / "constraints.txt").read_text(encoding="utf-8").splitlines()

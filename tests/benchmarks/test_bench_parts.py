@@ -66,7 +66,7 @@ def test_the_operations_of_a_factor_are_counted_by_columns():
         import bench_parts
     finally:
         sys.path.remove(str(BENCHMARKS))
-    from eigenshape.spectral.solver.pencil import normalize
+    from eigenshape.spectral.pencils import normalize
 
     pencil = normalize(es.cotangent_laplacian(es.icosphere(0)))
     moved, operations = bench_parts._factor(pencil.shift_pattern.elimination, None)

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus import geodesic_paths
 from eigenshape.calculus.geodesic_paths import geodesic_path
 from eigenshape.calculus.geodesic_rays import trace_geodesic

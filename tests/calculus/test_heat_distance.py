@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.heat_distance import (
     factorize_definite,
     heat_distances,

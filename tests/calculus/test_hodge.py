@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from eigenshape._arguments import require_choice
-from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
+from certeig.kit.arguments import require_choice
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus import hodge, one_forms
 from eigenshape.calculus.derivatives import gradient
 from eigenshape.calculus.hodge import decompose_field, harmonic_fields

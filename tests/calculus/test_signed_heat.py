@@ -3,7 +3,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.signed_heat import signed_heat_distance
 from eigenshape.calculus.vector_heat import prepare_vector_heat
 from eigenshape.geometry.mesh import TriangleMesh

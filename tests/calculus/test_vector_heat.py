@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from eigenshape._arguments import require_choice
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.arguments import require_choice
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.log_map import LogMethod, logarithmic_map
 from eigenshape.calculus.vector_heat import (
     extend_scalar,

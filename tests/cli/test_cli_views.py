@@ -2,7 +2,7 @@
 
 import pytest
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli.steps.writing import picture_side
 
 

@@ -256,7 +256,7 @@ def test_a_seam_that_is_open_by_rounding_is_closed_by_what_info_proposes(data):
 
 @pytest.mark.parametrize("suffix", [".glb", ".ply", ".obj"])
 def test_a_soup_of_faces_finds_out_why_its_spectrum_is_too_large(tmp_path, monkeypatch, suffix):
-    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 2.0**25)
+    monkeypatch.setattr("certeig.kit.memory.machine_memory", lambda: 2.0**25)
     path = tmp_path / f"flat{suffix}"
     write_mesh(soup(icosphere(3)), path)
     message, applied = answer("spectrum", path, "--below", "20")

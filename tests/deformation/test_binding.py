@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from bent_shapes import lump_rig, tube, tube_rig
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend, deform
 from eigenshape.deformation.handles import Rotation, Translation

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bent_shapes import bumpy, lump, lump_rig, tube, tube_rig
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend, deform, move_by_shares, require_mode
 from eigenshape.deformation.handles import Rotation, Translation

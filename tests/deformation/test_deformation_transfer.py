@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from bent_shapes import lump, lump_rig
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.deformation.deform import deform
 from eigenshape.deformation.handles import Rotation
 from eigenshape.deformation.pose_transfer import transfer_deformation

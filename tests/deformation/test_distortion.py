@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from bent_shapes import lump
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.deformation.distortion import measure_distortion
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.shapes.surfaces import grid

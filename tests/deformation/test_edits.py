@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from bent_shapes import lump, lump_rig, tube
 
-from eigenshape._errors import FileFormatError, InvalidParameterError
+from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.edits import (
     Edit,
     Move,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.deformation.handles import Rotation, Translation, affine_offset, rotation_from_drag
 
 QUARTER = np.pi / 2

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import EigenshapeError, InvalidParameterError
+from certeig.kit.errors import CerteigError, InvalidParameterError
 from eigenshape.deformation.deform import deform
 from eigenshape.deformation.handles import Rotation
 from eigenshape.deformation.rig import rig_shape
@@ -46,7 +46,7 @@ def test_each_bend_is_finite_or_refused_by_name(name, mode, data):
             found = deform(
                 rig, region, Rotation(mesh.vertices.mean(axis=0), [1, 2, 3], 1.0), mode=mode
             )
-        except EigenshapeError:
+        except CerteigError:
             continue
         assert np.isfinite(found.vertices).all()
         bent += 1

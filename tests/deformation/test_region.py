@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.deformation.region import (
     BoxRegion,
     BrushRegion,

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from bent_shapes import bumpy, lump, lump_rig
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.rig import eigen_skeleton, pose_rig, project_on_modes, rig_shape
 from eigenshape.geometry.mesh import TriangleMesh

@@ -4,7 +4,8 @@ import scipy.sparse as sp
 from bent_shapes import lump, lump_rig, tube, tube_rig
 from scipy.spatial.transform import Rotation as Turn
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.deformation import rigidity
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend_graded, move_by_shares, quaternions

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from bent_shapes import lump, lump_rig
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.deformation.deform import deform, move_by_shares
 from eigenshape.deformation.edits import Edit, Move
 from eigenshape.deformation.handles import Rotation, Translation

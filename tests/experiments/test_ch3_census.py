@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape.spectral.solver import strategy as roads
+from certeig.solver import strategy as roads
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments" / "ch3_census"
 FULL = json.loads((FOLDER / "expected.json").read_text())["full"]

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 
 
 def pairs_of(pairs):

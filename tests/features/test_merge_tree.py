@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from literal_merging import LiteralMerging
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.segmentation import segment
 from eigenshape.geometry.mesh import TriangleMesh

@@ -3,7 +3,8 @@ import itertools
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.features import boundaries
 from eigenshape.features.boundaries import smooth_boundaries
 from eigenshape.features.contrast import FINE_CONTRAST, contrast_at

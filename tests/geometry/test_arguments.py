@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.operators.laplacian import Laplacian

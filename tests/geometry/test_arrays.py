@@ -4,15 +4,10 @@ import sys
 import numpy as np
 import pytest
 
-from eigenshape._arrays import (
-    finite_values,
-    positive_values,
-    step_number,
-    vertex_values,
-    whole_number,
-    whole_numbers,
-)
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.arrays import finite_values, positive_values, whole_number, whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._arrays import step_number, vertex_values
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
@@ -173,7 +168,7 @@ except EigenshapeError as error:
 
 
 def test_an_array_is_measured_against_the_memory(monkeypatch):
-    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 2.0**10)
+    monkeypatch.setattr("certeig.kit.memory.machine_memory", lambda: 2.0**10)
     fact = r"points must fit into 50 % of the memory, 0\.0 GiB; for checking and copying an array of shape \(20, 2\) "
     with pytest.raises(InvalidShapeError, match=fact):
         PointCloud(np.arange(40.0).reshape(20, 2))

@@ -6,7 +6,8 @@ import pyvista
 import trimesh
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import as_mesh, as_shape, as_simplicial, from_arrays
 from eigenshape.geometry.facets import boundary_surface

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import EigenshapeError, InvalidShapeError
+from certeig.kit.errors import CerteigError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 
 CORNERS = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -11,7 +12,7 @@ FACE = [[0, 1, 2]]
 def refused(match, vertices=CORNERS, faces=FACE):
     with pytest.raises(InvalidShapeError, match=match) as caught:
         TriangleMesh(vertices, faces)
-    assert isinstance(caught.value, EigenshapeError)
+    assert isinstance(caught.value, CerteigError)
     assert isinstance(caught.value, ValueError)
 
 

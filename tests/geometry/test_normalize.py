@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import bounding_box, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh

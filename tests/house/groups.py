@@ -13,7 +13,7 @@ ROOT = HOUSE.parents[1]
 GROUPS = tomllib.loads((HOUSE / "groups.toml").read_text(encoding="utf-8"))
 # The short door says again what rooms say, and steps of the command line are no room for users.
 NO_ROOMS = ("eigenshape", "eigenshape.cli.steps")
-ROOMS_WITHOUT_STUB = ("eigenshape.types",)
+ROOMS_WITHOUT_STUB = ("certeig", "eigenshape.types")
 
 
 class Import(NamedTuple):
@@ -86,7 +86,8 @@ def public_names() -> dict[str, dict[str, str]]:
         stub = path.with_suffix(".pyi")
         if room in ROOMS_WITHOUT_STUB:
             origins = {each.name: each.origin for each in imports(room, path)}
-            found[room] = {name: origins[name] for name in import_module(room).__all__}
+            names = import_module(room).__all__
+            found[room] = {name: origins.get(name, room) for name in names}
         elif stub.exists() and room not in NO_ROOMS:
             # What comes from the room itself is a room inside it.
             found[room] = {

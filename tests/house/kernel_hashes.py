@@ -303,7 +303,7 @@ class Recorder:
     def __enter__(self) -> "Recorder":
         for module in list(sys.modules.values()):
             name = getattr(module, "__name__", "")
-            if not name.startswith("eigenshape.") or name.endswith("_loops"):
+            if not name.startswith(("certeig.", "eigenshape.")) or name.endswith("_loops"):
                 continue
             for key, value in list(vars(module).items()):
                 if isinstance(value, types.ModuleType) and value.__name__.endswith("_loops"):
@@ -342,7 +342,10 @@ class Recorder:
         if not callable(value) or isinstance(value, type):
             return value
         home = getattr(value, "__module__", None) or ""
-        if not (home.startswith("eigenshape.") and home.endswith("_loops")) or "blas" in home:
+        if (
+            not (home.startswith(("certeig.", "eigenshape.")) and home.endswith("_loops"))
+            or "blas" in home
+        ):
             return value  # BLAS lies elsewhere in every process
         name = f"{home.rpartition('.')[2].removesuffix('_loops')}.{value.__name__}"
 

@@ -7,13 +7,19 @@ import tokenize
 from collections import Counter
 from pathlib import Path
 
-SOURCE = Path(__file__).resolve().parents[2] / "src" / "eigenshape"
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = ROOT / "src" / "eigenshape", ROOT / "certeig" / "src" / "certeig"
 NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
+
+
+def source_files() -> list[Path]:
+    """Return the modules of both packages."""
+    return sorted(path for source in SOURCES for path in source.rglob("*.py"))
 
 
 def print_counts() -> None:
     """Print tokens a line, comments, private functions with one caller, and the largest folder."""
-    texts = {path: path.read_text() for path in sorted(SOURCE.rglob("*.py"))}
+    texts = {path: path.read_text() for path in source_files()}
     n_tokens = n_lines = n_comments = 0
     for text in texts.values():
         tokens = code_tokens(text)
@@ -28,7 +34,7 @@ def print_counts() -> None:
     print(f"tokens a code line: {n_tokens / n_lines:.1f}")
     print(f"comments inside functions, per 1,000 code lines: {1000 * n_comments / n_lines:.0f}")
     print(f"private functions with one caller: {once / max(len(private), 1):.0%}")
-    print(f"modules in the largest folder, {folder.relative_to(SOURCE.parent)}: {n_modules}")
+    print(f"modules in the largest folder, {folder.relative_to(ROOT)}: {n_modules}")
 
 
 def code_tokens(text: str) -> list[tokenize.TokenInfo]:
@@ -98,7 +104,7 @@ def uncommented_constants(path: Path) -> list[str]:
             "#" in lines[node.lineno - 1] or "#" in lines[(node.end_lineno or node.lineno) - 1]
         )
         if not on_line and not lines[max(above, 0)].startswith("#"):
-            missing.append(f"{path.relative_to(SOURCE.parent)}:{node.lineno} {targets[0].id}")
+            missing.append(f"{path.relative_to(ROOT)}:{node.lineno} {targets[0].id}")
     return missing
 
 

@@ -7,12 +7,6 @@ from groups import GROUPS, ROOT, arrows_against_walls, group_of, modules, privat
 
 # To be turned: a group, the one that it may not use, the module that does, and what it imports.
 ARROWS = [
-    "certeig core eigenshape.spectral.archive -> eigenshape.operators.laplacian:freeze_sparse",
-    "certeig core eigenshape.spectral.solver.cache -> eigenshape.operators.laplacian:Laplacian",
-    "certeig core eigenshape.spectral.solver.certify -> eigenshape.operators.laplacian:Laplacian",
-    "certeig core eigenshape.spectral.solver.kernel_values -> eigenshape.operators.laplacian:GaussianKernel",
-    "certeig core eigenshape.spectral.solver.pencil -> eigenshape.operators.laplacian:GaussianKernel",
-    "certeig core eigenshape.spectral.solver.pencil -> eigenshape.operators.laplacian:Laplacian",
     "core files eigenshape.io.mesh_files -> eigenshape.io.attributes:MeshAttributes",
     "core files eigenshape.io.mesh_files -> eigenshape.io.attributes:WriteJob",
     "core files eigenshape.io.mesh_files -> eigenshape.io.attributes:label_attributes",

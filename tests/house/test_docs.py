@@ -1,6 +1,7 @@
 """What the docs mention is there, and all that is public is mentioned."""
 
 import re
+import shlex
 from operator import attrgetter
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 
 import eigenshape as es
 from eigenshape.cli import app
+from eigenshape.cli.verbs import load_verb
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -18,6 +20,7 @@ PAGES = [
     ROOT / "CONTRIBUTING.md",
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "docs" / "coming_from").glob("*.md")),
+    *sorted((ROOT / "docs" / "decisions").glob("*.md")),
     *sorted((ROOT / "experiments").rglob("*.md")),
 ]
 # What stands for the names of files.
@@ -32,15 +35,37 @@ def test_names_in_docs_are_there(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_files_in_docs_are_there(page):
-    source = ROOT / "src" / "eigenshape"
+    sources = (ROOT / "src" / "eigenshape", ROOT / "certeig" / "src", ROOT / "certeig")
     files = re.findall(r"`(?:python )?([\w./]+\.py|[a-z_]+(?:/[a-z_]+)*/)`", page.read_text())
     missing = {
         name
         for name in files
         if not any((folder / name).exists() for folder in (ROOT, ROOT / "studio", page.parent))
-        and not list(source.rglob(name))
+        and not any(list(source.rglob(name)) for source in sources)
     }
     assert not missing - PATTERNS
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_in_docs_are_understood(page):
+    """Verbs and options are parsed; nothing runs."""
+    text = page.read_text()
+    blocks = re.findall(r"```sh\n(.*?)```", text, re.DOTALL)
+    cells = re.findall(r"\| `(eigenshape .*?)` \|", text)
+    commands = r"^ *(?:.*&& )?eigenshape (.*?)(?: &)?$"
+    for words in re.findall(commands, "\n".join(blocks + cells), re.MULTILINE):
+        verb, *options = shlex.split(words, comments=True)
+        if verb == "index":
+            verb += f" {options.pop(0)}"
+        load_verb(verb).make_context(verb, options)
+
+
+def test_the_architecture_is_a_map_and_each_decision_has_a_date():
+    assert (ROOT / "docs" / "architecture.md").stat().st_size <= 8000
+    for page in (ROOT / "docs" / "decisions").glob("*.md"):
+        assert page.name == "index.md" or re.match(
+            r"# .*\n\n\*\d+ \w+ 20\d\d\*\n\n", page.read_text()
+        ), page.name
 
 
 def test_experiments_that_comments_name_are_there():
@@ -62,6 +87,25 @@ def test_the_page_of_modes_runs():
     exec("\n".join(blocks), names)
     assert 0 < names["p_value"] < 0.5
     assert len(names["modes"])
+
+
+@pytest.mark.long
+@pytest.mark.sweep
+def test_the_page_of_first_steps_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    biped = es.make_creature("biped", n_vertices=800)
+    tall = es.TriangleMesh(2 * biped.vertices, biped.faces)  # as the page's region supposes
+    es.write_mesh(tall, "scan.ply")
+    es.write_mesh(tall, "other.ply")
+    es.write_mesh(es.TriangleMesh(1.01 * tall.vertices, tall.faces), "noisy.ply")
+    es.io.write_fields(es.shapes.ball(4), "brain.vtu", {})
+    page = (ROOT / "docs" / "first_steps.md").read_text()
+    names: dict[str, object] = {}
+    exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), names)
+    assert names["match"].name == "scan"
+    assert np.abs(names["bent"].vertices - names["longer"].vertices).max() > 0.1
+    for written in ("parts.png", "bent.ply", "report.png"):
+        assert Path(written).stat().st_size > 1000
 
 
 @pytest.mark.long

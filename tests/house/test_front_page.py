@@ -1,4 +1,4 @@
-"""The README's commands and pictures, and the form of the gallery, which the docs build runs."""
+"""The README (commands, size, links, code), its pictures, and the form of the gallery, which the docs build runs."""
 
 import ast
 import re
@@ -7,21 +7,61 @@ from pathlib import Path
 
 import pytest
 
+import eigenshape as es
+
 ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SHOWN = [
+    path.with_name("README.md")
+    for path in [ROOT / "pyproject.toml", *ROOT.glob("*/pyproject.toml")]
+]
+# The target of [text](target), of [name]: target, and of src="target" and href="target".
+LINK = re.compile(r"(?:\]\(|^\[[^]]+\]: |\b(?:src|href)=\")([^\s)\"]+)", re.MULTILINE)
 SCRIPTS = sorted((ROOT / "gallery").glob("*/*.py"))
 
 
 def test_readme_begins_with_exactly_two_commands():
-    blocks = (ROOT / "README.md").read_text().split("```")
-    commands = blocks[1].splitlines()[1:]
+    commands = README.split("```")[1].splitlines()[1:]
     assert len([line for line in commands if line.strip()]) == 2
+
+
+def test_readme_is_short_and_shows_one_picture():
+    assert len(README.encode()) <= 5000
+    assert len(re.findall(r"!\[|<img", README)) == 1
+
+
+@pytest.mark.parametrize("page", SHOWN, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_of_a_readme_are_absolute_and_lead_to_files_of_the_repository(page):
+    """PyPI shows the README of each package, without the files beside it."""
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    (address,) = re.findall(r'^repository-code: "(.*)"', citation, re.MULTILINE)
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        assert target.startswith("https://"), target
+        place = target.removeprefix(address)
+        if place not in (target, ""):
+            file = re.fullmatch(r"/(?:blob|raw)/main/([\w./]+)", place)
+            assert file, target
+            assert (ROOT / file[1]).is_file(), target
+
+
+@pytest.mark.long
+def test_the_code_of_the_readme_runs(tmp_path, monkeypatch):
+    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    giraffe = es.make_creature("giraffe", n_vertices=600)
+    es.write_mesh(giraffe, "scan.ply")
+    es.write_mesh(giraffe, "other.ply")
+    names: dict[str, object] = {}
+    exec(code, names)
+    assert names["match"].name == "scan"
+    assert Path("parts.png").stat().st_size > 1000
 
 
 @pytest.mark.long
 @pytest.mark.sweep
 def test_the_pictures_of_the_front_page_can_be_drawn(tmp_path):
     drawn = runpy.run_path(str(ROOT / "docs" / "front_page.py"))["main"](tmp_path, n_vertices=800)
-    pages = (ROOT / "README.md").read_text() + (ROOT / "docs" / "index.md").read_text()
+    pages = README + (ROOT / "docs" / "index.md").read_text()
     # Those of the studio are drawn, and tested, with the studio.
     shown = re.findall(r"pictures/(?!studio_|film\.gif)([\w.]+)", pages)
     assert set(shown) == {path.name for path in drawn}

@@ -13,4 +13,4 @@ def test_data_walks_up_and_never_back():
     ]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
-    assert "5 kept, 0 broken" in done.stdout
+    assert "7 kept, 0 broken" in done.stdout

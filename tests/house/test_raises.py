@@ -16,7 +16,8 @@ HOLE = "\0"
 
 
 def raised_messages():
-    for path in sorted((ROOT / "src").rglob("*.py")):
+    sources = (ROOT / folder for folder in ("src", "certeig/src"))
+    for path in sorted(path for source in sources for path in source.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             call = node.exc if isinstance(node, ast.Raise) else None
             if isinstance(call, ast.Call) and getattr(call.func, "id", "") in ERRORS and call.args:
@@ -34,7 +35,8 @@ def text_of(node):
 
 
 def expectations():
-    for path in sorted((ROOT / "tests").rglob("*.py")):
+    folders = (ROOT / folder for folder in ("tests", "certeig/tests"))
+    for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             if (
                 isinstance(node, ast.Constant)

@@ -12,7 +12,7 @@ from public_names import public_things
 from sklearn.base import BaseEstimator  # prints and draws estimators itself
 
 import eigenshape as es
-from eigenshape._text import LONGEST, html_repr, repr_of_changes, short_repr
+from certeig.kit.text import LONGEST, html_repr, repr_of_changes, short_repr
 
 CLASSES = [
     thing

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from test_shape_files import CUBE, CURVE, POLYDATA
 
-from eigenshape._errors import FileFormatError, InvalidShapeError
+from certeig.kit.errors import FileFormatError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io.formats.pcd import parse as parse_pcd

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import FileFormatError, InvalidParameterError
+from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.edits import Edit, Move, mesh_fingerprint
 from eigenshape.deformation.handles import Rotation, Translation
 from eigenshape.deformation.region import BoxRegion

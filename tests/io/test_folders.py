@@ -3,7 +3,7 @@
 import pytest
 
 import eigenshape as es
-from eigenshape._errors import FileFormatError, InvalidParameterError
+from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape.io.folders import find_items
 from eigenshape.retrieval.store.damage import StoreWarning
 

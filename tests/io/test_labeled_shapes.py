@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import FileFormatError, InvalidParameterError
+from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape.io.labeled_shapes import (
     read_label_names,
     read_labeled_shape,

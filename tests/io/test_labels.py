@@ -3,7 +3,7 @@ import pytest
 import trimesh
 from tetrahedra import TETRAHEDRON
 
-from eigenshape._errors import FileFormatError, InvalidParameterError
+from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape.io.labeled_shapes import read_labels, write_labels
 from eigenshape.io.mesh_files import read_mesh, write_mesh
 

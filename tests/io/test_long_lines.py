@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._files import LONGEST_LINE
+from certeig.kit.files import LONGEST_LINE
 
 LONG = b"1 " * (LONGEST_LINE // 2 + 9)
 FILES = {

@@ -3,7 +3,7 @@
 import pytest
 
 import eigenshape as es
-from eigenshape._files import as_path
+from certeig.kit.files import as_path
 from eigenshape.plot.figure import Figure
 
 

@@ -5,7 +5,7 @@ import time
 import pytest
 from test_real_files import MESHES, REFUSED
 
-from eigenshape._errors import EigenshapeError
+from certeig.kit.errors import CerteigError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.facets import boundary_surface
 from eigenshape.geometry.measure import enclosed_volume
@@ -56,7 +56,7 @@ def test_every_awkward_file_is_a_shape_or_a_named_error_soon(data, capfd):
         start = time.perf_counter()
         try:
             shape = read_shape(data / "nasty" / name)
-        except EigenshapeError as error:
+        except CerteigError as error:
             assert name in REFUSED.keys() - (CLOUDS | CURVES | PLANES).keys(), name
             assert name in str(error)  # noqa: PT017 - either way the outcome is checked
         else:

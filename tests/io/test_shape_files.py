@@ -5,12 +5,8 @@ import meshio
 import numpy as np
 import pytest
 
-from eigenshape._errors import (
-    EigenshapeError,
-    FileFormatError,
-    InvalidParameterError,
-    InvalidShapeError,
-)
+from certeig.kit.errors import CerteigError, FileFormatError, InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import simplex_volumes
@@ -179,7 +175,7 @@ def test_polygons_become_triangles(tmp_path):
 def test_broken_polydata_is_named(tmp_path, change, match):
     assert change[0] in POLYDATA["text"]
     (tmp_path / "a.vtk").write_bytes(POLYDATA["text"].replace(*change))
-    with pytest.raises(EigenshapeError, match=match):
+    with pytest.raises(CerteigError, match=match):
         read_shape(tmp_path / "a.vtk")
 
 
@@ -223,7 +219,7 @@ def test_files_that_lack_cells_or_their_end_are_named(tmp_path):
 def test_what_is_no_mesh_is_named_and_nothing_is_printed(tmp_path, capfd, suffix, content):
     path = tmp_path / f"a{suffix}"
     path.write_bytes(content)
-    with pytest.raises(EigenshapeError, match=rf"a{suffix}"):
+    with pytest.raises(CerteigError, match=rf"a{suffix}"):
         read_shape(path)
     assert capfd.readouterr() == ("", "")
 
@@ -244,7 +240,7 @@ def test_truncated_files_are_refused_or_whole(tmp_path, capfd, kind):
     for end in range(1, len(whole)):
         try:
             _, found = parse_file(SourceFile(path, suffix, whole[:end]), None)
-        except EigenshapeError:
+        except CerteigError:
             n_refused += 1
             continue
         np.testing.assert_array_equal(found, cells)

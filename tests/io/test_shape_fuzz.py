@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from lapy import TetMesh
 from test_shape_files import CUBE, POLYDATA, TABLES, pcd
 
-from eigenshape._errors import EigenshapeError
+from certeig.kit.errors import CerteigError
 from eigenshape.io.shape_files import read_shape
 
 
@@ -60,7 +60,7 @@ def test_a_changed_file_is_a_shape_or_a_named_error(files, capfd, data):
     path.write_bytes(changed)
     try:
         shape = read_shape(path)
-    except EigenshapeError as error:
+    except CerteigError as error:
         assert "changed" in str(error)  # noqa: PT017 - either way the outcome is checked
     else:
         assert np.isfinite(shape.points).all()

@@ -11,7 +11,7 @@ import pytest
 from laws.natural_slips import public_callables
 
 import eigenshape as es
-from eigenshape._arguments import CONVERSIONS, MAKERS, READERS
+from certeig.kit.arguments import CONVERSIONS, MAKERS, READERS
 
 TESTS = Path(__file__).resolve().parents[1]
 TORCH_NAMES = (Path(es.__file__).parent / "torch" / "__init__.pyi").read_text()

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from certeig.solver import strategy as roads
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver import strategy as roads
 
 seeds = st.integers(0, 2**32 - 1)
 masses = st.sampled_from(["lumped", "consistent", "averaged"])

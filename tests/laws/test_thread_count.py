@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._threads import VARIABLE, map_in_threads, thread_count, usable_cores
+from certeig.kit.threads import VARIABLE, map_in_threads, thread_count, usable_cores
 from eigenshape.retrieval.heat.features import describe_views
 
 SHAPE = es.make_creature("fish", n_vertices=800)

@@ -22,7 +22,7 @@ from thread_calls import CALLS, LEFT_OUT
 from threadpoolctl import threadpool_limits
 
 import eigenshape as es
-from eigenshape._threads import _blas_libraries, one_blas_thread
+from certeig.kit.threads import _blas_libraries, one_blas_thread
 
 N_THREADS = 4
 
@@ -144,9 +144,9 @@ def test_four_threads_get_what_one_gets_bit_for_bit(shared, monkeypatch, in_turn
 
 # What decides whether work is worth threads; with these small values it is for every small shape.
 SMALL_WORK = {
-    "eigenshape.sparse.tasks.FEWEST_ENTRIES": 500,
-    "eigenshape.sparse.basis.FEWEST_MULTIPLICATIONS": 1,
-    "eigenshape.sparse.basis.COMBINED_ROWS": 64,
+    "certeig.sparse.tasks.FEWEST_ENTRIES": 500,
+    "certeig.sparse.basis.FEWEST_MULTIPLICATIONS": 1,
+    "certeig.sparse.basis.COMBINED_ROWS": 64,
     "eigenshape.spectral.multilevel.aggregation.ROWS_A_THREAD": 64,
     "eigenshape.spectral.multilevel.vcycle.ROWS_A_THREAD": 64,
     "eigenshape.spectral.multilevel.residuals.CHUNK_ROWS": 64,
@@ -223,7 +223,7 @@ def test_each_thread_has_its_limit_whatever_the_library_and_gets_its_number_back
     monkeypatch, layer
 ):
     library = FakeLibrary(layer)
-    monkeypatch.setattr("eigenshape._threads._blas_libraries", lambda: [library])
+    monkeypatch.setattr("certeig.kit.threads._blas_libraries", lambda: [library])
     entered = Barrier(2)
 
     def compute(_: int) -> tuple[int, int]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.topology import submesh
 from eigenshape.matching.match import match_shapes
 from eigenshape.matching.target import prepare_target

@@ -4,7 +4,8 @@ from math import factorial
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators import elements

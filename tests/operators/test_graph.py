@@ -4,7 +4,8 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.graph import edge_graph, graph_laplacian

@@ -5,7 +5,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from eigenshape._errors import EigenshapeError
+from certeig.kit.errors import CerteigError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.io.shape_files import read_shape
@@ -34,7 +34,7 @@ def shapes(folder):
     for path in sorted(
         path for name in FOLDERS for path in (folder / name).rglob("*") if path.is_file()
     ):
-        with suppress(EigenshapeError):  # which tests/io look at
+        with suppress(CerteigError):  # which tests/io look at
             yield path, read_shape(path)
 
 
@@ -47,7 +47,7 @@ def test_every_file_gives_a_sound_operator_or_a_named_error(data, name):
             continue
         try:
             laplacian = build_laplacian(shape, name)
-        except EigenshapeError as error:
+        except CerteigError as error:
             refused.append(str(error))
             continue
         assert laplacian.n_points == 1 or keeps_the_laws(laplacian), path.name

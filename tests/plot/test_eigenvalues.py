@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.plot.figure import save_figure
 from eigenshape.plot.spectra import figure_spectra

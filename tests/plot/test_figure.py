@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._text import literal
+from certeig.kit.text import literal
 from eigenshape.plot.figure import Figure
 
 EVIL = "a\x1b[31mb\x07c\u202ed\x00e"

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.plot.camera import aim_camera, in_picture

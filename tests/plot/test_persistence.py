@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.features.segmentation import merge_targets, segment
 from eigenshape.plot.persistence import KINDS, leaf_places
 from eigenshape.plot.render import palette

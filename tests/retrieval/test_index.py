@@ -18,8 +18,9 @@ from describers import RECIPE, descriptor, keep, spoil
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from certeig.kit.errors import InvalidParameterError
 from eigenshape import _sealed
-from eigenshape._errors import InvalidParameterError, StoreError
+from eigenshape._errors import StoreError
 from eigenshape._sealed import PAGE, checksum
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.heat.score import HeatDescriptor, matching_score

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import face_normals, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_loops, disjoint_union, vertex_components

@@ -3,7 +3,7 @@ import pytest
 from each_creature import KINDS
 from threadpoolctl import threadpool_limits
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import edge_lengths, enclosed_volume
 from eigenshape.geometry.simplices import degenerate_simplices

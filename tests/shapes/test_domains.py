@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import enclosed_volume, face_normals
 from eigenshape.geometry.simplices import require_volumes, simplex_volumes
 from eigenshape.geometry.topology import (

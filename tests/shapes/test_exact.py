@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.special import eval_legendre, jn_zeros
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.shapes import exact
 
 

@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.shapes.exact import sphere_eigenvalues
 from eigenshape.shapes.harmonics import sphere_harmonics
 from eigenshape.shapes.spheres import fibonacci_sphere, random_sphere

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import enclosed_volume, face_normals, surface_area
 from eigenshape.geometry.resolution.subdivision import subdivide

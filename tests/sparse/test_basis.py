@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape.sparse.basis import combine_columns, pack_columns, products, subtract
+from certeig.sparse.basis import combine_columns, pack_columns, products, subtract
 
 
 def unpacked(slots):

@@ -8,16 +8,16 @@ from hypothesis import strategies as st
 from pencils import random_symmetric
 from scipy.spatial import Delaunay
 
+from certeig.sparse import dissection, elimination
+from certeig.sparse.elimination import analyze_pattern
+from certeig.sparse.front_loops import WIDE
+from certeig.sparse.symmetric_factor import factorize_symmetric
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.elements import mass
 from eigenshape.operators.fem import fem_laplacian
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.spheres import fibonacci_sphere
-from eigenshape.sparse import dissection, elimination
-from eigenshape.sparse.elimination import analyze_pattern
-from eigenshape.sparse.front_loops import WIDE
-from eigenshape.sparse.symmetric_factor import factorize_symmetric
 
 
 def solved(matrix, width=3):

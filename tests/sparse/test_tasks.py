@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from pencils import random_symmetric
 
 import eigenshape as es
-from eigenshape.sparse.dissection import dissect
-from eigenshape.sparse.elimination import analyze_pattern
-from eigenshape.sparse.symmetric_factor import factorize_symmetric
+from certeig.sparse.dissection import dissect
+from certeig.sparse.elimination import analyze_pattern
+from certeig.sparse.symmetric_factor import factorize_symmetric
 
 
 @pytest.fixture(autouse=True)
 def small_work(monkeypatch):
-    monkeypatch.setattr("eigenshape.sparse.tasks.FEWEST_ENTRIES", 1)
-    monkeypatch.setattr("eigenshape.sparse.dissection.WORTH_A_THREAD", 60)
+    monkeypatch.setattr("certeig.sparse.tasks.FEWEST_ENTRIES", 1)
+    monkeypatch.setattr("certeig.sparse.dissection.WORTH_A_THREAD", 60)
     yield
     es.set_threads(None)
 

@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere
 from eigenshape.spectral.solve import solve_spectrum

@@ -3,7 +3,7 @@ from inspect import unwrap
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.topology import boundary_edges
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import grid

@@ -329,7 +329,7 @@ def test_many_points_of_two_close_shapes_have_a_perfect_matching_and_few_have_no
 
 
 def test_pairs_that_would_not_fit_are_refused(monkeypatch):
-    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 1e5)
+    monkeypatch.setattr("certeig.kit.memory.machine_memory", lambda: 1e5)
     near, far = np.random.default_rng(0).random((2, 40, 3))
     es.stability.bottleneck_matching(near, near + 1e-3)  # few pairs
     with pytest.raises(

@@ -5,10 +5,12 @@ import scipy.sparse as sp
 from jaxtyping import Complex, Float, Int
 from scipy.sparse.linalg import spsolve
 
-from eigenshape._arrays import real_numbers, require_finite_rows, step_number
-from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
-from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import real_numbers
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import require_finite_rows, step_number
+from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, scale_to_unit, triangle_areas

@@ -6,9 +6,11 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import point_functions, real_numbers, require_finite_rows, simplex_vectors
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import real_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import point_functions, require_finite_rows, simplex_vectors
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh

@@ -4,10 +4,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import factor_equations
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 

@@ -5,18 +5,12 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import (
-    finite_number,
-    point_functions,
-    positive_number,
-    real_numbers,
-    step_number,
-    vertex_values,
-)
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import finite_number, positive_number, real_numbers
+from certeig.kit.progress import Progress, silent
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import point_functions, step_number, vertex_values
 from eigenshape._errors import InvalidShapeError
-from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike, Integer
 from eigenshape.calculus.linear_solver import factor_definite, factor_equations
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import boundary_facets

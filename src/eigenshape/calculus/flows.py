@@ -3,14 +3,13 @@
 import numpy as np
 import scipy.sparse as sp
 
-from eigenshape._arrays import (
-    finite_number,
-    positive_number,
-    step_number,
-)
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import finite_number, positive_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.typing import ArrayLike, Integer
+from certeig.matrices import require_points
+from eigenshape._arrays import step_number
+from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
@@ -19,7 +18,6 @@ from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.graph import edge_graph
-from eigenshape.operators.laplacian import require_points
 
 # Steps of Taubin's filter, without unit: λ and μ of his paper's examples (0.33, -0.34) are weaker;
 # these give the pass band 1/λ + 1/μ = 0.1 that he recommends, with λ = 0.5.

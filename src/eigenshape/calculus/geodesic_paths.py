@@ -7,9 +7,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
 
-from eigenshape._arrays import whole_number, whole_numbers
-from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import whole_number, whole_numbers
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from eigenshape._arrays import finite_values, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import finite_values, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,

@@ -4,10 +4,11 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly, positive_number, record, whole_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import ReadOnly, positive_number, record, whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.typing import ArrayLike
+from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape.calculus.linear_solver import (
     GroundedFactor,
     factorize_definite,
@@ -24,7 +25,6 @@ from eigenshape.operators import elements, flip_loops
 from eigenshape.operators.clouds.cloud_triangles import cloud_cover
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import delaunay_cover
-from eigenshape.sparse.symmetric_factor import SymmetricFactor
 
 # Sources that are solved for together: the lanes of a factor, and few enough that the gradients of
 # all simplices fit in the cache.

@@ -5,11 +5,12 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_choice
-from eigenshape._arrays import ReadOnly, real_numbers, record, require_finite_rows
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_choice
+from certeig.kit.arrays import ReadOnly, real_numbers, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import require_finite_rows
 from eigenshape.calculus.derivatives import sum_at_nodes
 from eigenshape.calculus.linear_solver import factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_mesh

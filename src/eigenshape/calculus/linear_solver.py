@@ -8,12 +8,14 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import ReadOnly, point_functions, real_numbers, record, require_finite_rows
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
-from eigenshape.operators.laplacian import as_symmetric, find_zero_row_sums, require_points
-from eigenshape.sparse.symmetric_factor import SymmetricFactor, factor_matrix
+from certeig.kit.arrays import ReadOnly, real_numbers, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from certeig.matrices import as_symmetric, find_zero_row_sums, require_points
+from certeig.sparse.symmetric_factor import SymmetricFactor, factor_matrix
+from eigenshape._arrays import point_functions, require_finite_rows
+from eigenshape._errors import InvalidShapeError
 
 # Loads on a component where nothing is fixed may sum to this share of their absolute sum. Sums of a
 # million numbers round to 1e-10 of it at most; a source that is not balanced is far above.

@@ -5,9 +5,9 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Complex, Float
 
-from eigenshape._arguments import require_choice
-from eigenshape._arrays import whole_number
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_choice
+from certeig.kit.arrays import whole_number
+from certeig.kit.typing import Integer
 from eigenshape.calculus.vector_heat import (
     VectorHeat,
     as_rows,

@@ -4,10 +4,12 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Int
 
-from eigenshape._arguments import require_choice
-from eigenshape._arrays import real_numbers, require_finite_rows
-from eigenshape._errors import ConvergenceError, InvalidParameterError, InvalidShapeError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_choice
+from certeig.kit.arrays import real_numbers
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import require_finite_rows
+from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.hodge import HodgeDecomposition, Rim
 from eigenshape.calculus.linear_solver import factorize_definite, factorize_grounded
 from eigenshape.geometry.conversion import MeshLike, as_simplicial

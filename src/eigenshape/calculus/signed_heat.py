@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import whole_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape.calculus.vector_heat import (
     VectorHeat,
     as_vector_heat,

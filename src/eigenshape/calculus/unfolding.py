@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, record
+from certeig.kit.arrays import ReadOnly, record
 from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import in_length, size_one

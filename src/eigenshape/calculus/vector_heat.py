@@ -3,17 +3,12 @@
 import numpy as np
 from jaxtyping import Complex, Float, Int
 
-from eigenshape._arrays import (
-    ReadOnly,
-    finite_values,
-    positive_number,
-    real_numbers,
-    record,
-    require_finite_rows,
-)
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import ReadOnly, finite_values, positive_number, real_numbers, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.typing import ArrayLike
+from certeig.sparse.symmetric_factor import SymmetricFactor
+from eigenshape._arrays import require_finite_rows
 from eigenshape.calculus.heat_distance import require_heat, require_sources
 from eigenshape.calculus.linear_solver import (
     GroundedFactor,
@@ -28,7 +23,6 @@ from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import Directions, half_cotangents, vertex_directions
 from eigenshape.operators.tufted import side_ends
-from eigenshape.sparse.symmetric_factor import SymmetricFactor
 
 
 @record

@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from eigenshape._arrays import real_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import real_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape.calculus.flows import taubin_smooth
 from eigenshape.calculus.level_sets import level_set
 from eigenshape.geometry.mesh import TriangleMesh

@@ -37,7 +37,7 @@ def collection(
     scheduler: str | None = None,
     as_json: bool = False,
 ) -> None:
-    """Bring all specimens of a folder into correspondence, and carry the landmarks of some to all.
+    """Bring all specimens of a folder into correspondence, and transfer the landmarks of some to all.
 
     The output has the mean shape (mean.ply), the landmarks of all specimens (landmarks.csv), their
     sizes, sides and what was noticed (specimens.csv) and a page that any browser opens

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import eigenshape as es
-from eigenshape._files import read_regular, replace_file
+from certeig.kit.files import read_regular, replace_file
 from eigenshape.cli import steps
 from eigenshape.cli.console import out, print_json, print_written, progress_bar
 

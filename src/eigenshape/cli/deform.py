@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import err, print_json, print_table, print_written, progress_bar
 from eigenshape.cli.inputs import SEAMS, numbers_of

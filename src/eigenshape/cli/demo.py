@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli.console import escape_text, out, progress_bar
 from eigenshape.cli.index import Workers, add
 from eigenshape.cli.query import query
@@ -25,7 +25,7 @@ Read next:
   eigenshape index add my-index FOLDER                the same for a folder of your own meshes
   eigenshape query my-index SCAN --picture sheet.png  and a scan of yours
   eigenshape studio {scan} --index {index}            a window in the browser: bend it, and search
-  README.md, docs/glossary.md                         the same steps in Python, and the terms
+  docs/first_steps.md, docs/glossary.md               the same steps in Python, and the terms
 """
 
 

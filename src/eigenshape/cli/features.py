@@ -1,4 +1,4 @@
-"""eigenshape features and condense: points and parts that persist, and regions of like heat, of many shapes."""
+"""eigenshape features and condense: points and parts that persist, and regions of similar heat, of many shapes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
@@ -134,7 +134,7 @@ def condense(
     scheduler: str | None = None,
     as_json: bool = False,
 ) -> None:
-    """Average heat signatures over regions of like heat, and write a table of the regions of all shapes.
+    """Average heat signatures over regions of similar heat, and write a table of the regions of all shapes.
 
     Each row is a region: its shape, area, center, number of vertices, and the mean logarithm of
     the heat at each time. These are the condensed features of neurons, by which connectomics tells

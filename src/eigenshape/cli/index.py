@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
@@ -58,7 +58,7 @@ def add(
 
     A shape is named by its path below the given folder; its class is the folder that holds it.
     Shapes that the index has already are skipped, also if their folder has moved. After Ctrl-C or a
-    crash, the same command continues where it stopped. Point clouds and frames of a depth camera
+    crash, the same command continues where it stopped. Point clouds and depth scans
     (.pcd) become a surface first. The exit code is 3 if some files failed.
 
     Parameters

@@ -3,7 +3,7 @@
 import re
 from typing import Literal
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.repairs.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
 from eigenshape.io.formats.registry import MESH_FORMATS, POINT_FORMATS, WRITTEN
 

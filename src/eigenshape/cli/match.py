@@ -9,7 +9,7 @@ from typing import Any
 import typer
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
@@ -47,7 +47,7 @@ def match(
     Parameters
     ----------
     mesh
-        Part, scan or pose: a mesh, points or a frame of a depth camera.
+        Part, scan or pose: a mesh, points or a depth scan.
     whole
         Whole shape, in a file of the same kinds.
     scale
@@ -177,7 +177,7 @@ def fuse(
     Parameters
     ----------
     scans
-        Scans of one rigid shape in one length unit: meshes, or frames of a depth camera (.pcd).
+        Scans of one rigid shape in one length unit: meshes, or depth scans (.pcd).
     """
     steps.require_mesh_path(output)
     meshes = [steps.load_surface(path, repair) for path in scans]

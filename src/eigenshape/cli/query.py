@@ -13,8 +13,9 @@ from typing import Annotated, Any
 import typer
 
 import eigenshape as es
-from eigenshape._errors import EigenshapeError, InvalidParameterError, StoreError
-from eigenshape._text import literal
+from certeig.kit.errors import CerteigError, InvalidParameterError
+from certeig.kit.text import literal
+from eigenshape._errors import StoreError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
@@ -77,7 +78,7 @@ def query(
     Parameters
     ----------
     scan
-        File to search for: a mesh, a point cloud or a frame of a depth camera (.pcd), of a whole
+        File to search for: a mesh, a point cloud or a depth scan (.pcd), of a whole
         shape or a part of one, in any pose; a folder of such files; or the name of a shape of the
         index, which is left out of the answer.
     n_matches
@@ -125,7 +126,7 @@ def query(
                     try:
                         mesh = steps.load_surface(item.path, repair)
                         answers.append(_ask(reader, title, mesh, recipe, options))
-                    except (EigenshapeError, OSError) as error:
+                    except (CerteigError, OSError) as error:
                         if not is_folder:
                             raise
                         failed.append((item.name, str(error)))

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     escape_text,

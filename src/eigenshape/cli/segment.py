@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import print_json, progress_bar
 from eigenshape.cli.inputs import SEAMS, HeatMethod, require_one_rule

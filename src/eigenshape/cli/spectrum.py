@@ -8,7 +8,7 @@ from types import NoneType
 from typing import Any, get_args, get_type_hints
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     err,

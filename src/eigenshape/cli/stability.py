@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import literal
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import literal
 from eigenshape.cli import steps
 from eigenshape.cli.console import out, print_json, print_table, progress_bar, result_facts
 from eigenshape.stability.plan import StabilityPlan

@@ -17,8 +17,8 @@ from typing import Annotated, Any, get_args, get_origin
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from eigenshape._errors import EigenshapeError, InvalidParameterError
-from eigenshape._text import printable
+from certeig.kit.errors import CerteigError, InvalidParameterError
+from certeig.kit.text import printable
 from eigenshape.cli.console import err, escape_text
 from eigenshape.cli.inputs import SHARED_PARAMETERS, option_spellings, read_parameters
 
@@ -65,7 +65,7 @@ class Verb(TyperCommand):
                 warnings.simplefilter("always", UserWarning)
                 warnings.showwarning = _print_warning
                 return super().invoke(ctx)
-        except (EigenshapeError, OSError) as error:
+        except (CerteigError, OSError) as error:
             text = str(error)
             if isinstance(error, OSError) and error.filename is not None:
                 text = f"{error.filename}: {error.strerror}"  # without the number of the error

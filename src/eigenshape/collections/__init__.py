@@ -1,4 +1,4 @@
-"""Collections of specimens: surfaces placed and bent onto each other, mean shapes, carried landmarks."""
+"""Collections of specimens: surfaces placed and bent onto each other, mean shapes, transferred landmarks."""
 
 import lazy_loader
 

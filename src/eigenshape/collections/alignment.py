@@ -8,9 +8,10 @@ from jaxtyping import Float
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from eigenshape._arrays import ReadOnly, finite_rows, record
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import finite_rows
 from eigenshape.collections.spread_points import (
     join_normals,
     main_pieces,

@@ -12,12 +12,13 @@ from urllib.parse import quote
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type, require_unicode
-from eigenshape._errors import EigenshapeError, InvalidParameterError, InvalidShapeError
-from eigenshape._files import as_path, content_digest
-from eigenshape._progress import Callback
+from certeig.kit.arguments import require_type, require_unicode
+from certeig.kit.errors import CerteigError, InvalidParameterError
+from certeig.kit.files import as_path, content_digest
+from certeig.kit.progress import Callback
+from certeig.kit.threads import one_blas_thread
+from eigenshape._errors import InvalidShapeError
 from eigenshape._sealed import explained
-from eigenshape._threads import one_blas_thread
 from eigenshape._workers import Item, Outcome, Workers, run_in_workers
 from eigenshape.collections.alignment import MIRROR, Side, Similarity, best_similarity
 from eigenshape.collections.collection import (
@@ -132,13 +133,13 @@ def build_collection(
         If fewer than two specimens can be fitted.
     StoreError
         If the folder cannot be written, or its disk is full. What was done is kept.
-    EigenshapeError
+    CerteigError
         If no worker can start. A script must call this under ``if __name__ == "__main__":``, since
         workers import the script.
 
     See Also
     --------
-    carry_landmarks : Landmarks of some specimens, carried to all.
+    carry_landmarks : Landmarks of some specimens, transferred to all.
     open_collection : Open it later.
 
     Examples
@@ -343,7 +344,7 @@ class _Run:
 def _outcome(work: Callable[[Path], T], path: Path) -> Outcome[T]:
     try:
         return Outcome(work(path))
-    except (EigenshapeError, OSError) as err:
+    except (CerteigError, OSError) as err:
         return Outcome(error=str(err))
 
 

@@ -1,4 +1,4 @@
-"""Landmarks carried from some specimens of a collection to all."""
+"""Landmarks transferred from some specimens of a collection to all."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._files import as_path, replace_file
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.files import as_path, replace_file
+from certeig.kit.threads import one_blas_thread
 from eigenshape.collections.collection import Collection
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.measure import mean_radius
@@ -45,22 +45,22 @@ class CarriedLandmarks(ReadOnly):
         Of the s specimens and of the k landmarks.
     points : (s, k, 3) float
         In each specimen's own frame and unit: the given landmarks of labelled specimens, and those
-        carried to all others, on their surfaces.
+        transferred to all others, on their surfaces.
     spread : (s, k) float
         Expected error of each, the root of its mean square, in length; 0 for given ones. It is what
-        is found when the landmarks of each labelled specimen are carried from all others.
+        is found when the landmarks of each labelled specimen are transferred from all others.
     doubtful : (s, k) bool
         Where a person should look: the specimen has no such place; a given landmark lies far from
         the surface, from the map, or from where other specimens put it, or all of the specimen lie
-        as landmarks of another one do; or nothing but doubtful ones was carried there.
+        as landmarks of another one do; or nothing but doubtful ones was transferred there.
     given : (s, k) bool
         Which were given.
     distance : (s, k) float
-        Of a given landmark from the surface; of a carried one the distance by which it was
+        Of a given landmark from the surface; of a transferred one the distance by which it was
         moved to the surface. In length.
     disagreement : (s, k) float
         Distance of a given landmark, in length, within which half of the other labelled specimens
-        put it. NaN where it is carried, or no other specimen has it.
+        put it. NaN where it is transferred, or no other specimen has it.
     confidence : (s, k) float
         That of the map at the landmark, 0 to 1, as of `Collection`.
 

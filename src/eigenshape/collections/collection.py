@@ -7,9 +7,10 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError, InvalidShapeError, StoreError
-from eigenshape._files import as_path, content_digest, replace_file
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.files import as_path, content_digest, replace_file
+from eigenshape._errors import InvalidShapeError, StoreError
 from eigenshape.collections.alignment import MIRROR, Side
 from eigenshape.collections.parts import SPECIMENS, read_state
 from eigenshape.collections.spread_points import main_pieces

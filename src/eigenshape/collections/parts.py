@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from certeig.kit.files import remove_leftovers
 from eigenshape import _sealed
 from eigenshape._errors import StoreError
-from eigenshape._files import remove_leftovers
 from eigenshape._sealed import DamagedFileError, insert_row, read_table, reading, writing
 from eigenshape.collections.surface_fit import SurfaceFit
 from eigenshape.geometry.mesh import TriangleMesh

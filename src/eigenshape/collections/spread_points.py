@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.distances.crossing_loops import curve_places
 from eigenshape.geometry.measure import area_vectors, face_areas

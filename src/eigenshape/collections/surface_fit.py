@@ -10,9 +10,10 @@ from jaxtyping import Float, Int
 from scipy.linalg import solve
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import EigenshapeError, InvalidShapeError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import CerteigError
+from certeig.kit.threads import one_blas_thread
+from eigenshape._errors import InvalidShapeError
 from eigenshape.collections.alignment import (
     MIRROR,
     ON_SURFACE,
@@ -60,7 +61,7 @@ LEVELS: Levels = (
 SLIDE = 0.2
 SPACING = 0.7  # of centers of displacements, in widths
 FAR = 0.05  # gap at which the confidence is at most a quarter
-ON_RIM = 1e-9  # weight of inner vertices below which a point lies on the rim of a surface
+ON_RIM = 1e-9  # weight of inner vertices below which a point lies on the boundary of a surface
 UNMATCHED = 0.1  # distance from which a point has no counterpart
 # Root mean square of the logarithms by which edges at a vertex became longer, from which it has no
 # counterpart: skulls and creatures in other poses have at most 0.2 (0.26 if 40 % are cut off), a side
@@ -91,7 +92,7 @@ class SurfaceFit(ReadOnly):
         Distance of each to the target, in length of the target.
     confidence : (n,) float
         From 1, on the target and facing the same way, to 0: min(2 cos⁺, 1) / (1 + (gap / 0.05 r)²)²,
-        with the angle of the normals there and the root mean square radius r. 0 beyond a rim of the
+        with the angle of the normals there and the root mean square radius r. 0 beyond a boundary of the
         target, or where the source is folded.
     gap : float
         0 to 1: the mean of d² / (d² + (0.1 r)²), with the distance d of the target's points to the
@@ -99,7 +100,7 @@ class SurfaceFit(ReadOnly):
     strain : float
         Standard deviation of the logarithms by which edges became longer, where nothing is missing.
     missing : float
-        Share of the source's area that is beyond a rim of the target, more than 0.1 r away, or
+        Share of the source's area that is beyond a boundary of the target, more than 0.1 r away, or
         folded: lengths changed by a third.
     excess : float
         Share of the target's area that is more than 0.1 r from the source.
@@ -234,7 +235,7 @@ def _posed_fits(
 ) -> list[SurfaceFit]:
     """Bend a source, or its mirror image, onto a target in another pose, from where `match_shapes` puts it."""
     fits = []
-    with suppress(EigenshapeError):  # what it refuses, such as needles, is no fault here
+    with suppress(CerteigError):  # what it refuses, such as needles, is no fault here
         whole = prepare_target(target)
         for mirrored in sides:
             if mirrored:
@@ -309,7 +310,7 @@ def bend_onto(
     gaps = np.linalg.norm(nearest.points - moved, axis=1)
     normals = unit_vectors(area_vectors(target.vertices[target.faces[nearest.simplices]]))
     cosines = np.einsum("ni,ni->n", mean_normals(bent), normals)
-    # What is nearest to a rim is beyond it.
+    # What is nearest to a boundary is beyond it.
     inside = ~np.isin(np.arange(target.n_vertices), boundary_vertices(target))
     beyond = np.sum(nearest.weights * inside[target.faces[nearest.simplices]], axis=1) < ON_RIM
     confidence = np.clip(2 * cosines, 0, 1) * (1 + (gaps / (FAR * size)) ** 2) ** -2

@@ -8,11 +8,11 @@ from itertools import chain
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arguments import describe_value, require_type
-from eigenshape._arrays import ReadOnly, record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import Integer
+from certeig.kit.arguments import describe_value, require_type
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import Integer
 from eigenshape.deformation.region import Region, region_mask, require_boundary
 from eigenshape.deformation.region_patches import Patch, split_region
 from eigenshape.deformation.rig import EigenRig

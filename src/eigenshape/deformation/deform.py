@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.typing import Integer
 from eigenshape.deformation.binding import Binding, bind, pull_binding
 from eigenshape.deformation.handles import Handle, require_handle, require_handles
 from eigenshape.deformation.modes import Mode, require_mode

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.deformation.rigidity import edge_weights, fit_turns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, bounding_box, edge_lengths

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import describe_value, require_each
-from eigenshape._arrays import ReadOnly, record, whole_number
-from eigenshape._errors import FileFormatError, InvalidParameterError
+from certeig.kit.arguments import describe_value, require_each
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape.deformation.binding import bind
 from eigenshape.deformation.deform import bend
 from eigenshape.deformation.handles import Handle, Rotation, Translation, require_handle

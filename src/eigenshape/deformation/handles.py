@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, finite_number, finite_values, freeze, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.arrays import ReadOnly, finite_number, finite_values, freeze, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 
 # Sine over cosine of two directions, below which they are parallel or opposite: far above the
 # rounding of a cross product, and far below any angle that a hand can drag.

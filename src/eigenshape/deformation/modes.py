@@ -2,7 +2,7 @@
 
 from typing import Literal, cast, get_args
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 
 Mode = Literal["graded", "uncrossed", "thesis"]
 

@@ -4,10 +4,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from eigenshape._arrays import real_numbers, whole_number, whole_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import real_numbers, whole_number, whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.deformation.distortion import require_poses
 from eigenshape.deformation.rigidity import edge_weights, fit_turns, free_part
 from eigenshape.deformation.rigidity_loops import turn_edges

@@ -8,8 +8,8 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import describe_value
-from eigenshape._arrays import (
+from certeig.kit.arguments import describe_value
+from certeig.kit.arrays import (
     ReadOnly,
     as_array,
     freeze,
@@ -18,8 +18,8 @@ from eigenshape._arrays import (
     record,
     whole_numbers,
 )
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape.deformation.handles import as_vector
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.geodesic import geodesic_distances

@@ -7,12 +7,13 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import cho_solve
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, freeze, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import finite_rows
 from eigenshape.deformation.rigidity import EdgeWeights, edge_weights
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh

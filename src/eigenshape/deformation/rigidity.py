@@ -8,14 +8,15 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.sparse.symmetric_factor import SymmetricFactor, factor_matrix
+from eigenshape._errors import InvalidShapeError
 from eigenshape.deformation.rigidity_loops import fit_rotations, turn_edges
 from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
-from eigenshape.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 
 Points = Float[np.ndarray, "n 3"]
 Step = tuple[Points, Points]  # change of the free vertices in a round, and their new places

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import html_repr
+from certeig.kit.typing import Integer
 from eigenshape.deformation.binding import Binding, bind
 from eigenshape.deformation.deform import bend, move_by_shares
 from eigenshape.deformation.edits import Edit, Move, apply_edit, carry_edit
@@ -363,7 +363,7 @@ def replay(
     edits : sequence of Edit
     source : MeshLike, optional
         The undeformed mesh on which the edits were made, if it is not the mesh of the rig. Regions
-        are carried over by nearest vertices.
+        are transferred by nearest vertices.
 
     Returns
     -------

@@ -6,9 +6,9 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.threads import one_blas_thread
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset, require_handles
 from eigenshape.deformation.rig import eigen_skeleton, project_on_modes

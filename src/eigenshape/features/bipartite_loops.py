@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Int, Int64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 Indices = Int64[np.ndarray, " _"]
 Rows = Int64[np.ndarray, " n"]

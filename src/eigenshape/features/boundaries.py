@@ -5,8 +5,8 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, record
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import positive_values, record
 from eigenshape.features.segmentation import Segmentation, adjacent_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facet_lists import label_components

@@ -1,12 +1,13 @@
-"""Regions of like values on a surface, and the means of the values over them."""
+"""Regions of similar values on a surface, and the means of the values over them."""
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, real_numbers, record, require_finite_rows
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import ReadOnly, real_numbers, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import require_finite_rows
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.requirements import require_sound
@@ -52,7 +53,7 @@ class CondensedFeatures(ReadOnly):
 
 @one_blas_thread()
 def condense(mesh: MeshLike, values: ArrayLike, tolerance: float = LOST) -> CondensedFeatures:
-    """Join neighboring vertices with like values into regions, and average over these.
+    """Join neighboring vertices with similar values into regions, and average over these.
 
     With the logarithm of a heat kernel signature these are the condensed features of connectomics
     (Pedigo and others 2025), from which spines, shafts and cell bodies of neurons are told apart:

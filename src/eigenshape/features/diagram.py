@@ -3,11 +3,12 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record, vertex_values
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import Shown
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import Shown
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import vertex_values
 from eigenshape.features.least_matching import least_distance, least_perfect
 from eigenshape.features.loops import extended_loops
 from eigenshape.features.merge_loops import join_points

@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
+from certeig.kit.memory import available_memory, require_memory
 from eigenshape._errors import InvalidShapeError
-from eigenshape._memory import available_memory, require_memory
 from eigenshape.features.bipartite_loops import match_rows
 
 Points = Float[np.ndarray, "_ d"]

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import breadth_first_order
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape.features.merge_loops import spanning_forest
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.facets import facet_table

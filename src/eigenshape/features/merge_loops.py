@@ -8,7 +8,7 @@ few sides at one vertex must be sorted.
 import numpy as np
 from jaxtyping import Bool, Int, Int32, Int64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 Corners = Int32[np.ndarray, "f 3"]
 FaceNumbers = Int32[np.ndarray, " f"]

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
+from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import vertex_values
-from eigenshape._typing import ArrayLike
 from eigenshape.features.merge_loops import file_sides, find_corners, join_faces
 from eigenshape.features.region_tree import MergeTree, merge_regions, number_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh

@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.arrays import ReadOnly, freeze, real_numbers, whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.simplices import dual_volumes
 

@@ -6,7 +6,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape.features.contrast import FINE_CONTRAST, PART_CONTRAST
 from eigenshape.features.part_merging import (
     PART_TIME,

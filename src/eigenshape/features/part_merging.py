@@ -8,9 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import positive_values
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.region_tree import PartTree, number_regions
 from eigenshape.features.segmentation import Segmentation, adjacent_parts, segment

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, finite_values, record, whole_number
-from eigenshape._progress import Progress
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import ReadOnly, finite_values, record, whole_number
+from certeig.kit.progress import Progress
+from certeig.kit.threads import one_blas_thread
 from eigenshape.features.boundaries import CONCAVITY, move_boundaries, smooth_boundaries
 from eigenshape.features.contrast import FINE_CONTRAST, contrast_at
 from eigenshape.features.part_contrast import weigh_parts

@@ -3,9 +3,10 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, face_labels, record, whole_number
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._arrays import face_labels
 from eigenshape.features.region_tree import MergeTree, PartTree, merge_regions
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.topology import edge_table, face_pairs

@@ -4,9 +4,10 @@ import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, record, whole_number
+from certeig.kit.arrays import ReadOnly, freeze, record, whole_number
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.simplicial import Mesh
 
 

@@ -7,10 +7,11 @@ from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import attribute_of, describe_value, require_choice
-from eigenshape._arrays import as_array, finite_rows, index_rows
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import attribute_of, describe_value, require_choice
+from certeig.kit.arrays import as_array
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import finite_rows, index_rows
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.polygons import triangulate_polygons

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, record
+from certeig.kit.arrays import ReadOnly, record
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import scale_to_unit, vertex_normals

@@ -5,9 +5,10 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import ReadOnly, finite_rows, record
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 
 Points = Float[np.ndarray, "n d"]

@@ -5,7 +5,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, half_edges

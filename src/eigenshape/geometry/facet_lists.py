@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import ReadOnly, record
+from certeig.kit.arrays import ReadOnly, record
 
 # The corners of a facet are packed into one integer while that stays below this bound: sorting
 # integers is several times as fast as sorting rows.

@@ -7,9 +7,10 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, index_rows, record
+from certeig.kit.arrays import ReadOnly, freeze, record
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import finite_rows, index_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape._typing import ArrayLike
 from eigenshape.geometry.facet_lists import FacetTable, list_facets, state_without_facets
 
 MOST_DRAWN = 200_000  # faces of a mesh that a notebook shows as a picture

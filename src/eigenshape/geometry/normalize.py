@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import cdist
 
-from eigenshape._arguments import require_choice
+from certeig.kit.arguments import require_choice
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import scale_to_unit, triangle_areas

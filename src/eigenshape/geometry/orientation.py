@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from eigenshape._threads import one_blas_thread
+from certeig.kit.threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import turn_faces
 from eigenshape.geometry.measure import enclosed_volume, mean_normals, scale_to_unit, triangle_areas

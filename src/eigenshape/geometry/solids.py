@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape._typing import ArrayLike
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import SimplicialMesh
 

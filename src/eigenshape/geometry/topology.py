@@ -4,8 +4,9 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.facet_lists import label_components, shared_facets
 from eigenshape.geometry.facets import boundary_facets, corner_fans, facet_table

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy.sparse import csr_array, eye_array
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._text import html_repr
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.text import html_repr
 from eigenshape.geometry.measure import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import number_places
@@ -51,7 +51,7 @@ class Material:
 class MeshAttributes(ReadOnly):
     r"""What a mesh file holds besides positions and faces.
 
-    `read_mesh(path, attributes=True)` returns it, `carry_attributes` carries it to a repaired mesh,
+    `read_mesh(path, attributes=True)` returns it, `carry_attributes` transfers it to a repaired mesh,
     and `write_mesh(mesh, path, attributes=...)` writes it.
 
     Attributes

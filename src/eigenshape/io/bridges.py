@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError, InvalidShapeError
+from certeig.kit.errors import FileFormatError
+from certeig.kit.typing import Integer
+from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
-from eigenshape._typing import Integer
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh

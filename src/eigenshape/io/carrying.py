@@ -1,4 +1,4 @@
-"""Attributes carried from a mesh to a repaired or decimated one."""
+"""Attributes transferred from a mesh to a repaired or decimated one."""
 
 from dataclasses import replace
 from typing import Any

@@ -4,9 +4,9 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from eigenshape._arguments import require_each
-from eigenshape._errors import FileFormatError
-from eigenshape._files import as_path, read_regular, replacing
+from certeig.kit.arguments import require_each
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import as_path, read_regular, replacing
 from eigenshape.deformation.edits import Edit, edits_from_json, edits_to_json
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from eigenshape._arguments import require_unicode
-from eigenshape._arrays import freeze
-from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape._files import as_path, replace_file
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_unicode
+from certeig.kit.arrays import freeze
+from certeig.kit.errors import FileFormatError, InvalidParameterError
+from certeig.kit.files import as_path, replace_file
+from certeig.kit.typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh

@@ -11,10 +11,10 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from eigenshape._arrays import whole_number
-from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape._files import as_path, read_regular, require_lines
-from eigenshape._typing import Integer
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import FileFormatError, InvalidParameterError
+from certeig.kit.files import as_path, read_regular, require_lines
+from certeig.kit.typing import Integer
 from eigenshape._workers import Item
 from eigenshape.io.formats.registry import (
     GZ,

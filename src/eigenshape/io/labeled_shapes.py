@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._errors import FileFormatError
-from eigenshape._files import as_path, read_regular, replace_file
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import as_path, read_regular, replace_file
 from eigenshape.io.formats.numbers import INT64, lines_of, whole, whole_table
 from eigenshape.io.formats.ply import parse_labels
 from eigenshape.io.formats.registry import MESH_FORMATS

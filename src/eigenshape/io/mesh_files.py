@@ -8,9 +8,10 @@ from typing import Literal, overload
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from eigenshape._arguments import require_type
-from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidShapeError
-from eigenshape._files import as_path, replace_file
+from certeig.kit.arguments import require_type
+from certeig.kit.errors import FileFormatError, InvalidParameterError
+from certeig.kit.files import as_path, replace_file
+from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import FileLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh

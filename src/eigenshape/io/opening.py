@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from eigenshape._arrays import record
-from eigenshape._errors import FileFormatError, InvalidParameterError, InvalidShapeError
-from eigenshape._files import as_path, read_regular
+from certeig.kit.arrays import record
+from certeig.kit.errors import FileFormatError, InvalidParameterError
+from certeig.kit.files import as_path, read_regular
+from eigenshape._errors import InvalidShapeError
 from eigenshape._typing import BinaryFile, FileLike
 from eigenshape.io.formats.first_bytes import recognize, require_content
 from eigenshape.io.formats.numbers import (

@@ -3,8 +3,8 @@
 import warnings
 from pathlib import Path
 
-from eigenshape._errors import FileFormatError
-from eigenshape._files import as_path, replace_file
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import as_path, replace_file
 from eigenshape.features.parcellation import Parcellation, require_parcels
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.io.field_files import structure_named

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from eigenshape._arguments import require_type
+from certeig.kit.arguments import require_type
+from certeig.kit.files import as_path, replace_file
+from certeig.kit.typing import Integer
 from eigenshape._errors import InvalidShapeError
-from eigenshape._files import as_path, replace_file
-from eigenshape._typing import FileLike, Integer
+from eigenshape._typing import FileLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import repair

@@ -28,10 +28,10 @@ def read_surface(
     file_format: str | None = None,
     scene: str | int | None = None,
 ) -> RepairedMesh[TriangleMesh]:
-    r"""Read a mesh, or make a surface of tetrahedra, points or a frame of a depth camera; repair it.
+    r"""Read a mesh, or make a surface of tetrahedra, points or a depth scan; repair it.
 
-    A frame is a PCD file with more than one row: pixels that are neighbors on its grid and in space
-    are joined, as a camera at the origin sees them, and the surface faces the camera. Points
+    A depth scan is a PCD file with more than one row: pixels that are neighbors on its grid and in
+    space are joined, as a camera at the origin sees them, and the surface faces the camera. Points
     without an order become the surface whose normals fit theirs (Poisson reconstruction). It is
     closed where they leave only small holes, and rounds off what is thinner than a few times the
     distance between them. Points that are not finite, with the faces at them, and all but the

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Shaped
 
-from eigenshape._arrays import freeze
+from certeig.kit.arrays import freeze
 from eigenshape.io.formats.registry import VOLUME_FORMATS, format_of
 from eigenshape.io.opening import naming, open_file
 

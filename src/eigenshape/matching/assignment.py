@@ -37,7 +37,7 @@ def assign_far_points(
     """
     if len(part.points) < N_FAR:
         return []
-    # Points that are far from each other and, if possible, from the rim
+    # Points that are far from each other and, if possible, from the boundary
     inside = part.weights.min(axis=1).astype(np.float64)
     found = [int((inside * part.between.mean(axis=1)).argmax())]
     while len(found) < N_FAR:

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.special import expit
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape.geometry.measure import area_vectors, face_areas, triangle_areas
 from eigenshape.geometry.simplices import at_points
 from eigenshape.geometry.topology import edge_table, neighbor_links

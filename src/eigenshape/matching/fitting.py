@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor
 from scipy.linalg.lapack import dpotrs
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.matching.fitting_loops import add_pulls, add_tensions, turn_frames
 from eigenshape.matching.match_loops import nearest_rows

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from eigenshape._kernels import Out, kernel, math_functions
+from certeig.kit.kernels import Out, kernel, math_functions
 
 CIRCLE: Any = math_functions("cos", "sin")
 

@@ -6,10 +6,10 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress
+from certeig.kit.threads import one_blas_thread
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
@@ -67,7 +67,7 @@ class FusedScan(ReadOnly):
 
 @one_blas_thread()
 def fuse_scans(scans: Sequence[MeshLike], *, progress: Progress | None = None) -> FusedScan:
-    """Join scans of one rigid shape, such as frames of a depth camera, to one surface.
+    """Join scans of one rigid shape, such as depth scans, to one surface.
 
     Each two scans are registered (`register_scans`). The pairs with the best scores that connect
     most scans place them, and the surface that fits the points and normals of all is computed

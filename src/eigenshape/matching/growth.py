@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from eigenshape._threads import map_in_threads
+from certeig.kit.threads import map_in_threads
 from eigenshape.geometry.measure import edge_lengths
 from eigenshape.matching.assignment import N_FAR, assign_far_points
 from eigenshape.matching.evidence import FittedMap

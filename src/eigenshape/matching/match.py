@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress, silent
-from eigenshape._threads import map_in_threads, one_blas_thread
+from certeig.kit.arrays import record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.threads import map_in_threads, one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -74,8 +74,9 @@ def match_shapes(
     a scanner saw from one side, or a whole shape. Nothing is trained and no landmarks are needed:
 
     1. Geodesic discs around 300 points of the part and 500 of the whole are described
-       (`extract_patches`); each point has five candidate partners. If the part has a rim, its discs
-       are also compared with those of what eight viewpoints see of the whole, which end at rims, too.
+       (`extract_patches`); each point has five candidate partners. If the part has a boundary,
+       its discs are also compared with discs of what eight viewpoints see of the whole, which end at
+       boundaries, too.
     2. Two candidate pairs support each other if their distances along the surface agree, and the
        turn from the direction on the part to that on the whole is the same as for other pairs: the
        leading fixed point of x_i ← |Σ_j c_ij x_j|, with complex c_ij. Mirror images get no support,
@@ -134,7 +135,7 @@ def match_shapes(
     Nothing is found where part and whole have nothing in common, but a map is returned all the
     same: look at `confidence`. If the shape can be turned into itself, there are several maps:
     look at `n_equally_good`. A piece of more than 16,000 vertices or with needles is matched by way
-    of a copy with fewer vertices, and the map is carried over. A part of 5,000 vertices takes 2 to 4 s on one
+    of a copy with fewer vertices, and the map is transferred. A part of 5,000 vertices takes 2 to 4 s on one
     core, by the machine.
 
     Examples

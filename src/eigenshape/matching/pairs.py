@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Complex64, Float, Int
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.matching.match_loops import couple_pairs, nearest_rows, place_by_distances
 from eigenshape.matching.surface import Surface, View
@@ -11,7 +11,8 @@ from eigenshape.matching.surface import Surface, View
 # All lengths are in units of `Surface` unless stated.
 N_CANDIDATES = 5  # partners that are tried for each point; ten found nothing more
 # Discs of views are one of eight, so that one of them is near by chance: their differences count so
-# many times. Near a rim both discs are cut alike, and weigh more than the product of their weights.
+# many times. Near a boundary both discs are cut alike, and weigh more than the product of their
+# weights.
 FOREIGN, RIM_SHARE = 1.2, 0.5
 # Share of a distance by which two pairs may disagree and still support each other
 DISTANCE_SLACK = 0.4
@@ -63,7 +64,8 @@ class Pairs:
 def patch_differences(part: Surface, whole: Surface) -> Float[np.ndarray, "m k"]:
     """Return weighted mean squared differences of whitened numbers, in sums over 20 axes.
 
-    A part with a rim is compared with views of the whole, too, whose discs end at rims as well.
+    A part with a boundary is compared with views of the whole, too, whose discs end at boundaries
+    as well.
     """
     found = _differences(part, whole, 1.0)
     if part.weights.min() == 1:

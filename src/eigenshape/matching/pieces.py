@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import ReadOnly, record
+from certeig.kit.arrays import ReadOnly, record
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import edge_lengths, face_areas, mean_normals, surface_area
 from eigenshape.geometry.mesh import TriangleMesh

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from eigenshape._arguments import require_type
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_type
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
 from eigenshape.deformation.pose_transfer import transfer_deformation
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import surface_area

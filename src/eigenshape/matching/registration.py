@@ -8,10 +8,11 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_rows, record
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import finite_rows
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import mean_normals, nearest_rotations
 from eigenshape.geometry.mesh import TriangleMesh

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_loops
@@ -22,7 +22,8 @@ MOST_AREA = 1.5
 # Two complete shapes whose lengths differ by less, by the root of their areas, are taken as one
 # individual in one unit: poses of one cat differ by up to 5 %, those of a centaur by 6 %.
 SAME_SIZE = 1.1
-# A shape is complete if its rims are as long as those of discs with this share of its area in all.
+# A shape is complete if its boundaries are as long as the boundaries of discs with this share of its
+# area in all.
 LARGEST_HOLES = 0.05
 # Sizes of the part that are tried, as shares of the longest side of the whole's box
 SIZES = 1.25 ** np.arange(1, -6, -1.0)
@@ -80,7 +81,7 @@ def choose_factor(
 
 
 def is_complete(mesh: TriangleMesh) -> bool:
-    """Tell whether a surface has no rims, or so short ones that little of it is missing."""
+    """Tell whether a surface has no boundaries, or so short ones that little of it is missing."""
     rims = [mesh.vertices[loop] for loop in boundary_loops(mesh)]
     lengths = [float(np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1).sum()) for rim in rims]
     area_of_discs = sum(length**2 for length in lengths) / (4 * np.pi)

@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy.typing import DTypeLike, NDArray
 
-from eigenshape._arrays import ReadOnly, as_array, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import ReadOnly, as_array, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 
 
 @record

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._threads import map_in_threads
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.threads import map_in_threads
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.matching.match_loops import nearest_face_points

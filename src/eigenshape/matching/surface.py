@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Complex64, Float, Float32, Int
 
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._threads import map_in_threads
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.threads import map_in_threads
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh

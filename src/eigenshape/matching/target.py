@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import record
-from eigenshape._text import html_repr
-from eigenshape._threads import map_in_threads, one_blas_thread
+from certeig.kit.arrays import record
+from certeig.kit.text import html_repr
+from certeig.kit.threads import map_in_threads, one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.geodesic import unchecked_waves
 from eigenshape.geometry.measure import mean_normals

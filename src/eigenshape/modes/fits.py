@@ -4,11 +4,12 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import point_functions, real_numbers, vertex_values
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import real_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import point_functions, vertex_values
 from eigenshape.geometry.simplices import size_one
 from eigenshape.spectral.spectrum import Spectrum
 

@@ -5,12 +5,13 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_choice, require_type
-from eigenshape._arrays import point_functions, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._memory import require_memory
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_choice, require_type
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.memory import require_memory
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import point_functions
 from eigenshape.modes.fits import size_one_maps
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, require_lowest
 from eigenshape.spectral.tools.filters import project

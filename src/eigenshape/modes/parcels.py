@@ -7,9 +7,9 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record, whole_number
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.typing import Integer
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 from eigenshape.spectral.solve import solve_spectrum
 

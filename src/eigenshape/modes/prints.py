@@ -5,10 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type, require_unicode
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_type, require_unicode
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import Integer
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.spectral.comparison.eigenvalues import shape_dna
 

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from eigenshape._arguments import require_type, require_unicode
-from eigenshape._arrays import real_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type, require_unicode
+from certeig.kit.arrays import real_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape.calculus.voxels import as_affine, different_values, voxel_surface
 from eigenshape.geometry.mesh import TriangleMesh
 

@@ -4,16 +4,12 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import (
-    MOST_STEPS,
-    positive_values,
-    real_numbers,
-    require_finite_rows,
-)
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import positive_values, real_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import MOST_STEPS, require_finite_rows
 from eigenshape.spectral.spectrum import Spectrum
 
 # Of the balloon model (Friston and others 2000; Pang and others 2023): decay of the signal in 1/s,

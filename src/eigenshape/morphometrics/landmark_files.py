@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from eigenshape._arguments import require_type
-from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape._files import as_path, read_regular, replace_file, require_lines
+from certeig.kit.arguments import require_type
+from certeig.kit.errors import FileFormatError, InvalidParameterError
+from certeig.kit.files import as_path, read_regular, replace_file, require_lines
 from eigenshape.morphometrics.landmark_parsers import (
     Parsed,
     Table,

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.morphometrics.landmarks import Landmarks
 
 Table: TypeAlias = dict[str, Landmarks]

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, real_numbers, whole_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, freeze, real_numbers, whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 
 SMALLEST, LARGEST = (
     1e-120,

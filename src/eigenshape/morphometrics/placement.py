@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.measure import edge_lengths, mean_radius
 from eigenshape.geometry.mesh import TriangleMesh

@@ -6,10 +6,10 @@ from scipy.interpolate import RBFInterpolator
 from scipy.linalg import null_space
 from scipy.spatial.distance import cdist
 
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.morphometrics.landmarks import complete_points

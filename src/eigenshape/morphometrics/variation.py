@@ -6,18 +6,18 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import permutation_test
 
-from eigenshape._arrays import (
+from certeig.kit.arrays import (
     ReadOnly,
     as_array,
     positive_values,
     real_numbers,
     record,
-    require_finite_rows,
     whole_numbers,
 )
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import require_finite_rows
 from eigenshape.morphometrics.landmarks import Specimens, as_configurations, complete_points
 from eigenshape.morphometrics.procrustes import fit_procrustes
 from eigenshape.morphometrics.splines import fit_spline

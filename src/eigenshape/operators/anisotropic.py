@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_choice
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import require_choice
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import surface_area, vertex_normals
 from eigenshape.geometry.requirements import require_sound

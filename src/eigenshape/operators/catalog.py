@@ -9,8 +9,9 @@ from typing import Any
 
 import scipy.sparse as sp
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import Shown
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import Shown
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.mesh import TriangleMesh

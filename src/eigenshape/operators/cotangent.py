@@ -4,10 +4,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arguments import require_choice
-from eigenshape._arrays import positive_values
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_choice
+from certeig.kit.arrays import positive_values
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.measure import scale_to_unit, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh

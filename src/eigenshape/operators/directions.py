@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, record
+from certeig.kit.arrays import ReadOnly, record
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.mesh import TriangleMesh

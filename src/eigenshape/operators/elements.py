@@ -14,8 +14,8 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import freeze
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import freeze
+from certeig.kit.threads import one_blas_thread
 from eigenshape.geometry.simplices import (
     barycentric_gradients,
     in_length,

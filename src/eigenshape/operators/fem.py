@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import whole_number
-from eigenshape._typing import Integer
+from certeig.kit.arrays import whole_number
+from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.requirements import require_sound
@@ -50,8 +50,8 @@ def fem_laplacian(mesh: MeshLike, order: Integer = 2) -> Laplacian:
     >>> import eigenshape as es
     >>> square = es.shapes.grid(8, 8)
     >>> laplacian = es.operators.fem_laplacian(square, order=3)
-    >>> rim = es.operators.fem_boundary_nodes(square, order=3)
-    >>> es.solve_spectrum(laplacian, 1, fixed=rim).eigenvalues.round(3).tolist()
+    >>> boundary = es.operators.fem_boundary_nodes(square, order=3)
+    >>> es.solve_spectrum(laplacian, 1, fixed=boundary).eigenvalues.round(3).tolist()
     [19.739]
     """
     mesh = as_simplicial(mesh)
@@ -130,9 +130,9 @@ def fem_boundary_nodes(mesh: MeshLike, order: Integer = 2) -> Int[np.ndarray, " 
 
     >>> import eigenshape as es
     >>> square = es.shapes.grid(8, 8)
-    >>> rim = es.operators.fem_boundary_nodes(square, order=3)
+    >>> boundary = es.operators.fem_boundary_nodes(square, order=3)
     >>> laplacian = es.operators.fem_laplacian(square, order=3)
-    >>> drum = es.solve_spectrum(laplacian, 1, fixed=rim)
+    >>> drum = es.solve_spectrum(laplacian, 1, fixed=boundary)
     >>> (drum.eigenvalues / 3.14159265**2).round(4).tolist()
     [2.0]
     """

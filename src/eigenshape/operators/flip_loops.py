@@ -8,7 +8,7 @@ same.
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 Lengths = Float64[np.ndarray, " n"]
 Sides = Int64[np.ndarray, " n"]

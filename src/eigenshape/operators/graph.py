@@ -5,14 +5,16 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 
-from eigenshape._arguments import require_choice
-from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
+from certeig.kit.arguments import require_choice
+from certeig.kit.errors import InvalidParameterError
+from certeig.matrices import require_square
+from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.simplices import in_length, size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import adjacency_matrix
-from eigenshape.operators.laplacian import Laplacian, require_square
+from eigenshape.operators.laplacian import Laplacian
 
 Kind = Literal["combinatorial", "weighted", "normalized"]
 EdgeWeights = Literal["unit", "inverse_length"]

@@ -5,33 +5,17 @@ whole boundary gives the Dirichlet condition, fixing a part of it the mixed one.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Int
+from jaxtyping import Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, as_array, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr
-from eigenshape._typing import ArrayLike
-
-
-def freeze_sparse(matrix: sp.csr_array) -> sp.csr_array:
-    """Return a copy with sorted indices whose arrays are read-only."""
-    copy = matrix.copy()
-    copy.sum_duplicates()  # sorts, too: SciPy would do so later in place, where it no longer can
-    for part in (copy.data, copy.indices, copy.indptr):
-        part.flags.writeable = False
-    return copy
-
-
-# Largest difference of W_ij and W_ji, relative to the largest entry, that is accepted as rounding.
-ASYMMETRY = 1e-12
-# Row sums up to this share of the absolute row sums count as zero: those of stiffness matrices are
-# zero up to the rounding of their entries.
-ZERO_ROW_SUM = 1e-12
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import html_repr
+from certeig.kit.typing import ArrayLike
+from certeig.matrices import as_symmetric, require_points
 
 
 @dataclass(frozen=True)
@@ -163,16 +147,6 @@ def with_mass_floor(laplacian: Laplacian, floor: float) -> Laplacian:
     return laplacian
 
 
-def find_zero_row_sums(matrix: sp.sparray) -> Bool[np.ndarray, " n"]:
-    """Return for each row whether it sums to zero, up to rounding.
-
-    Constants on a component have no energy if all its rows do. Each row is compared with its own
-    entries: beside one stiff edge, the rows at a fixed boundary are small and not zero.
-    """
-    sums, sizes = np.abs(matrix.sum(axis=1)), abs(matrix).sum(axis=1)
-    return sums <= ZERO_ROW_SUM * sizes
-
-
 def dirichlet_laplacian(
     laplacian: Laplacian, fixed: ArrayLike
 ) -> tuple[Laplacian, Int[np.ndarray, " free"]]:
@@ -206,8 +180,8 @@ def dirichlet_laplacian(
     --------
     >>> import eigenshape as es
     >>> square = es.shapes.grid(3, 3)
-    >>> rim = es.geometry.boundary_vertices(square)
-    >>> inner, free = es.operators.dirichlet_laplacian(es.cotangent_laplacian(square), rim)
+    >>> boundary = es.geometry.boundary_vertices(square)
+    >>> inner, free = es.operators.dirichlet_laplacian(es.cotangent_laplacian(square), boundary)
     >>> inner.n_points, free.tolist()
     (4, [5, 6, 9, 10])
     """
@@ -224,25 +198,6 @@ def dirichlet_laplacian(
     return with_mass_floor(replace(laplacian, **cut), laplacian.mass_floor), free
 
 
-def require_points(fixed: ArrayLike, n_points: int) -> Int[np.ndarray, " c"]:
-    """Return `fixed` as an array of points, in its order and with its duplicates.
-
-    Raise InvalidParameterError if an entry is no point number, or out of range.
-    """
-    points = np.atleast_1d(as_array(fixed, "fixed"))
-    if points.size and points.dtype.kind not in "iu":
-        raise InvalidParameterError(
-            f"fixed must be a list of point numbers; the type of its entries is {points.dtype}. "
-            f"Pass np.flatnonzero(mask) for a mask."
-        )
-    bad = np.flatnonzero((points < 0) | (points >= n_points))
-    if bad.size:
-        raise InvalidParameterError(
-            f"fixed must hold points 0..{n_points - 1}; entry {bad[0]} is {points[bad[0]]}."
-        )
-    return points.astype(np.int64)
-
-
 def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:
     """Raise an error if the matrices of an operator are not all of it.
 
@@ -255,34 +210,3 @@ def require_matrix(laplacian: Laplacian, name: str = "laplacian") -> None:
             "eigenvalues after they are computed. Build it with correct=None, or use its spectrum, "
             "es.solve_spectrum(laplacian, k)."
         )
-
-
-def require_square(matrix: Any, name: str, wanted: str = "a square sparse matrix") -> None:
-    """Raise an error if a value is not a square sparse matrix with rows."""
-    shape = np.shape(matrix)
-    if not sp.issparse(matrix) or len(shape) != 2 or shape[0] != shape[1] or not shape[0]:
-        raise InvalidParameterError(
-            f"{name} must be {wanted}; it is a {type(matrix).__name__} of shape {shape}."
-        )
-
-
-def as_symmetric(name: str, value: sp.sparray) -> sp.csr_array:
-    """Return a read-only copy of a matrix, or raise an error if it is not finite and symmetric."""
-    require_square(value, name)
-    matrix = freeze_sparse(sp.csr_array(value, dtype=np.float64))
-    bad = np.flatnonzero(~np.isfinite(matrix.data))
-    if bad.size:
-        entries = matrix.tocoo()
-        row, column = entries.row[bad[0]], entries.col[bad[0]]
-        raise InvalidParameterError(
-            f"{name} must be finite; entry ({row}, {column}) is {entries.data[bad[0]]} ({bad.size} such)."
-        )
-    differences = abs(matrix - matrix.T).tocoo()
-    worst = differences.data.argmax() if differences.nnz else 0
-    if differences.nnz and differences.data[worst] > ASYMMETRY * abs(matrix.data).max():
-        row, column = differences.row[worst], differences.col[worst]
-        raise InvalidParameterError(
-            f"{name} must be symmetric; entry ({row}, {column}) is {matrix[row, column]} "
-            f"and entry ({column}, {row}) is {matrix[column, row]}."
-        )
-    return matrix

@@ -3,8 +3,9 @@
 import numpy as np
 import scipy.sparse as sp
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._typing import Integer
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import Integer
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
 from eigenshape.geometry.requirements import require_different_simplices

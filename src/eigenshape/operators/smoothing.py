@@ -3,9 +3,11 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import positive_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import positive_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.sparse.symmetric_factor import factor_matrix
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.facets import boundary_facets
@@ -16,7 +18,6 @@ from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import boundary_vertices, neighbor_links
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.sparse.symmetric_factor import factor_matrix
 
 # Noise level at which `denoise` lets heat flow one mean edge length: that of Gaussian noise of a
 # quarter of an edge. A larger value smooths less.

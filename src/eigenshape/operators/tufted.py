@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import record
-from eigenshape._errors import ConvergenceError
+from certeig.kit.arrays import record
+from certeig.kit.errors import ConvergenceError
 from eigenshape.geometry.measure import unit_vectors
 from eigenshape.operators import flip_loops
 

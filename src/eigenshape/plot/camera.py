@@ -7,11 +7,11 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, real_numbers, record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, real_numbers, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import area_vectors, scale_to_unit, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.cm import ScalarMappable
 
-from eigenshape._arguments import require_type
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape.features.parcellation import Parcellation, require_parcels
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh

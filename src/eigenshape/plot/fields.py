@@ -10,16 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import (
-    face_labels,
-    finite_values,
-    real_numbers,
-    vertex_values,
-    whole_numbers,
-)
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import finite_values, real_numbers, whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import face_labels, vertex_values
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.plot.camera import Camera, Up, View, choose_camera

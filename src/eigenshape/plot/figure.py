@@ -8,10 +8,10 @@ from matplotlib import figure as matplotlib_figure
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from eigenshape._arguments import require_type
-from eigenshape._errors import InvalidParameterError
-from eigenshape._files import as_path, replacing
-from eigenshape._text import printable
+from certeig.kit.arguments import require_type
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.files import as_path, replacing
+from certeig.kit.text import printable
 
 SUFFIXES = (".png", ".svg", ".pdf")
 

@@ -6,10 +6,11 @@ import numpy as np
 from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull, QhullError
 
-from eigenshape._arrays import as_array, finite_rows, finite_values, real_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import literal
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import as_array, finite_values, real_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import literal
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import finite_rows
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import palette
 

@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Int
 from matplotlib.colors import to_hex
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import number_from_zero, whole_number
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import number_from_zero, whole_number
 from eigenshape.features.diagram import PersistenceDiagram, PersistencePairs
 from eigenshape.features.segmentation import Tree, merge_targets
 from eigenshape.plot.figure import Figure

@@ -4,9 +4,9 @@ import matplotlib as mpl
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import mean_normals

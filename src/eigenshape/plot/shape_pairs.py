@@ -8,8 +8,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
-from eigenshape._arguments import require_type
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import require_type
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.matching.shape_match import ShapeMatch

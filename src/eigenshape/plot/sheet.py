@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, record, vertex_values
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import vertex_values
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.plot.camera import Camera, Up, View, aim_camera, choose_camera

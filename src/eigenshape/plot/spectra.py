@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from matplotlib.ticker import MaxNLocator
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_values, positive_number, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import finite_values, positive_number, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import palette
 from eigenshape.spectral.bounds.brackets import Brackets

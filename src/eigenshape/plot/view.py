@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from certeig.kit.typing import ArrayLike
 from eigenshape._extras import import_extra
-from eigenshape._typing import ArrayLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.plot.camera import Up, View
 

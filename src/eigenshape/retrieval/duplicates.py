@@ -4,9 +4,9 @@ from functools import partial
 
 import numpy as np
 
-from eigenshape._arguments import require_type
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress
+from certeig.kit.arguments import require_type
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress
 from eigenshape.retrieval.index import ShapeIndex
 
 # Of five kinds of synthetic creatures and eight real shapes, with six views each: moved and scaled,
@@ -25,7 +25,7 @@ def find_duplicates(
     """Find pairs of shapes that are nearly the same, wherever they lie and whatever their size.
 
     Each shape is searched for in the index, as it is stored. Unlike those of `ShapeIndex.query`,
-    scores are not scaled by how isolated a shape is, so they depend on the two shapes alone.
+    scores are not corrected for hubness, so they depend on the two shapes alone.
 
     Parameters
     ----------

@@ -9,11 +9,11 @@ from pathlib import Path
 from shutil import rmtree
 from typing import Any
 
-from eigenshape._arguments import require_each, require_type
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.files import as_path
+from certeig.kit.text import html_repr, printable
+from certeig.kit.typing import Integer
 from eigenshape._errors import StoreError
-from eigenshape._files import as_path
-from eigenshape._text import html_repr, printable
-from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_store
 from eigenshape.retrieval.search.matches import Matches

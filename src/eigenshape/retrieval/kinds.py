@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import freeze
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import freeze
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.retrieval.heat.features import N_VIEWS, describe_views, find_heat_features

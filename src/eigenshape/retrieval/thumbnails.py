@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from eigenshape._threads import one_blas_thread
+from certeig.kit.threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.scans.raster import rasterize
 

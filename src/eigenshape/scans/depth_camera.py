@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record, whole_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import html_repr
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import html_repr
+from certeig.kit.typing import ArrayLike
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh

@@ -1,4 +1,4 @@
-"""Make a surface of a frame of a depth camera, along the grid of its pixels."""
+"""Make a surface of a depth scan, along the grid of its pixels."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -87,7 +87,7 @@ def pixel_faces(depth: Float[np.ndarray, "h w"], focal: float) -> Int[np.ndarray
 
 
 def triangulate_frame(points: Float[np.ndarray, "h w 3"]) -> RepairedMesh[TriangleMesh]:
-    """Connect the pixels of a frame whose camera was at the origin, across small gaps too.
+    """Connect the pixels of a depth scan whose camera was at the origin, across small gaps too.
 
     Each vertex is a measured point. The width of a pixel is measured: the median angle between the
     rays of neighboring pixels.

@@ -3,11 +3,12 @@
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, real_numbers, record, whole_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, real_numbers, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
 from eigenshape.geometry.measure import face_areas, mean_normals, scale_to_unit

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape.scans.raster_loops import fill_buffer
 
 # Twice the area, in square pixels, up to which a face is seen from its edge and covers no pixel.

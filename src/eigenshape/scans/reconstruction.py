@@ -27,7 +27,7 @@ MARGIN = 0.25  # free space around the points, in extents: the field is periodic
 SMOOTHING = 1.0  # standard deviation of the Gaussian that smooths the normals, in cells
 REACH = 3  # cells around a point in which there is a surface; it closes holes of this radius
 SUPPORT = 1.0  # cells between a face and the nearest point, above which the face has no support
-RIM_STEPS = 8  # averages that smooth the rim, each over a face and those around it
+RIM_STEPS = 8  # averages that smooth the boundary, each over a face and those around it
 # A vertex keeps this share of an edge of the grid away from its ends, so no triangle is a needle.
 CLOSEST_TO_CORNER = 0.15
 LEAST_SPREAD = 0.05  # of the nearest points in the second direction, relative to the first
@@ -98,7 +98,7 @@ def reconstruct_surface(
     reach = SUPPORT * np.clip((np.sqrt(areas) / cell)[nearest], 1, REACH)
     bare = (np.einsum("fi,fi->f", facing, normals[nearest]) < 0) | (distance > reach)
     if bare.any():
-        # Single points decide where the rim runs, so it is ragged: averages of what faces say over
+        # Single points decide where the boundary runs, so it is ragged: averages of what faces say over
         # their neighbors move it as mean curvature does (Merriman, Bence and Osher, 1992).
         corner_of = sp.csr_array(
             (

@@ -9,9 +9,9 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.linalg import splu
 
-from eigenshape._arrays import record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import adjacency_matrix, edge_table
 from eigenshape.shapes.creature_plans import CREATURES, PLANS

@@ -6,10 +6,10 @@ from itertools import permutations
 import numpy as np
 from scipy.spatial import Delaunay
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import positive_values, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import Integer
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 

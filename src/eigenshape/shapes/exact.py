@@ -9,10 +9,10 @@ from jaxtyping import Float
 from scipy.optimize import brentq
 from scipy.special import comb, eval_legendre, jn_zeros, jnp_zeros, spherical_jn
 
-from eigenshape._arrays import positive_values, real_numbers, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import positive_values, real_numbers, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.operators.choices import Condition
 
 # Nodes of the Gauss rule of `sphere_functional_eigenvalues`: enough for harmonics of degree 300

@@ -5,9 +5,10 @@ from math import isqrt
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import finite_rows, freeze, whole_number
+from certeig.kit.arrays import freeze, whole_number
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
-from eigenshape._typing import ArrayLike, Integer
 
 # Degrees up to 316. Beyond degree 1400 the functions divided by (1 - z²)^{m/2} overflow.
 MOST_HARMONICS = 10**5

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.interpolate import CubicHermiteSpline
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape.shapes.creature_plans import Limb, Swing
 
 # Limbs are blended where the difference of their distances is below this length (a creature is

@@ -4,10 +4,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_rows, whole_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import finite_rows
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.shapes.surfaces import icosphere

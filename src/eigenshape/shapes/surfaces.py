@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import positive_values, whole_number
+from certeig.kit.arrays import positive_values, whole_number
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.resolution.subdivision import subdivide
 

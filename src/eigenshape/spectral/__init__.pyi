@@ -1,6 +1,7 @@
 from .bounds.brackets import Brackets as Brackets
 from .bounds.brackets import bracket_eigenvalues as bracket_eigenvalues
 from .certificate import Certificate as Certificate
+from .certify import certify as certify
 from .comparison.angles import EigenspaceAngles as EigenspaceAngles
 from .comparison.angles import eigenspace_angles as eigenspace_angles
 from .comparison.eigenspaces import eigenspace_errors as eigenspace_errors
@@ -40,7 +41,6 @@ from .signatures.heat import scale_invariant_signature as scale_invariant_signat
 from .signatures.wave import default_energies as default_energies
 from .signatures.wave import wave_kernel_signature as wave_kernel_signature
 from .solve import solve_spectrum as solve_spectrum
-from .solver.certify import certify as certify
 from .spectrum import Spectrum as Spectrum
 from .tools.bundle import OperatorBundle as OperatorBundle
 from .tools.bundle import cache_operator_bundles as cache_operator_bundles

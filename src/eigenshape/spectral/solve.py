@@ -7,32 +7,33 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_choice, require_type
-from eigenshape._arrays import freeze, positive_number, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._files import as_path
-from eigenshape._progress import Progress, silent
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+import certeig
+from certeig.kit.arguments import require_choice, require_type
+from certeig.kit.arrays import freeze, positive_number, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.files import as_path
+from certeig.kit.progress import Progress, silent
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
+from certeig.solver.certified import certified_pairs
+from certeig.solver.certify import in_user_units
+from certeig.solver.eigenpairs import Pairs
+from certeig.solver.pencil import Pencil, to_user_vectors
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
-from eigenshape.spectral.certificate import Certificate
-from eigenshape.spectral.multilevel.approximate import (
-    approximate_pairs,
-    require_accuracy,
-    require_lumped,
-)
-from eigenshape.spectral.solver.cache import content_key, keep, load_kept, require_writable
-from eigenshape.spectral.solver.certified import certified_pairs
-from eigenshape.spectral.solver.certify import in_user_units
-from eigenshape.spectral.solver.eigenpairs import Pairs
-from eigenshape.spectral.solver.kernel_values import (
+from eigenshape.spectral.cache import content_key, keep, load_kept, require_writable
+from eigenshape.spectral.kernel_values import (
     from_pencil,
     require_readable,
     to_pencil,
     user_certificate,
     user_residuals,
 )
-from eigenshape.spectral.solver.pencil import Pencil, normalize, to_user_vectors
+from eigenshape.spectral.multilevel.approximate import (
+    approximate_pairs,
+    require_accuracy,
+    require_lumped,
+)
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.spectrum import Spectrum
 
 Method = Literal["certified", "approximate"]
@@ -259,7 +260,7 @@ def _requested_pairs(
 
 
 def spectrum_of(
-    laplacian: Laplacian, pencil: Pencil, pairs: Pairs, certificate: Certificate
+    laplacian: Laplacian, pencil: Pencil, pairs: Pairs, certificate: certeig.Certificate
 ) -> Spectrum:
     """Convert pairs of the pencil to a spectrum in the user's units, corrected if the kernel is."""
     # A negative Rayleigh quotient proves a negative eigenvalue, however large its residual, up to

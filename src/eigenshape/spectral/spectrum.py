@@ -1,34 +1,30 @@
-"""A spectrum, the proof that nothing is missing from it, and how fast its modes lose heat."""
-
-from html import escape
-from pathlib import Path
+"""A spectrum of a shape, and how fast its modes lose heat."""
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, positive_values, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
-from eigenshape.spectral.archive import read_spectrum, write_spectrum
+import certeig
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import positive_values, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
+from certeig.spectrum import ZERO_RESIDUALS
 from eigenshape.spectral.certificate import Certificate
 
-# An eigenvalue counts as 0 up to this share of the largest one, or up to this many times its own
-# residual. The second says so where all known eigenvalues are small beside the rounding of W.
+# An eigenvalue counts as 0 up to this share of the largest one, or up to some multiple of its own
+# residual, which says so where all known eigenvalues are small beside the rounding of W.
 NULL = 1e-9
-ZERO_RESIDUALS = 4
 # Approximate pairs have residuals near the root of the error of their values, above eigenvalues
 # that are not 0. There the residual counts only up to this share of the largest eigenvalue.
 APPROXIMATE_NULL = 1e-6
-MOST_DOTS = 200  # eigenvalues that the plot of a notebook shows
 
 
 @record
-class Spectrum(ReadOnly):
+class Spectrum(certeig.Spectrum):
     """Eigenvalues and eigenvectors of a Laplacian, with the certificate that none is missing.
 
-    These are the k lowest eigenpairs, or all eigenpairs in an interval.
+    These are the k lowest eigenpairs, or all eigenpairs in an interval. `save` writes them to a
+    file, and `load` reads them.
 
     Attributes
     ----------
@@ -62,68 +58,10 @@ class Spectrum(ReadOnly):
     These are the 9 lowest eigenvalues of the operator: none
     """
 
-    eigenvalues: Float[np.ndarray, " k"]
-    eigenvectors: Float[np.ndarray, "n k"]
-    mass: sp.csr_array
-    residuals: Float[np.ndarray, " k"]
     certificate: Certificate
 
-    def save(self, path: str | Path, *, key: str | None = None) -> None:
-        """Write the spectrum to a .npz file; `load` reads it back bit for bit.
-
-        The file is written completely or not at all.
-
-        Parameters
-        ----------
-        path : str or Path
-        key : str, optional
-            A label, such as a hash of the mesh, that `load` can require.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written.
-        """
-        write_spectrum(path, vars(self), key)
-
-    @classmethod
-    def load(cls, path: str | Path, *, key: str | None = None) -> "Spectrum":
-        """Read a spectrum from a file that `save` wrote. No code in the file is ever run.
-
-        Parameters
-        ----------
-        path : str or Path
-        key : str, optional
-            The key with which the spectrum must have been saved. By default any key is accepted.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be read.
-        FileFormatError
-            If the file is not a spectrum, is truncated, its parts do not fit together, its numbers
-            are not finite, its eigenvalues are negative or not ascending, or its key differs.
-        """
-        return cls(**read_spectrum(path, key))
-
-    def _portrait(self) -> str:
-        """Return a plot of the eigenvalues, and what is proved of them, as HTML."""
-        values = self.eigenvalues
-        first = self.certificate.first
-        shown = np.unique(np.linspace(0, len(values) - 1, MOST_DOTS).round().astype(np.int64))
-        # In a box of 300 x 100 pixels, with a margin of 10: number to the right, eigenvalue up
-        right = 10 + 300 * shown / max(len(values) - 1, 1)
-        height = 110 - 100 * (values[shown] / (values[-1] or 1.0))
-        dots = "".join(
-            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2"/>' for x, y in zip(right, height, strict=True)
-        )
-        plot = (
-            '<svg width="320" height="120" fill="currentColor" role="img" '
-            f'aria-label="Eigenvalues by their numbers">{dots}</svg>'
-        )
-        last = first + len(values) - 1
-        ends = f"eigenvalues {first} to {last}: {values[0]:.4g} to {values[-1]:.4g} (1/length²)"
-        return f"{plot}<p>{ends}</p><p>{escape(self.certificate.explain())}</p>"
+    certificate_class = Certificate
+    maker = "eigenshape"
 
 
 def count_zero_modes(spectrum: Spectrum) -> int:

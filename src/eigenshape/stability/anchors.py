@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, positive_values, record, whole_number
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, positive_values, record, whole_number
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.distances.closest import squared_distances
 from eigenshape.geometry.distances.geodesic import farthest_first, unchecked_waves

@@ -6,12 +6,12 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, whole_numbers
-from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape._text import html_repr
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import positive_values, whole_numbers
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.kit.text import html_repr
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
 from eigenshape.operators.clouds.kernel import EDGE_FACTOR, LAST
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 

@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_number, record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, finite_number, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh

@@ -6,8 +6,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
 from eigenshape.geometry.enclosing_ball import enclosing_ball
 from eigenshape.geometry.simplices import require_volumes, size_one, volumes
 from eigenshape.stability.perturbation import Perturbation, vertex_pairs

@@ -5,10 +5,11 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, finite_rows, positive_values, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, positive_values, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import finite_rows
 from eigenshape.features.bipartite_loops import match_rows
 from eigenshape.features.least_matching import least_perfect, near_pairs
 from eigenshape.geometry.samples.surface_points import SurfacePoints

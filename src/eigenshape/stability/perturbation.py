@@ -3,10 +3,11 @@
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, face_labels, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import face_labels
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.simplicial import Mesh

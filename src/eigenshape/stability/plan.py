@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from eigenshape._text import html_repr
+from certeig.kit.text import html_repr
 
 # Eigenvalues to compare by default.
 USUAL_K = 20

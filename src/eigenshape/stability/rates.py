@@ -6,10 +6,10 @@ from math import e, exp, lgamma, pi, sqrt
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import html_repr
+from certeig.kit.typing import ArrayLike, Integer
 
 THEOREMS = ("3.1.1", "3.1.3", "3.1.4", "3.1.5", "4.1.1", "4.3.1", "lipschitz", "dense")
 # Largest dimension m of a manifold. The constants are finite far beyond, but no data reach there.

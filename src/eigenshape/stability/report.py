@@ -4,11 +4,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, positive_values, record, whole_number, whole_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress, silent
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, positive_values, record, whole_number, whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.typing import ArrayLike
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.samples.surface_points import sample_surface

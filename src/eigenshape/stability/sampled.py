@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arrays import record
-from eigenshape._progress import Progress
-from eigenshape._text import html_repr
+from certeig.kit.arrays import record
+from certeig.kit.progress import Progress
+from certeig.kit.text import html_repr
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.samples.surface_points import sample_surface

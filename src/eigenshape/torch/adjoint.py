@@ -5,13 +5,13 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float
 
-from eigenshape._arrays import record
-from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import record
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.solver.certify import RESOLUTION
+from certeig.solver.pencil import Pencil
+from certeig.solver.shift import factorize_near
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.spectral.solver.certify import RESOLUTION
-from eigenshape.spectral.solver.pencil import Pencil
-from eigenshape.spectral.solver.shift import factorize_near
 
 # Equations that are solved with one factor: two times the lanes of a factor. Fewer take more
 # factors, more take more iterations since the shift is farther from their eigenvalues.

@@ -8,8 +8,8 @@ from typing import Any
 
 from torch.utils.data import Dataset
 
-from eigenshape._progress import Callback
-from eigenshape._typing import Integer
+from certeig.kit.progress import Callback
+from certeig.kit.typing import Integer
 from eigenshape._workers import Item, Workers
 from eigenshape.io.folders import find_items
 from eigenshape.io.shape_files import read_shape

@@ -5,10 +5,10 @@ from typing import Any, Literal
 import torch
 from torch import Tensor, nn
 
-from eigenshape._arguments import require_choice, require_type
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_choice, require_type
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import Integer
 from eigenshape.spectral.tools.bundle import OperatorBundle
 from eigenshape.torch.shapes import ShapeTensors, bundle_tensors
 

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 import torch
 from torch import Tensor
 
-from eigenshape._arrays import positive_number
+from certeig.kit.arrays import positive_number
 from eigenshape.calculus.heat_distance import require_heat, require_sources
 from eigenshape.calculus.linear_solver import factorize_definite, factorize_grounded
 from eigenshape.torch.operators import (

@@ -6,12 +6,13 @@ import numpy as np
 import torch
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import describe_value
-from eigenshape._arrays import whole_number
-from eigenshape._errors import ConvergenceError, InvalidParameterError, MissingExtraError
-from eigenshape._threads import map_in_threads
-from eigenshape._typing import Integer
-from eigenshape.spectral.solver.certify import RESOLUTION
+from certeig.kit.arguments import describe_value
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.kit.threads import map_in_threads
+from certeig.kit.typing import Integer
+from certeig.solver.certify import RESOLUTION
+from eigenshape._errors import MissingExtraError
 
 try:
     from torch_geometric.transforms import BaseTransform

@@ -5,9 +5,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from eigenshape._arguments import describe_value, require_type
-from eigenshape._arrays import positive_number
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import describe_value, require_type
+from certeig.kit.arrays import positive_number
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.spectral.spectrum import NULL
 from eigenshape.torch.operators import as_tensor
 from eigenshape.torch.shapes import ShapeTensors

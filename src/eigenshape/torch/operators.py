@@ -6,8 +6,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from eigenshape._arguments import describe_value
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.arguments import describe_value
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import size_one

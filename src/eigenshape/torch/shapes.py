@@ -10,9 +10,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import positive_number
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.arrays import positive_number
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.spectral.tools.bundle import OperatorBundle, export_bundle
 from eigenshape.torch.operators import as_tensor

@@ -5,8 +5,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_values, positive_values, whole_numbers
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import finite_values, positive_values, whole_numbers
 from eigenshape.spectral.spectrum import NULL
 from eigenshape.torch.operators import to_numpy
 from eigenshape.torch.spectrum import TensorSpectrum

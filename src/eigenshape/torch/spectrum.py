@@ -10,16 +10,16 @@ import scipy.sparse as sp
 import torch
 from torch import Tensor
 
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import silent
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import Integer
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import silent
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import Integer
+from certeig.solver.certified import certified_pairs
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import spectrum_of
-from eigenshape.spectral.solver.certified import certified_pairs
-from eigenshape.spectral.solver.pencil import normalize
 from eigenshape.torch.adjoint import SolvedPencil, find_groups, pull_back
 from eigenshape.torch.operators import as_faces, as_tensor, cotangent_entries, to_numpy
 

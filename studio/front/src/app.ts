@@ -2,10 +2,12 @@
 
 import type { Backend, Change, State } from "./core/backend";
 import markup from "./app.html?raw";
+import type { App, Panel } from "./contract";
 import type { Beside } from "./core/beside";
 import { Cloud } from "./core/cloud";
 import { acceptDrops, chooseFiles, download, Form, h, readFiles, type NamedFile } from "./core/dom";
 import type { Film } from "./core/film";
+import type { Settings } from "./core/settings";
 import { Skin, stackImages } from "./core/skin";
 import { Viewer, type View } from "./core/viewer";
 import type { Arrays, TypedArray } from "./core/wire";
@@ -17,39 +19,6 @@ import style from "./style.css?inline";
 import { runTour } from "./tour";
 import { welcome } from "./welcome";
 
-/** What survives a reload of the page, in the storage of the tab. */
-export class Settings {
-  private readonly values: Record<string, unknown>;
-
-  constructor(
-    private readonly storage: Storage | null,
-    private readonly key = "eigenshape",
-  ) {
-    this.values = JSON.parse(storage?.getItem(key) ?? "{}");
-  }
-
-  get<T>(name: string, otherwise: T): T {
-    return (this.values[name] as T | undefined) ?? otherwise;
-  }
-
-  set(name: string, value: unknown): void {
-    this.values[name] = value;
-    this.storage?.setItem(this.key, JSON.stringify(this.values));
-  }
-}
-
-export interface Panel {
-  id: string;
-  title: string;
-  needs: string[]; // capabilities without which the panel is hidden
-  build(app: Studio): HTMLElement;
-  refresh(state: State): void;
-  shown?(): void;
-  hidden?(): void;
-  /** What can be played of what the panel shows. */
-  films?(): Film[];
-}
-
 const FORMATS = {
   ply: "Save the shape as PLY",
   obj: "Save positions and faces as OBJ; GLB keeps textures, too",
@@ -58,7 +27,8 @@ const FORMATS = {
 const SEEN = "eigenshape-tour=1"; // cookie: the ports of one machine share it, unlike storage
 const POLL = 300; // ms between two questions while the server computes
 
-export class Studio {
+/** The window; what its contents use of it is described at `App`. */
+export class Studio implements App {
   readonly viewer: Viewer;
   state!: State;
   private readonly page = new Form(markup);
@@ -71,8 +41,8 @@ export class Studio {
   private readonly pages = new Map<string, { panel: Panel; tab: HTMLElement; page: HTMLElement }>();
   private active: Panel | null = null;
   private cloud: Cloud | null = null; // the points that the surface was made of
-  second: Beside | null = null; // picture of the second shape
-  readonly secondShown: ((second: Beside) => void)[] = []; // called when its shape is there
+  second: Beside | null = null;
+  readonly secondShown: ((second: Beside) => void)[] = [];
   private strip: Strip | null = null;
   private showing: Promise<void> = Promise.resolve(); // the newest state
   private busy = 0;
@@ -157,7 +127,6 @@ export class Studio {
     started.catch((error) => this.fail(error));
   }
 
-  /** Show how the studio works, unless this person has seen it. */
   firstTour(): void {
     if (document.cookie.includes(SEEN)) return;
     document.cookie = `${SEEN}; max-age=${10 * 365 * 86400}; samesite=strict`;
@@ -171,7 +140,6 @@ export class Studio {
     runTour(this, bend.limbs).catch((error) => this.fail(error));
   }
 
-  /** Make a change on the server, show its result and its warnings; return whether it was made. */
   async change(change: Change, text: string, files?: Arrays): Promise<boolean> {
     const making = this.run(text, this.backend.finish(change, files));
     this.changing = making;
@@ -204,12 +172,10 @@ export class Studio {
       .catch((error) => this.fail(error));
   }
 
-  /** Let the person choose files; none if one cannot be read, and the status says why. */
   choose(suffixes = this.state.suffixes, multiple = false): Promise<NamedFile[]> {
     return this.orFail(chooseFiles(suffixes, this.state.most_bytes, multiple));
   }
 
-  /** Let a file be dropped on an element. */
   acceptDrops(element: HTMLElement, onFile: (file: NamedFile) => void): void {
     acceptDrops(element, async (file) =>
       (await this.orFail(readFiles([file], this.state.most_bytes))).forEach(onFile),
@@ -223,12 +189,10 @@ export class Studio {
     });
   }
 
-  /** Let a file become the shape; return whether it did. */
   openFile({ name, bytes }: NamedFile): Promise<boolean> {
     return this.change({ kind: "open", name }, `Reading ${name}`, { file: bytes });
   }
 
-  /** Show `text` as the status while `work` runs; return null if it fails, and say why. */
   async run<T>(text: string, work: Promise<T>): Promise<T | null> {
     this.busy += 1;
     if (text) this.say(`${text} …`);
@@ -256,18 +220,15 @@ export class Studio {
     this.status.textContent = this.status.title = text;
   }
 
-  /** Return an array that the library computes, or null if it cannot; the status says why. */
   load<T extends TypedArray>(name: string, text: string): Promise<T | null> {
     return this.run(text, this.backend.array<T>(name));
   }
 
-  /** Save a file that the library writes: a mesh format, or the edits. */
   async save(kind: string, ending: string): Promise<void> {
     const file = await this.load<Uint8Array<ArrayBuffer>>(`file/${kind}`, "Writing the file");
     if (file) download(file, this.fileName(ending));
   }
 
-  /** Add buttons that save the shape, one for each format, to the row of a form with this name. */
   addExports(form: Form, row: string): void {
     if (!this.state.capabilities.includes("finish")) return;
     for (const [format, title] of Object.entries(FORMATS)) {
@@ -281,12 +242,10 @@ export class Studio {
     return `${this.state.name.replace(/\.\w{2,4}$/, "") || "shape"}.${ending}`;
   }
 
-  /** Bind a key such as "g", "Shift+D" or "Ctrl+Z"; the overview lists it with its text. */
   shortcut(key: string, text: string, action: () => void): void {
     this.shortcuts.set(key, { text, action });
   }
 
-  /** Show a panel. */
   open(id: string): void {
     const next = this.pages.get(id);
     if (!next || next.panel === this.active) return;
@@ -304,7 +263,6 @@ export class Studio {
     this.strip?.panelShown();
   }
 
-  /** Return what can be played of what is shown. */
   films(): Film[] {
     return this.active?.films?.() ?? [];
   }
@@ -417,7 +375,6 @@ export class Studio {
     return kind === "undo" ? place > 0 : place < history.length;
   }
 
-  /** Undo or redo what the hand did last, when what it does now is done. */
   step(kind: "undo" | "redo"): Promise<void> {
     this.stepping = this.stepping.then(async () => {
       await this.changing;

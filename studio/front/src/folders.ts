@@ -1,6 +1,6 @@
 /** A dialog with the folders of the machine on which the studio runs: of shapes, indexes, collections. */
 
-import type { Studio } from "./app";
+import type { App } from "./contract";
 import { Form, h } from "./core/dom";
 import markup from "./folders.html?raw";
 
@@ -16,7 +16,7 @@ export class FolderDialog {
 
   private opening: Promise<boolean> = Promise.resolve(false);
 
-  constructor(private readonly app: Studio) {
+  constructor(private readonly app: App) {
     app.main.append(this.form.root);
     this.form.on({
       "folder-open": () => this.open(this.place),

@@ -1,6 +1,6 @@
 /** A note above the panels: what could not be opened, and what can be asked for of a large shape. */
 
-import type { Studio } from "./app";
+import type { App } from "./contract";
 import type { State } from "./core/backend";
 import { Form } from "./core/dom";
 import markup from "./large.html?raw";
@@ -8,7 +8,7 @@ import markup from "./large.html?raw";
 export class LargeNote {
   private readonly form = new Form(markup);
 
-  constructor(app: Studio) {
+  constructor(app: App) {
     const ask = (kind: string, text: string) => () => app.change({ kind }, text);
     this.form.on({
       lighten: ask("lighten", "Making a lighter copy"),

@@ -1,8 +1,9 @@
 /** Start the studio in the page that loads this bundle; a notebook calls `render` instead. */
 
-import { Settings, Studio } from "./app";
+import { Studio } from "./app";
 import type { Backend } from "./core/backend";
 import { h } from "./core/dom";
+import { Settings } from "./core/settings";
 import { httpBackend } from "./hosts/http";
 import { inlineBackend } from "./hosts/inline";
 import { widgetBackend, type WidgetModel } from "./hosts/widget";

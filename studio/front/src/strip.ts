@@ -1,7 +1,7 @@
 /** The strip over the picture: whole shape, edges, cut, ruler, films, and what a finger does. */
 
 import { Vector3 } from "three";
-import type { Studio } from "./app";
+import type { App } from "./contract";
 import { download, Form, h } from "./core/dom";
 import { playFilm, saveGif, turntable, type Film } from "./core/film";
 import { Ruler } from "./core/ruler";
@@ -13,7 +13,7 @@ export class Strip {
   private playing: AbortController | null = null;
   private films: Film[] = [];
 
-  constructor(private readonly app: Studio) {
+  constructor(private readonly app: App) {
     const { form } = this;
     const { viewer } = app;
     this.ruler = new Ruler(viewer);

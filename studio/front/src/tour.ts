@@ -1,6 +1,6 @@
 /** The tour: in twenty seconds it bends a limb, turns the view, and says what else there is. */
 
-import type { Studio } from "./app";
+import type { App } from "./contract";
 import type { Vec3 } from "./core/backend";
 import { h, isTouch } from "./core/dom";
 import type { Limbs } from "./panels/deform/limbs";
@@ -21,7 +21,7 @@ async function play(ms: number, signal: AbortSignal, act: (share: number) => voi
 }
 
 /** Run the tour; a click, Escape or its button ends it. Nothing of it is kept. */
-export async function runTour(app: Studio, limbs: Limbs): Promise<void> {
+export async function runTour(app: App, limbs: Limbs): Promise<void> {
   const { viewer } = app;
   const { stage } = viewer;
   const stop = new AbortController();

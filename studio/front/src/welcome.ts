@@ -1,12 +1,12 @@
 /** The first page where no file was opened: drop one, or try a sample. */
 
-import type { Studio } from "./app";
+import type { App } from "./contract";
 import { h, isTouch, pictureOf } from "./core/dom";
 
 const TITLES: Record<string, string> = { quadruped: "Animal", biped: "Person", hand: "Hand" };
 
 /** Show a card over the picture until a shape is chosen. */
-export function welcome(app: Studio): void {
+export function welcome(app: App): void {
   const { samples } = app.state;
   const close = () => {
     app.settings.set("welcomed", true);

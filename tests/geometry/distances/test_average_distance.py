@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 
 
 def test_on_a_sphere_it_is_a_quarter_turn():

@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import Delaunay
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.distances.geodesic import (
     farthest_points,
     geodesic_balls,

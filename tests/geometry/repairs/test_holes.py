@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh

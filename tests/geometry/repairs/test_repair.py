@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from broken_meshes import moebius, soup, tetrahedra, with_slivers
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh

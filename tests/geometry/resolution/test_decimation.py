@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from broken_meshes import moebius
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError, MissingExtraError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError, MissingExtraError
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair import suggest_repairs

@@ -4,7 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import SphericalVoronoi
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.samples.quadrature import _cell_volume, _cell_volumes, shape_quadrature

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.operators.clouds.cloud_triangles import cloud_cover, local_triangles
 from eigenshape.operators.robust import robust_laplacian

@@ -7,7 +7,8 @@ from exact_quadratures import sphere_quadrature, torus_quadrature
 from scipy.special import eval_legendre
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.geometry.simplices import dual_volumes, mean_side_length
@@ -304,7 +305,7 @@ def test_a_component_that_falls_apart_is_refused():
 
 
 def test_a_matrix_beyond_memory_is_refused_before_it_is_built(monkeypatch):
-    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 1e6)
+    monkeypatch.setattr("certeig.kit.memory.machine_memory", lambda: 1e6)
     with pytest.raises(
         InvalidShapeError, match=r"50 % of the memory, 0.0 GiB; for \S+ entries, \d+ a row"
     ):

@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.operators.clouds.neighbors import neighbor_graph
 from eigenshape.operators.graph import graph_laplacian
 from eigenshape.shapes.surfaces import grid

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import shape_quadrature
 from eigenshape.operators.clouds import cloud_kernel

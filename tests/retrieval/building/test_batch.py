@@ -16,7 +16,7 @@ from describers import RECIPE, SPOIL_ROWS, mesh_of, read_and_count, read_by_cont
 from filelock import FileLock
 
 import eigenshape
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape._workers import Item, Outcome, Workers, run_in_workers
 from eigenshape.retrieval.building.batch import (
     build_index,

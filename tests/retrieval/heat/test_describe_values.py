@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from describers import RECIPE, descriptor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.retrieval.heat import score
 from eigenshape.retrieval.heat.recipe import PRESETS, SCALE_FREE, THESIS, HeatRecipe
 from eigenshape.retrieval.heat.score import (

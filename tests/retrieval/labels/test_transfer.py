@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh

@@ -12,7 +12,8 @@ import pytest
 from describers import RECIPE, descriptor, keep
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError, StoreError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import StoreError
 from eigenshape._sealed import PAGE
 from eigenshape.retrieval import DescribedShape
 from eigenshape.retrieval.search.reader import require_maker

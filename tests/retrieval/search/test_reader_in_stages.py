@@ -8,7 +8,7 @@ from describers import keep
 from search_cases import RECIPE, mixtures
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search import candidates
 

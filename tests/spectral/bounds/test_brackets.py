@@ -6,7 +6,8 @@ import pytest
 from intervals import assert_around, finer
 from pencils import TETRAHEDRON
 
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.facets import boundary_facets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from intervals import assert_around
 
-from eigenshape._errors import ConvergenceError
+from certeig.kit.errors import ConvergenceError
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian

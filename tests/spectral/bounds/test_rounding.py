@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
+from certeig.sparse.symmetric_factor import EPS
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian, mass_floor
 from eigenshape.shapes.domains import ball, interval
 from eigenshape.shapes.surfaces import grid, icosphere
-from eigenshape.sparse.symmetric_factor import EPS
 from eigenshape.spectral.bounds.nonconforming import enclose, relative_rounding
 from eigenshape.spectral.solve import solve_spectrum
 

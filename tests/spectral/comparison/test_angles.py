@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.linalg import subspace_angles
 from scipy.stats import ortho_group
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.resolution.subdivision import subdivide
 from eigenshape.geometry.topology import disjoint_union

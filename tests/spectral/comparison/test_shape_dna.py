@@ -7,7 +7,8 @@ from lapy import shapedna
 from scipy.spatial.transform import Rotation
 
 import eigenshape as es
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 
 few = settings(deadline=None, max_examples=10)
 

@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import boundary_vertices, disjoint_union
 from eigenshape.operators.clouds.gaussian import mesh_laplacian

@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from eigenshape import _memory
-from eigenshape._errors import InvalidParameterError
+from certeig.kit import memory
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_laplacian
 from eigenshape.shapes.exact import sphere_eigenvalues
@@ -56,7 +56,7 @@ def test_points_and_times_that_are_not_there_are_named(monkeypatch):
         heat_kernel(SPECTRUM, 1, [-1], 0.1)
     with pytest.raises(InvalidParameterError, match=r"t must be positive and finite; entry 0 is 0"):
         heat_kernel(SPECTRUM, 1, 1, 0.0)
-    monkeypatch.setattr(_memory, "machine_memory", lambda: 1000.0)
+    monkeypatch.setattr(memory, "machine_memory", lambda: 1000.0)
     with pytest.raises(InvalidParameterError, match="A heat kernel must fit into 50 % of the"):
         heat_kernel(SPECTRUM, 1, None, 0.1)
 

@@ -295,7 +295,7 @@ def test_numbers_and_kinds_out_of_range_are_refused(all_pairs):
 
 
 def test_more_than_memory_holds_is_refused(all_pairs, monkeypatch):
-    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 1000.0)
+    monkeypatch.setattr("certeig.kit.memory.machine_memory", lambda: 1000.0)
     with pytest.raises(
         es.InvalidParameterError, match=r"for 4 shapes of 36 modes .* Take fewer modes"
     ):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from eigenshape import _memory
+from certeig.kit import memory
 
 HAND = es.make_creature("hand", 1, n_vertices=600)
 TURN = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
@@ -147,6 +147,6 @@ def test_refused(hand, options, message):
 
 
 def test_equations_that_do_not_fit_into_memory_are_refused(hand, monkeypatch):
-    monkeypatch.setattr(_memory, "machine_memory", lambda: 1e6)
+    monkeypatch.setattr(memory, "machine_memory", lambda: 1e6)
     with pytest.raises(es.InvalidParameterError, match="Take fewer modes, and extend the map"):
         es.functional_map(hand, hand, n_modes=20, descriptors="waves")

@@ -6,7 +6,7 @@ import pytest
 import scipy.sparse as sp
 from pencils import cycle, dense_eigenvalues, graph, hypercube, path, tetrahedra, wild
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.io.mesh_files import read_mesh
@@ -290,7 +290,7 @@ def test_corrections_that_overflow_are_refused(always_coarsen, monkeypatch, whic
 
 def test_what_does_not_fit_is_refused_with_numbers(monkeypatch):
     laplacian = cotangent_laplacian(icosphere(4))
-    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 1e5)
+    monkeypatch.setattr("certeig.kit.memory.machine_memory", lambda: 1e5)
     with pytest.raises(
         InvalidParameterError,
         match=r"9 pairs of 2562 points that is about 0\.0 GiB of bases, 0\.0 GiB of levels of their",

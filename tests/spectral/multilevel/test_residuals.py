@@ -3,14 +3,14 @@
 import numpy as np
 from pencils import graph, hypercube
 
-from eigenshape._progress import silent
+from certeig.kit.progress import silent
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import torus
 from eigenshape.spectral.multilevel import approximate
 from eigenshape.spectral.multilevel.approximate import climb
 from eigenshape.spectral.multilevel.davidson import misses_pairs
 from eigenshape.spectral.multilevel.residuals import Interpolated, Stored
-from eigenshape.spectral.solver.pencil import normalize
+from eigenshape.spectral.pencils import normalize
 
 TORUS = cotangent_laplacian(torus(120, 50))
 

@@ -5,15 +5,15 @@ import pytest
 import scipy.sparse as sp
 from pencils import cycle, dense_eigenvalues, graph, path
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.solver.diagnosis import require_solvable
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.shapes.surfaces import icosphere
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver.diagnosis import require_solvable
-from eigenshape.spectral.solver.pencil import normalize
 
 TRIANGLE, PAIR = np.ones((3, 3)) - np.eye(3), np.ones((2, 2)) - np.eye(2)
 
@@ -285,7 +285,7 @@ def test_ten_thousand_triangles_and_more_pairs_than_these():
 
 
 def test_more_pairs_than_memory_are_refused_with_numbers(monkeypatch):
-    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 2.0**32)
+    monkeypatch.setattr("certeig.kit.memory.machine_memory", lambda: 2.0**32)
     with pytest.raises(
         InvalidParameterError,
         match=r"must fit into 90 % of the memory, 3\.6 GiB; "

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import eigenshape
-from eigenshape._errors import InvalidParameterError
+from certeig import archive
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral import archive, solve
+from eigenshape.spectral import cache, solve
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver import cache
 
 
 @pytest.fixture

@@ -3,16 +3,16 @@ import pytest
 import scipy.sparse as sp
 from pencils import cycle, dense_eigenvalues, graph, hypercube, path, tetrahedra, wild
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.solver import strategy as roads
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.certify import certify
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver import strategy as roads
-from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.pencil import normalize
 
 
 @pytest.fixture
@@ -126,7 +126,7 @@ def test_a_shift_on_an_eigenvalue_moves_away(monkeypatch):
     expected = solve_spectrum(laplacian, 40)
     pencil = normalize(laplacian)
     on_it = float(np.ldexp(expected.eigenvalues[25], -pencil.value_exponent))
-    from eigenshape.spectral.solver.shift import factorize_near
+    from certeig.solver.shift import factorize_near
 
     monkeypatch.setattr(
         roads, "shift_inside", lambda pencil, k: factorize_near(pencil, on_it * (1 + 1e-12))
@@ -298,7 +298,7 @@ def test_one_of_k_and_below_is_required():
 )
 def test_what_does_not_fit_is_refused_with_numbers(monkeypatch, level, words):
     laplacian = cotangent_laplacian(icosphere(level))
-    monkeypatch.setattr("eigenshape._memory.machine_memory", lambda: 1e5)
+    monkeypatch.setattr("certeig.kit.memory.machine_memory", lambda: 1e5)
     with pytest.raises(
         InvalidParameterError,
         match=r"A spectrum must fit into 90 % of the memory, 0\.0 GiB; for 20 pairs of .*",

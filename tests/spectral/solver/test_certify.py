@@ -2,15 +2,17 @@ import numpy as np
 import pytest
 from pencils import graph, path, tetrahedra, wild
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.solver import certify as certify_module
+from certeig.solver import inertia as count
+from certeig.solver.certify import prove
+from certeig.solver.eigenpairs import Pairs
+from certeig.solver.pencil import residual_norms
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.certify import certify
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver import certify as certify_module
-from eigenshape.spectral.solver import inertia as count
-from eigenshape.spectral.solver.certify import certify, prove
-from eigenshape.spectral.solver.eigenpairs import Pairs
-from eigenshape.spectral.solver.pencil import normalize, residual_norms
 
 
 @pytest.fixture(scope="module")

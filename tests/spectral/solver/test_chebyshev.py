@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import ConvergenceError
+from certeig.kit.errors import ConvergenceError
+from certeig.solver import chebyshev
+from certeig.solver.chebyshev import chebyshev_filter
+from certeig.solver.eigenpairs import lowest_pairs
+from certeig.solver.lanczos import Wanted, grow_space
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import torus
-from eigenshape.spectral.solver import chebyshev
-from eigenshape.spectral.solver.chebyshev import chebyshev_filter
-from eigenshape.spectral.solver.eigenpairs import lowest_pairs
-from eigenshape.spectral.solver.lanczos import Wanted, grow_space
-from eigenshape.spectral.solver.pencil import normalize
+from eigenshape.spectral.pencils import normalize
 
 PENCIL = normalize(mesh_laplacian(torus(48, 20)))
 ROOTS = np.sqrt(PENCIL.mass_diagonal)

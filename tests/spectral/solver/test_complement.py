@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
-from eigenshape._errors import ConvergenceError
+from certeig.kit.errors import ConvergenceError
+from certeig.solver import strategy
+from certeig.solver.complement import prove_outside, sparser_below
+from certeig.solver.eigenpairs import Pairs
+from certeig.solver.factor import factorize
+from certeig.solver.pencil import rayleigh_residuals
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver import strategy
-from eigenshape.spectral.solver.complement import prove_outside, sparser_below
-from eigenshape.spectral.solver.eigenpairs import Pairs
-from eigenshape.spectral.solver.factor import factorize
-from eigenshape.spectral.solver.pencil import normalize, rayleigh_residuals
 
 PENCIL = normalize(mesh_laplacian(torus(40, 18)))
 MASS = np.diag(PENCIL.mass_diagonal)

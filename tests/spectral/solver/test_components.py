@@ -5,15 +5,15 @@ import pytest
 import scipy.sparse as sp
 from pencils import cycle, dense_eigenvalues, graph, path
 
+from certeig.solver import strategy as roads
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import grid, icosphere
+from eigenshape.spectral.certify import certify
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver import strategy as roads
-from eigenshape.spectral.solver.certify import certify
-from eigenshape.spectral.solver.pencil import normalize
 
 
 def moved(mesh: TriangleMesh, scale: float, along: float) -> TriangleMesh:

@@ -1,11 +1,12 @@
 import numpy as np
 
+from certeig.solver.eigenpairs import Pairs, lowest_pairs, polish
+from certeig.solver.factor import factorize
+from certeig.solver.lanczos import Wanted, block_lanczos
+from certeig.solver.pencil import rayleigh_residuals
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral.solver.eigenpairs import Pairs, lowest_pairs, polish
-from eigenshape.spectral.solver.factor import factorize
-from eigenshape.spectral.solver.lanczos import Wanted, block_lanczos
-from eigenshape.spectral.solver.pencil import normalize, rayleigh_residuals
+from eigenshape.spectral.pencils import normalize
 
 PENCIL = normalize(cotangent_laplacian(icosphere(3)))
 FACTOR = factorize(PENCIL, 0.02 * PENCIL.level)

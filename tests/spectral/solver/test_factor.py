@@ -5,17 +5,18 @@ import pytest
 import scipy.sparse as sp
 from pencils import dense_eigenvalues, graph, path, wild
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.solver import shift as shift_module
+from certeig.solver.factor import factorize, rounding
+from certeig.solver.pencil import residual_norms
+from certeig.solver.shift import factorize_near, shift_inside
+from certeig.sparse.front_loops import WIDE
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_laplacian
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.domains import box
 from eigenshape.shapes.surfaces import icosphere
-from eigenshape.sparse.front_loops import WIDE
-from eigenshape.spectral.solver import shift as shift_module
-from eigenshape.spectral.solver.factor import factorize, rounding
-from eigenshape.spectral.solver.pencil import normalize, residual_norms
-from eigenshape.spectral.solver.shift import factorize_near, shift_inside
+from eigenshape.spectral.pencils import normalize
 
 
 def scaled_back(pencil, value):

@@ -2,18 +2,18 @@ import numpy as np
 import pytest
 from pencils import cycle, dense_eigenvalues, graph, hypercube, tetrahedra
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.solver import certified, slices
+from certeig.solver import strategy as roads
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import irregular_grid
 from eigenshape.shapes.spheres import fibonacci_sphere
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver import certified, slices
-from eigenshape.spectral.solver import strategy as roads
-from eigenshape.spectral.solver.pencil import normalize
 from eigenshape.spectral.spectrum import Spectrum
 
 

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from eigenshape._errors import ConvergenceError, InvalidParameterError
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from eigenshape.operators.clouds.gaussian import mesh_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.certify import certify
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver.certify import certify
 
 
 def sphere_eigenvalues(k):

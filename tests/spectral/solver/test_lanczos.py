@@ -2,14 +2,15 @@ import numpy as np
 import pytest
 from pencils import dense_eigenvalues, graph, path, tetrahedra
 
-from eigenshape._errors import ConvergenceError
+from certeig.kit.errors import ConvergenceError
+from certeig.solver import lanczos
+from certeig.solver.eigenpairs import lowest_pairs
+from certeig.solver.factor import factorize
+from certeig.solver.lanczos import MOST_LOST, Wanted, block_lanczos
+from certeig.solver.pencil import rayleigh_residuals
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import icosphere, torus
-from eigenshape.spectral.solver import lanczos
-from eigenshape.spectral.solver.eigenpairs import lowest_pairs
-from eigenshape.spectral.solver.factor import factorize
-from eigenshape.spectral.solver.lanczos import MOST_LOST, Wanted, block_lanczos
-from eigenshape.spectral.solver.pencil import normalize, rayleigh_residuals
+from eigenshape.spectral.pencils import normalize
 
 
 def run(pencil, factor, wanted, locked=None):

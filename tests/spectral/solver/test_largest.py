@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from certeig.solver.chebyshev import largest_ritz_value
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.surfaces import torus
-from eigenshape.spectral.solver.chebyshev import largest_ritz_value
 
 
 def test_the_bounds_enclose_the_largest_eigenvalue_closely():

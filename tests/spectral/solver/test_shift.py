@@ -3,13 +3,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from certeig.solver import shift
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.operators.crouzeix_raviart import crouzeix_raviart_laplacian, facet_mass
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.shapes.domains import box
-from eigenshape.spectral.solver import shift
-from eigenshape.spectral.solver.pencil import normalize
+from eigenshape.spectral.pencils import normalize
 
 
 @pytest.mark.parametrize("seed", [1, 2, 16, 24, 40])

@@ -2,15 +2,16 @@ import numpy as np
 import pytest
 from pencils import cycle, dense_eigenvalues, graph, hypercube, tetrahedra
 
-from eigenshape._errors import ConvergenceError
+from certeig.kit.errors import ConvergenceError
+from certeig.solver import slices
+from certeig.solver import strategy as roads
+from certeig.solver.pencil import rayleigh_residuals
+from certeig.solver.slices import walk
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.shapes.domains import irregular_grid
 from eigenshape.shapes.surfaces import icosphere, torus
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver import slices
-from eigenshape.spectral.solver import strategy as roads
-from eigenshape.spectral.solver.pencil import normalize, rayleigh_residuals
-from eigenshape.spectral.solver.slices import walk
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import eigenshape as es
-from eigenshape import _memory
+from certeig.kit import memory
 from eigenshape.geometry.topology import disjoint_union
 from eigenshape.spectral.tools.embedding import component_labels
 
@@ -150,7 +150,7 @@ def test_distances_scale_with_the_unit():
 
 
 def test_pairs_that_do_not_fit_into_memory_are_refused(monkeypatch):
-    monkeypatch.setattr(_memory, "machine_memory", lambda: 1e5)
+    monkeypatch.setattr(memory, "machine_memory", lambda: 1e5)
     with pytest.raises(es.InvalidParameterError, match="162 × 162 pairs of points"):
         es.spectral.spectral_distances(SPECTRUM)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from eigenshape._errors import EigenshapeError, InvalidParameterError
+from certeig.kit.errors import CerteigError, InvalidParameterError
 from eigenshape.collections.carrying import CarriedLandmarks
 from eigenshape.collections.collection import Collection, read_specimen
 from eigenshape.geometry.mesh import TriangleMesh
@@ -49,7 +49,7 @@ def _readable(
     for name, own in landmarks.items():
         try:
             mesh, _ = read_specimen(paths[name])
-        except (EigenshapeError, OSError):
+        except (CerteigError, OSError):
             continue
         yield name, mesh, own
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.image import imsave
 
-from eigenshape._files import replace_file
+from certeig.kit.files import replace_file
 from eigenshape.cli.steps.collecting import unsure_sides
 from eigenshape.collections.alignment import best_similarity
 from eigenshape.collections.carrying import CarriedLandmarks

@@ -1,4 +1,4 @@
-"""Regions of like heat of one file, in a worker, and the table of those of all."""
+"""Regions of similar heat of one file, in a worker, and the table of the regions of all."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from certeig.kit.files import replace_file
 from eigenshape._extras import import_extra
-from eigenshape._files import replace_file
 from eigenshape._workers import run_in_workers
 from eigenshape.cli.steps.writing import require_output
 from eigenshape.features.condensed import condense

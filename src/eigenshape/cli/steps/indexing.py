@@ -6,9 +6,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from eigenshape._errors import InvalidParameterError, MissingExtraError
-from eigenshape._progress import Callback
-from eigenshape._threads import thread_count
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Callback
+from certeig.kit.threads import thread_count
+from eigenshape._errors import MissingExtraError
 from eigenshape._workers import Item, Workers
 from eigenshape.cli.console import batch_reporter, err, progress_bar
 from eigenshape.cli.inputs import memory_bytes

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._progress import Progress
+from certeig.kit.progress import Progress
 from eigenshape.cli.console import print_table
 from eigenshape.deformation.region_patches import regions_of_patches
 from eigenshape.features.boundaries import smooth_boundaries

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from eigenshape._errors import EigenshapeError, InvalidParameterError
+from certeig.kit.errors import CerteigError, InvalidParameterError
 from eigenshape.cli.console import err, escape_text, print_repairs
 from eigenshape.cli.inputs import repair_names
 from eigenshape.deformation.distortion import require_poses
@@ -99,7 +99,7 @@ def read_examples(
         try:
             example = _read_example(path, None, names)
             example.points  # noqa: B018 - described here, and kept, so that a failure has a name
-        except (EigenshapeError, OSError) as error:
+        except (CerteigError, OSError) as error:
             err.print(f"[yellow]left out:[/] {escape_text(path.name)}: {escape_text(error)}")
             left_out.append(path.name)
         else:

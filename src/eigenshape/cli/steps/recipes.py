@@ -5,7 +5,8 @@ from pathlib import Path
 from pickle import UnpicklingError
 from zipfile import BadZipFile
 
-from eigenshape._errors import FileFormatError, InvalidParameterError, StoreError
+from certeig.kit.errors import FileFormatError, InvalidParameterError
+from eigenshape._errors import StoreError
 from eigenshape.cli.console import err
 from eigenshape.retrieval.heat.recipe import PRESETS
 from eigenshape.retrieval.index import ShapeIndex

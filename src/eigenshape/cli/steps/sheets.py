@@ -6,9 +6,10 @@ import numpy as np
 from jaxtyping import Int
 from matplotlib.figure import Figure
 
-from eigenshape._arrays import record
-from eigenshape._errors import EigenshapeError, StoreError
-from eigenshape._text import literal
+from certeig.kit.arrays import record
+from certeig.kit.errors import CerteigError
+from certeig.kit.text import literal
+from eigenshape._errors import StoreError
 from eigenshape.cli.console import err, escape_text, progress_bar
 from eigenshape.cli.steps.writing import Side
 from eigenshape.geometry.distances.geodesic import geodesic_distances
@@ -151,7 +152,7 @@ def _panel(query: ColoredQuery, match: Match, repairs: tuple[str, ...]) -> Panel
     title = f"{literal(match.name)}\nscore {match.score:.3f}"
     try:
         mesh = _read_match(match, repairs)
-    except (EigenshapeError, OSError) as error:
+    except (CerteigError, OSError) as error:
         err.print(f"[yellow]not drawn:[/] {escape_text(match.name)}: {escape_text(error)}")
         nothing = np.zeros(0, dtype=np.int64)
         return Panel(None, title, nothing, nothing)

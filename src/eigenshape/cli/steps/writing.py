@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from matplotlib.figure import Figure
 
-from eigenshape._errors import FileFormatError, InvalidParameterError
-from eigenshape._files import replace_file
+from certeig.kit.errors import FileFormatError, InvalidParameterError
+from certeig.kit.files import replace_file
 from eigenshape.cli.console import err, escape_text, print_written
 from eigenshape.cli.inputs import numbers_of
 from eigenshape.geometry.mesh import TriangleMesh

@@ -9,10 +9,10 @@ from jaxtyping import Float
 from numpy.typing import DTypeLike
 from scipy.sparse.linalg import eigsh
 
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import html_repr
+from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr
-from eigenshape._typing import ArrayLike
 from eigenshape.calculus.linear_solver import factor_equations
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh

@@ -5,9 +5,10 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._typing import ArrayLike
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest_loops import nearest_faces, windings
 from eigenshape.geometry.distances.crossing_loops import box_tree, curve_places, face_boxes

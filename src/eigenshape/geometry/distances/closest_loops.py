@@ -8,7 +8,7 @@ import math
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 
 def nearest_faces(

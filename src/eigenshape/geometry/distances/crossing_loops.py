@@ -6,7 +6,7 @@ The corners of face i are `points[3 i : 3 i + 3]`. Faces are in the order of the
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 LEAF = 4  # most faces of a leaf; more means fewer nodes but more pairs of faces to compare
 FIRST_ROOM = 64  # pairs for which there is memory at first; most surfaces have none

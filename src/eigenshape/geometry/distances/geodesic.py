@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import number_from_zero, positive_values, whole_number, whole_numbers
+from certeig.kit.arrays import number_from_zero, positive_values, whole_number, whole_numbers
+from certeig.kit.threads import SpareMemory, map_in_threads, one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._errors import InvalidShapeError
-from eigenshape._threads import SpareMemory, map_in_threads, one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.distances.geodesic_loops import spread_wave, spread_waves
 from eigenshape.geometry.requirements import require_describable

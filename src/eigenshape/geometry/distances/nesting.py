@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from eigenshape._arrays import ReadOnly, record
+from certeig.kit.arrays import ReadOnly, record
 from eigenshape.geometry.distances.closest_loops import nearest_faces
 from eigenshape.geometry.distances.crossing_loops import box_tree, curve_places, face_boxes
 from eigenshape.geometry.distances.crossings import round_finely

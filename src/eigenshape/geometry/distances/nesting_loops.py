@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 
 def are_inside(

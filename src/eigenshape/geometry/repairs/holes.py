@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.hole_loops import triangulate
 from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns
@@ -14,7 +14,7 @@ from eigenshape.geometry.topology import boundary_loops, edge_table, half_edges,
 def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[TriangleMesh]:
     """Fill every hole with faces between the vertices around it; no vertex is added.
 
-    An open surface is closed along its rim too. A hole is left open, and the report says so, if it
+    An open surface is closed along its boundary, too. A hole is left open, and the report says so, if it
     has too many edges, or if filling it would need a face without area, a face that exists already,
     or an edge with three faces.
 

@@ -6,9 +6,10 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import real_numbers, vertex_values, whole_number, whole_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import real_numbers, whole_number, whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import vertex_values
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns

@@ -35,7 +35,7 @@ from eigenshape.geometry.simplices import scaled_corners, size_one
 from eigenshape.geometry.topology import boundary_loops, vertex_components
 
 # Shares of the area of a surface up to which `suggest_repairs` takes something for a fault of the
-# scan rather than for a part of the shape or its rim.
+# scan rather than for a part of the shape or its boundary.
 LARGEST_SPECK = 0.01  # a component other than the largest
 ALL_SPECKS = 0.2  # all these components together
 LARGEST_HOLE = 0.05  # a hole; for comparison, the open side of half a ball has 0.5
@@ -276,7 +276,7 @@ def has_specks(mesh: TriangleMesh) -> bool:
 
 
 def has_small_holes(mesh: TriangleMesh) -> bool:
-    """Tell whether each hole has little area: that of a disc with the same length of rim."""
+    """Tell whether each hole has little area: that of a disc with the same length of boundary."""
     points, _ = size_one(mesh.vertices)
     rims = [points[loop] for loop in boundary_loops(mesh)]
     lengths = [np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1).sum() for rim in rims]

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 
 SURFACE_REPAIRS = ("orient", "largest_component", "fill_holes", "cut_one_sided")  # of surfaces only
 # Of meshes of any dimension and of surfaces, in the order in which messages and help list them.

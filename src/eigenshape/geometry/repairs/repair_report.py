@@ -5,7 +5,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import ReadOnly, record
+from certeig.kit.arrays import ReadOnly, record
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.simplices import MEASURES
 from eigenshape.geometry.simplicial import Mesh

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import triangle_areas

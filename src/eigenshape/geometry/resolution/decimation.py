@@ -1,12 +1,13 @@
-"""Decimation: the same surface by fewer faces, and what lay on the many carried over to the few."""
+"""Decimation: the same surface by fewer faces, and what lay on the many transferred to the few."""
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, as_array, record, whole_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
+from certeig.kit.arrays import ReadOnly, as_array, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
-from eigenshape._typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.face_turns import orient_consistently
@@ -126,7 +127,7 @@ def decimate(
     Returns
     -------
     DecimatedMesh
-        The new mesh, and its places on the original, by which values and labels are carried over.
+        The new mesh, and its places on the original, by which values and labels are transferred.
 
     Raises
     ------

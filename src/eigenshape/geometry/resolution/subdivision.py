@@ -7,7 +7,7 @@ from typing import overload
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import freeze
+from certeig.kit.arrays import freeze
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh, SimplicialMesh

@@ -8,7 +8,7 @@ from threading import Lock
 
 import numpy as np
 
-from eigenshape._arrays import positive_number
+from certeig.kit.arrays import positive_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
 from eigenshape.geometry.conversion import MeshLike, as_mesh

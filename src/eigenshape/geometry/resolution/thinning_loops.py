@@ -8,7 +8,7 @@ the lists until these are joined.
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 RIM, FIXED = 1, 2  # kinds of vertices beside free ones, which are 0; FIXED ones never move
 

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 
 @kernel("n_sets", "n_points")

@@ -4,9 +4,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, positive_values, record, whole_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError, try_auto
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import ReadOnly, freeze, positive_values, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import finite_rows
+from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.requirements import require_sound

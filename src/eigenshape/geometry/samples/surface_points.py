@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record, whole_number
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
 from eigenshape.geometry.simplicial import Mesh

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._errors import FileFormatError, InvalidParameterError
+from certeig.kit.errors import FileFormatError, InvalidParameterError
 from eigenshape.geometry.polygons import triangulate_polygons
 from eigenshape.geometry.solids import N_TETRAHEDRA, split_solids
 from eigenshape.io.formats.registry import CellKind

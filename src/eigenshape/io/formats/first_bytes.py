@@ -3,7 +3,7 @@
 import re
 from typing import NamedTuple
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.registry import format_of
 
 LOOKED_AT = 4096  # bytes; what comes before the first element of XML or JSON fits into them

@@ -26,8 +26,8 @@ from urllib.parse import unquote
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from eigenshape._errors import FileFormatError
-from eigenshape._files import read_regular
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import read_regular
 from eigenshape.io.formats.cells import NO_TRIANGLES
 from eigenshape.io.formats.numbers import quote_line
 from eigenshape.io.formats.obj_attributes import find_beside

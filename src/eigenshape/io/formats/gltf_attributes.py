@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.geometry.measure import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.attributes import (

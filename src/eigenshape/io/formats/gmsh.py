@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.cells import CellLists, ParsedShape, require_splittable
 from eigenshape.io.formats.numbers import (
     Cursor,

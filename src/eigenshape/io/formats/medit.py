@@ -14,7 +14,7 @@ import re
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.cells import N_CORNERS, SEGMENTS, Cells, require_splittable
 from eigenshape.io.formats.numbers import Cursor, numbers_of, quote_line, wholes
 

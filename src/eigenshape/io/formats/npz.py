@@ -10,7 +10,7 @@ from io import BytesIO
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import Cells, list_corners
 from eigenshape.io.formats.numbers import require_reasonable

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from eigenshape._errors import FileFormatError
-from eigenshape._files import require_lines
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import require_lines
 
 Line = tuple[int, bytes]  # its number in the file, and its text
 PLAIN = b"+-.0123456789eE \t\n"

@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import record
-from eigenshape._errors import FileFormatError
+from certeig.kit.arrays import record
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.cells import polygon_triangles
 from eigenshape.io.formats.numbers import (
     Line,

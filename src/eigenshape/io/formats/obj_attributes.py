@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._errors import FileFormatError
-from eigenshape._files import read_regular
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import read_regular
 from eigenshape.geometry.measure import area_vectors, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.polygons import cut_polygons

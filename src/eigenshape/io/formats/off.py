@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import polygon_triangles
 from eigenshape.io.formats.numbers import (

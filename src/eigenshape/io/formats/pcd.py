@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.cells import NO_TRIANGLES
 from eigenshape.io.formats.numbers import (
     Line,
@@ -86,7 +86,7 @@ def parse(data: bytes) -> tuple[Float[np.ndarray, "n 3"], np.ndarray, *tuple[str
 
 
 def n_rows(data: bytes) -> int:
-    """Return the rows of a frame of a depth camera, or 1 for points without an order."""
+    """Return the rows of a depth scan, or 1 for points without an order."""
     lines, _, _ = _split(data)
     words = {text.split()[0]: (number, text) for number, text in lines}
     if b"HEIGHT" not in words or b"WIDTH" not in words:

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._errors import FileFormatError
-from eigenshape._files import LONGEST_LINE
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import LONGEST_LINE
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import (
     list_corners,

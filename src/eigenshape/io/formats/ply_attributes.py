@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._errors import FileFormatError
-from eigenshape._files import read_regular
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import read_regular
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.polygons import triangulate_polygons
 from eigenshape.io.attributes import (

@@ -9,7 +9,7 @@ Refused: a row with fewer numbers; landmarks under the same suffix.
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.cells import NO_TRIANGLES
 from eigenshape.io.formats.numbers import (
     coordinates,

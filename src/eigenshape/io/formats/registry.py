@@ -9,8 +9,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
-from eigenshape._errors import FileFormatError
-from eigenshape._files import require_regular
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import require_regular
 
 CellKind = Literal["triangles", "quads", "tetrahedra"]
 """The kinds of cells that can be requested from a file."""

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import count_nouns

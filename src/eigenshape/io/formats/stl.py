@@ -9,7 +9,7 @@ Refused: a count that the file does not hold; shapes that single precision chang
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.geometry.measure import unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import weld

@@ -14,7 +14,7 @@ from urllib.parse import quote, unquote_to_bytes
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.cells import FOUR_CORNERED, CellLists, ParsedFields, ParsedShape
 from eigenshape.io.formats.numbers import Cursor, quote_line

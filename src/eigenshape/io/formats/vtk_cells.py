@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.cells import (
     FOUR_CORNERED,
     N_CORNERS,

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io.formats.cells import CellLists, ParsedFields, ParsedShape
 from eigenshape.io.formats.numbers import (

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.numbers import numbers_of
 
 # A surface of a brain has a tag for each parcel, and a note of its program of some kilobytes.

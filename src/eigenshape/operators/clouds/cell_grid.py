@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import record
-from eigenshape._kernels import math_functions
-from eigenshape._threads import map_in_threads
+from certeig.kit.arrays import record
+from certeig.kit.kernels import math_functions
+from certeig.kit.threads import map_in_threads
 from eigenshape.operators.clouds.pair_loops import count_pairs, fill_pairs, sum_differences
 
 AXES = 3  # axes that are cut into cells, those along which the points spread most

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import require_type
+from certeig.kit.arguments import require_type
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.geometry.simplices import size_one

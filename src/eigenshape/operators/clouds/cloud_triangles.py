@@ -4,10 +4,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import Integer
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import require_different_points
 from eigenshape.geometry.simplices import require_span, size_one

@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
-from eigenshape._arguments import require_choice, require_type
-from eigenshape._arrays import positive_values
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_choice, require_type
+from certeig.kit.arrays import positive_values
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.geometry.simplices import mean_side_length, require_span, size_one

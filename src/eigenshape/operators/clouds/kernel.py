@@ -13,10 +13,11 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import require_choice
-from eigenshape._arrays import positive_values
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._memory import require_memory
+from certeig.kit.arguments import require_choice
+from certeig.kit.arrays import positive_values
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.memory import require_memory
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.distances.geodesic import geodesic_balls
 from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT, size_one

@@ -5,9 +5,10 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import finite_rows, positive_number, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arrays import positive_number, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import finite_rows
 from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import adjacency_matrix, unique_edges
 

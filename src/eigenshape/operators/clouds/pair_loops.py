@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Bool, Float64, Int, Int32, Int64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 Cells: TypeAlias = tuple[
     Float64[np.ndarray, "n dim"],

@@ -14,12 +14,12 @@ from typing import Any
 
 from typing_extensions import TypeAliasType
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._errors import InvalidParameterError
-from eigenshape._files import content_digest
-from eigenshape._progress import Callback
-from eigenshape._text import Shown
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.files import content_digest
+from certeig.kit.progress import Callback
+from certeig.kit.text import Shown
+from certeig.kit.typing import Integer
 from eigenshape._workers import Item as Item  # noqa: PLC0414 - the room lists it from here
 from eigenshape._workers import Outcome, run_in_workers
 from eigenshape._workers import Workers as Workers  # noqa: PLC0414 - and this
@@ -131,7 +131,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
         Files, with the names and labels of their shapes.
     read : callable
         Return the mesh of a path: ``es.read_mesh``; ``es.io.read_surface``, which also makes
-        surfaces of point clouds and of frames of depth cameras; or a function of yours that a new
+        surfaces of point clouds and of depth scans; or a function of yours that a new
         process can import by name. It may return a `RepairedMesh`, whose report is kept.
     recipes : sequence of HeatRecipe or PatchRecipe, optional
         By default that of `ShapeIndex.default_recipe`.

@@ -6,11 +6,12 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record, vertex_values
-from eigenshape._progress import Progress
-from eigenshape._threads import map_in_threads
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.progress import Progress
+from certeig.kit.threads import map_in_threads
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import vertex_values
 from eigenshape.features.merge_tree import merge_tree
 from eigenshape.features.region_tree import MergeTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation, segment

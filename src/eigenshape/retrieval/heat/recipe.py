@@ -5,8 +5,8 @@ from itertools import pairwise
 from math import log
 from typing import Literal
 
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import html_repr, repr_of_changes
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import html_repr, repr_of_changes
 
 # Scales are a geometric sequence if the steps of their logarithms differ by less than this.
 EQUAL_STEPS = 1e-9

@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial.distance import cdist
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, record
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, freeze, record
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 
 

@@ -5,7 +5,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, face_labels, freeze, record
+from certeig.kit.arrays import ReadOnly, freeze, record
+from eigenshape._arrays import face_labels
 from eigenshape.geometry.conversion import as_mesh
 from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh

@@ -7,12 +7,13 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from eigenshape._arguments import require_each
-from eigenshape._arrays import ReadOnly, point_functions, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_each
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import point_functions
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facet_lists import label_components

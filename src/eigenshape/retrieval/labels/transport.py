@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._threads import one_blas_thread
+from certeig.kit.threads import one_blas_thread
 from eigenshape.retrieval.labels.labeled_shape import LabelPoints
 from eigenshape.retrieval.patches.matching import anchor_strain
 

@@ -6,7 +6,7 @@ A description has `n_codes` codes: for each base radius those of `n_sizes` sizes
 import numpy as np
 from jaxtyping import Float32, Float64, Int8, Int16, Int64, UInt8
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 
 @kernel("n_rows", "half")

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float, Float32, Int8
 from scipy.special import logsumexp
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, record
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, freeze, record
+from certeig.kit.threads import one_blas_thread
 from eigenshape.retrieval.patches.patches import Patches
 
 BASES = (0, 3, 6)  # radii, by number, for each of which a codebook is learned

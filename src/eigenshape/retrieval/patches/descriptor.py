@@ -7,11 +7,11 @@ from math import inf
 import numpy as np
 from jaxtyping import Int, Int8
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import Shown
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import Shown
+from certeig.kit.threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import (
     CLIP,
     PatchCodebook,
@@ -39,7 +39,7 @@ class PatchRecipe(Shown):
         sevenths of it.
     n_frames : int
         Sides from which an index describes a closed shape as a depth camera sees it, beside its
-        views. Six find more for queries that are single frames of a depth camera, and take 35 KB
+        views. Six find more for queries that are single depth scans, and take 35 KB
         and 1 CPU second a shape.
 
     Raises

@@ -1,4 +1,4 @@
-"""Distances between codes of shapes, the least over relative sizes, and their scale: how isolated a shape is."""
+"""Distances between codes of shapes, the least over relative sizes, and their correction for hubness."""
 
 from collections.abc import Callable, Sequence
 

@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
 from eigenshape.retrieval.patches.codebook import BASES, N_SIZES, PatchCodebook, whiten_numbers
 from eigenshape.retrieval.patches.matching_loops import between_landmarks, leading
 from eigenshape.retrieval.patches.patches import RADII, Patches

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
-from eigenshape._kernels import Out, kernel
+from certeig.kit.kernels import Out, kernel
 
 RINGS = 4  # rings of equal width in a disc
 TURN_BINS = 8  # bins of the cosine to the disc's normal, 0 to 1

@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from scipy.sparse.csgraph import shortest_path
 
-from eigenshape._arrays import ReadOnly, record, whole_number
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.threads import map_in_threads, one_blas_thread
+from certeig.kit.typing import Integer
 from eigenshape._errors import InvalidShapeError
-from eigenshape._threads import map_in_threads, one_blas_thread
-from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.geodesic import farthest_points
 from eigenshape.geometry.measure import mean_normals
@@ -114,7 +114,7 @@ def extract_patches(
         Viewpoints, spread evenly around the shape, if it is closed. An open shape has none.
     n_frames : int
         Of these viewpoints, how many are described once more as a depth camera sees the shape from
-        there (`simulate_scan`), with its noise and its gaps, so that single frames find the shape.
+        there (`simulate_scan`), with its noise and its gaps, so that single depth scans find the shape.
     clean : bool
         Whether to describe a copy that is turned outward (`orient_outward`) and smoothed as far as
         its noise requires (`denoise`), so that a scan compares with clean shapes. If False, faces
@@ -123,7 +123,7 @@ def extract_patches(
     Returns
     -------
     list of Patches
-        The whole first, then the views, then the frames. All points lie at vertices of the whole.
+        The whole first, then the views, then the depth scans. All points lie at vertices of the whole.
 
     Raises
     ------

@@ -8,11 +8,11 @@ from jaxtyping import Float
 from scipy.cluster.vq import kmeans2
 from scipy.special import logsumexp
 
-from eigenshape._arguments import require_each
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_each
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import Integer
 from eigenshape.retrieval.patches.codebook import (
     BASES,
     N_AXES,

@@ -6,8 +6,8 @@ from zlib import crc32
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.threads import one_blas_thread
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.patches.distance import (
     measure_isolations,

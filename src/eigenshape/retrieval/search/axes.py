@@ -4,8 +4,8 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float32, Int8, Int16
 
-from eigenshape._arrays import ReadOnly, freeze, record
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import ReadOnly, freeze, record
+from certeig.kit.threads import one_blas_thread
 
 # Axes kept at each base radius. With 64 the best ten were missed five times as often, and 256
 # would double the memory (benchmarks/bench_search.py).

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int8
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.patches.distance import scale_distances
 from eigenshape.retrieval.search.coarse import CoarseRows

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float, Float32, Int, Int8, Int64
 from numpy.lib.format import open_memmap, read_array
 
-from eigenshape._arrays import ReadOnly, freeze, record
-from eigenshape._errors import FileFormatError
-from eigenshape._files import replacing
+from certeig.kit.arrays import ReadOnly, freeze, record
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import replacing
 from eigenshape.retrieval.patches.code_loops import scan
 from eigenshape.retrieval.patches.descriptor import PatchRecipe
 from eigenshape.retrieval.patches.distance import N_REFERENCES, SIZE_PRICE, measure_isolations

@@ -9,9 +9,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float32, Int, Int8
 
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import html_repr
 from eigenshape._extras import import_extra
-from eigenshape._text import html_repr
 from eigenshape.retrieval.search.candidates import Supplier, smallest
 from eigenshape.retrieval.search.coarse import CoarseRows
 

@@ -7,10 +7,10 @@ from typing import overload
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import ReadOnly, freeze, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import Shown, html_repr
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arrays import ReadOnly, freeze, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import Shown, html_repr
+from certeig.kit.threads import one_blas_thread
 from eigenshape.retrieval.kinds import Descriptor, pair_points
 from eigenshape.retrieval.search.candidates import Method
 from eigenshape.retrieval.search.chances import class_chances

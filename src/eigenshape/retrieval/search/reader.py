@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import describe_value, require_type
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError, StoreError
+from certeig.kit.arguments import describe_value, require_type
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import html_repr
+from certeig.kit.typing import Integer
+from eigenshape._errors import StoreError
 from eigenshape._sealed import is_log_long
-from eigenshape._text import html_repr
-from eigenshape._typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe
@@ -229,7 +230,7 @@ class IndexReader:
         exact : bool
             Whether all are compared.
         is_scaled : bool
-            Whether scores are scaled by how isolated each shape is; otherwise they depend on the two
+            Whether scores are corrected for hubness; otherwise they depend on the two
             shapes alone.
 
         Returns

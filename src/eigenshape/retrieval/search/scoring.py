@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._threads import one_blas_thread
+from certeig.kit.threads import one_blas_thread
 from eigenshape.retrieval.kinds import Descriptor, as_stored, row_type, score_rows, verify_scores
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.search.candidates import Candidates

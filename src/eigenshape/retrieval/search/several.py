@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._files import as_path
-from eigenshape._typing import IndexLike, Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.files import as_path
+from certeig.kit.typing import Integer
+from eigenshape._typing import IndexLike
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.retrieval.kinds import Descriptor, describe
 from eigenshape.retrieval.patches.verification import N_VERIFIED
@@ -38,7 +39,7 @@ def query_indexes(
 ) -> Matches:
     """Ask several indexes, and return nearly what one index of all their shapes would have answered.
 
-    Each index scales scores by how isolated its shapes are among its own (`Match.distance`), which
+    Each index corrects scores for hubness among its own shapes (`Match.distance`), which
     one index of them all would do among all.
 
     The workers of an executor each ask some of the indexes: processes of this machine, or a

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eigenshape._text import Shown, printable
+from certeig.kit.text import Shown, printable
 
 MOST_NAMED = 3  # damages that a warning names; `ShapeIndex.verify` lists all
 

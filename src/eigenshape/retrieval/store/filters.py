@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arguments import require_each, require_type
-from eigenshape._errors import InvalidParameterError
+from certeig.kit.arguments import require_each, require_type
+from certeig.kit.errors import InvalidParameterError
 from eigenshape.retrieval.store.state import IndexState, tags_and_attributes
 
 RESERVED = ("label", "tag")  # keys of a filter that are no attributes; their values are texts

@@ -15,7 +15,7 @@ from zlib import crc32
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import record
+from certeig.kit.arrays import record
 from eigenshape._errors import StoreError
 from eigenshape._sealed import (
     DAMAGE,

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from certeig.kit.text import Shown
 from eigenshape._errors import StoreError
 from eigenshape._sealed import DAMAGE
-from eigenshape._text import Shown
 from eigenshape.retrieval.store.damage import Damage, warn_of_damage
 from eigenshape.retrieval.store.database import DATABASE, TABLES, writing
 from eigenshape.retrieval.store.state import DamagedEntryError, IndexState, read_state

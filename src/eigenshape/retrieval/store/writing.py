@@ -11,11 +11,12 @@ from zlib import crc32
 
 import numpy as np
 
-from eigenshape._arguments import require_each, require_type, require_unicode
-from eigenshape._arrays import record
-from eigenshape._errors import InvalidParameterError, StoreError
+from certeig.kit.arguments import require_each, require_type, require_unicode
+from certeig.kit.arrays import record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import Shown
+from eigenshape._errors import StoreError
 from eigenshape._sealed import checksum
-from eigenshape._text import Shown
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, details_of, recipe_to_text, rows_of
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (

@@ -3,12 +3,12 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_choice
-from eigenshape._arrays import ReadOnly, freeze, record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import Integer
+from certeig.kit.arguments import require_choice
+from certeig.kit.arrays import ReadOnly, freeze, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facets import facet_components, facet_table, without_pinches
 from eigenshape.geometry.requirements import require_sound

@@ -3,8 +3,9 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._errors import ConvergenceError
-from eigenshape._progress import Progress
+from certeig.kit.errors import ConvergenceError
+from certeig.kit.progress import Progress
+from certeig.sparse.symmetric_factor import EPS
 from eigenshape.geometry.facet_lists import FacetTable
 from eigenshape.geometry.simplices import scaled_corners, simplex_volumes, triangular_sides
 from eigenshape.geometry.simplicial import Mesh
@@ -15,7 +16,6 @@ from eigenshape.operators.crouzeix_raviart import (
     mass_floor,
 )
 from eigenshape.operators.laplacian import Laplacian
-from eigenshape.sparse.symmetric_factor import EPS
 from eigenshape.spectral.solve import solve_spectrum
 from eigenshape.spectral.spectrum import Spectrum
 

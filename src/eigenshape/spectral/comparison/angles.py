@@ -3,11 +3,14 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from certeig.solver.certify import quality
+from certeig.solver.eigenpairs import Pairs, error_bound
+from certeig.solver.pencil import Pencil, residual_norms
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.comparison.eigenspaces import (
     SEPARATED,
@@ -16,10 +19,8 @@ from eigenshape.spectral.comparison.eigenspaces import (
     principal_angles,
     separated_groups,
 )
-from eigenshape.spectral.solver.certify import quality
-from eigenshape.spectral.solver.eigenpairs import Pairs, error_bound
-from eigenshape.spectral.solver.kernel_values import to_pencil
-from eigenshape.spectral.solver.pencil import Pencil, normalize, residual_norms
+from eigenshape.spectral.kernel_values import to_pencil
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 Vectors = Float[np.ndarray, "n p"]

@@ -7,10 +7,11 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import finite_values, require_finite_rows, whole_numbers
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import finite_values, whole_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import require_finite_rows
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 
 # Exact eigenvalues that differ by less than this share of the larger one are copies of one

@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from eigenshape._arguments import require_each
-from eigenshape._arrays import ReadOnly, finite_values, record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_each
+from certeig.kit.arrays import ReadOnly, finite_values, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.operators.cotangent import cotangent_laplacian

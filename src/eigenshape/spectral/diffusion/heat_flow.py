@@ -5,15 +5,18 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.fft import dct
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import point_functions, positive_values
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress, silent
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
-from eigenshape.operators.laplacian import Laplacian, find_zero_row_sums, require_matrix
-from eigenshape.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
-from eigenshape.spectral.solver.pencil import Pencil, normalize
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import positive_values
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from certeig.matrices import find_zero_row_sums
+from certeig.solver.pencil import Pencil
+from certeig.sparse.symmetric_factor import SymmetricFactor, factorize_symmetric
+from eigenshape._arrays import point_functions
+from eigenshape.operators.laplacian import Laplacian, require_matrix
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.spectrum import Spectrum, decay_factors
 
 # Largest error by default, relative to the norm of the values: 25 to 30 solves for each factor.
@@ -110,8 +113,8 @@ def apply_heat(
 
     >>> import numpy as np
     >>> square = es.shapes.grid(8, 8)
-    >>> laplacian, rim = es.cotangent_laplacian(square), es.geometry.boundary_vertices(square)
-    >>> inner, free = es.operators.dirichlet_laplacian(laplacian, rim)
+    >>> laplacian, boundary = es.cotangent_laplacian(square), es.geometry.boundary_vertices(square)
+    >>> inner, free = es.operators.dirichlet_laplacian(laplacian, boundary)
     >>> values, warm = np.ones(square.n_vertices), np.zeros(square.n_vertices)
     >>> warm[free] = es.spectral.apply_heat(inner, values[free], 0.1)
     >>> bool(laplacian.mass.diagonal() @ warm < 0.1)  # it was the area, 1

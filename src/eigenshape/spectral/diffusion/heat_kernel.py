@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arrays import ReadOnly, freeze, record, whole_numbers
-from eigenshape._memory import require_memory
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arrays import ReadOnly, freeze, record, whole_numbers
+from certeig.kit.memory import require_memory
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
 from eigenshape.spectral.spectrum import Spectrum, decay_factors
 
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_choice
-from eigenshape._arrays import finite_values
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import Shown
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_choice
+from certeig.kit.arrays import finite_values
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import Shown
+from certeig.kit.typing import ArrayLike
 from eigenshape.operators.choices import Condition
 from eigenshape.spectral.spectrum import (
     Spectrum,

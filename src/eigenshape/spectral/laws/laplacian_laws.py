@@ -7,14 +7,17 @@ import scipy.sparse as sp
 from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arguments import require_type
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
+from certeig.kit.arguments import require_type
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.matrices import ASYMMETRY
+from certeig.solver.factor import Factor, factorize, rounding
+from certeig.solver.pencil import Pencil
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike
 from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.topology import vertex_components
-from eigenshape.operators.laplacian import ASYMMETRY, Laplacian
+from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.laws.agreement import sizes_of
 from eigenshape.spectral.laws.outcomes import (
     DEFAULT_PROMISES,
@@ -28,8 +31,7 @@ from eigenshape.spectral.laws.outcomes import (
     make_report,
 )
 from eigenshape.spectral.laws.transformations import Subject, as_subject
-from eigenshape.spectral.solver.factor import Factor, factorize, rounding
-from eigenshape.spectral.solver.pencil import Pencil, normalize
+from eigenshape.spectral.pencils import normalize
 
 ROW_SUM = 1e-11  # of the largest √(W_ii W_jj) in the row
 WEIGHT = 1e-11  # of √(W_ii W_jj): weights that are 0 in exact arithmetic come out on either side

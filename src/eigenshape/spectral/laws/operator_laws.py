@@ -7,9 +7,9 @@ from typing import Any, TypeAlias, get_args
 import numpy as np
 import scipy.sparse as sp
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import record
-from eigenshape._errors import EigenshapeError, InvalidParameterError
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import record
+from certeig.kit.errors import CerteigError, InvalidParameterError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike
 from eigenshape.operators.laplacian import Laplacian
@@ -173,7 +173,7 @@ def check_operator(
     rows_are_points = laplacian.n_points == _n_points(subject) if by_points is None else by_points
     spectrum = None
     if not rows_are_points:
-        with suppress(EigenshapeError):  # laws that need it are not judged, and say so
+        with suppress(CerteigError):  # laws that need it are not judged, and say so
             spectrum = lowest_eigenvalues(laplacian)
     rounding = _rounding(build, subject, spectrum or laplacian, random)
     trial = Trial(build, subject, laplacian, random, spectrum, rows_are_points, rounding)
@@ -195,7 +195,7 @@ def _rounding(
             elif expected.n_points == other.n_points:
                 change, _ = distance(expected, other)
             largest = max(largest, change)
-    except (EigenshapeError, ValueError, ArithmeticError):
+    except (CerteigError, ValueError, ArithmeticError):
         return LEAST_ROUNDING  # the laws that change coordinates will find the refusal
     return max(LEAST_ROUNDING, HEADROOM * largest)
 
@@ -218,7 +218,7 @@ def _rebuilding_laws(trial: Trial, promised: frozenset[Promise]) -> Iterator[Out
             continue
         try:
             outcome = law(name, trial)
-        except (EigenshapeError, ValueError, ArithmeticError) as err:
+        except (CerteigError, ValueError, ArithmeticError) as err:
             # An operator that refuses the shape told otherwise breaks the law.
             refusal = f"told otherwise, the shape or its spectrum is refused: {err}"
             outcome = Law(name, False, np.inf, trial.tolerance, refusal)

@@ -6,8 +6,8 @@ from typing import Literal, TypeAlias, get_args
 
 from typing_extensions import TypeAliasType
 
-from eigenshape._errors import InvalidParameterError
-from eigenshape._text import Shown, html_repr
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import Shown, html_repr
 
 Promise = TypeAliasType(
     "Promise",

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import describe_value
+from certeig.kit.arguments import describe_value
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
 from eigenshape.spectral.maps.functional_map import point_areas, unit_modes, unit_projector
 from eigenshape.spectral.signatures.heat import default_times
 from eigenshape.spectral.signatures.wave import default_energies, wave_bands

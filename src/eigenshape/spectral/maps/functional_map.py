@@ -3,11 +3,12 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, freeze, point_functions, record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, freeze, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import point_functions
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes
 
 # Share of the constant function that the first mode may lack. The eigenvectors of the approximate

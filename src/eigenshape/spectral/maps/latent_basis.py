@@ -9,12 +9,13 @@ from jaxtyping import Float
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arguments import describe_value, require_choice, require_type
-from eigenshape._arrays import ReadOnly, finite_rows, freeze, record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._memory import require_memory
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import describe_value, require_choice, require_type
+from certeig.kit.arrays import ReadOnly, freeze, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.memory import require_memory
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import finite_rows
 from eigenshape.spectral.maps.functional_map import LOST, FunctionalMap, point_areas, unit_modes
 from eigenshape.spectral.spectrum import Spectrum
 

@@ -7,12 +7,12 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import describe_value
-from eigenshape._arrays import as_array, finite_values
-from eigenshape._errors import InvalidParameterError
-from eigenshape._memory import require_memory
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import describe_value
+from certeig.kit.arrays import as_array, finite_values
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.memory import require_memory
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.spectral.maps.descriptors import (
     descriptor_functions,

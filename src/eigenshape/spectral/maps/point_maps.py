@@ -7,12 +7,12 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import as_array, freeze, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress, silent
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import as_array, freeze, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.spectral.maps.functional_map import (
     FunctionalMap,
     modes_of_both,

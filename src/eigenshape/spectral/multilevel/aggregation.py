@@ -4,10 +4,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arrays import record
-from eigenshape._threads import free_threads, map_in_threads, share_units
+from certeig.kit.arrays import record
+from certeig.kit.threads import free_threads, map_in_threads, share_units
+from certeig.solver.chebyshev import largest_ritz_value
 from eigenshape.spectral.multilevel.multilevel_loops import grow_aggregates, multiply_sparse
-from eigenshape.spectral.solver.chebyshev import largest_ritz_value
 
 LARGEST = 256  # most points in an aggregate, on average
 TOO_LITTLE = 1.5  # ratio of points between levels below which another level is not worth its cost

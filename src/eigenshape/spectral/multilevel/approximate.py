@@ -7,20 +7,21 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from eigenshape._arrays import record
-from eigenshape._errors import ConvergenceError, InvalidParameterError
-from eigenshape._memory import require_memory
-from eigenshape._progress import Progress, silent
+import certeig
+from certeig.kit.arrays import record
+from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.kit.memory import require_memory
+from certeig.kit.progress import Progress, silent
+from certeig.solver.certify import require_orthonormal
+from certeig.solver.eigenpairs import Pairs
+from certeig.solver.pencil import Pencil, as_pencil, residual_norms
+from certeig.solver.shift import factorize_near
+from certeig.solver.strategy import solve_lowest
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.multilevel.aggregation import build_levels
 from eigenshape.spectral.multilevel.davidson import WIDTH, Goal, finish_vectors, refine
 from eigenshape.spectral.multilevel.vcycle import Coarsest, Tower
-from eigenshape.spectral.solver.certify import require_orthonormal
-from eigenshape.spectral.solver.eigenpairs import Pairs
-from eigenshape.spectral.solver.pencil import Pencil, as_pencil, residual_norms
-from eigenshape.spectral.solver.shift import factorize_near
-from eigenshape.spectral.solver.strategy import solve_lowest
 
 # Points up to which the exact solve is faster.
 EXACT_POINTS = 600
@@ -72,7 +73,7 @@ class Start:
 
 def approximate_pairs(
     pencil: Pencil, k: int, accuracy: float, max_residual: float, report: Progress
-) -> tuple[Pairs, Certificate]:
+) -> tuple[Pairs, certeig.Certificate]:
     """Compute approximations of the k lowest pairs of a pencil with diagonal mass.
 
     Smoothed aggregation (Vaněk, Mandel and Brezina 1996) coarsens the operator to some thousand

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._errors import ConvergenceError
+from certeig.kit.errors import ConvergenceError
 from eigenshape.spectral.multilevel.residuals import (
     Interpolated,
     Stored,

@@ -7,8 +7,8 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arrays import record
-from eigenshape._threads import map_in_threads
+from certeig.kit.arrays import record
+from certeig.kit.threads import map_in_threads
 from eigenshape.spectral.multilevel.vcycle import Tower, multiply
 
 R = TypeVar("R")

@@ -7,12 +7,12 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arrays import record
-from eigenshape._threads import free_threads, map_in_threads, share_units
+from certeig.kit.arrays import record
+from certeig.kit.threads import free_threads, map_in_threads, share_units
+from certeig.solver.factor import Factor
+from certeig.solver.pencil import Pencil
 from eigenshape.spectral.multilevel.aggregation import ROWS_A_THREAD, Level
 from eigenshape.spectral.multilevel.multilevel_loops import multiply_rows, smoothing_step
-from eigenshape.spectral.solver.factor import Factor
-from eigenshape.spectral.solver.pencil import Pencil
 
 INNER_STEPS = 8  # smoothing steps on the levels between the finest and the coarsest
 

@@ -3,13 +3,15 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, positive_values, record, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._progress import Progress, silent
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
-from eigenshape.operators.laplacian import Laplacian
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, positive_values, record, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.progress import Progress, silent
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
+from certeig.solver.pencil import Pencil
+from eigenshape.operators.laplacian import GaussianKernel, Laplacian
+from eigenshape.spectral.kernel_values import from_pencil, require_readable
 from eigenshape.spectral.multilevel.approximate import (
     MOST_ROUNDS,
     SINGLE,
@@ -28,10 +30,9 @@ from eigenshape.spectral.multilevel.residuals import (
     norms_of_residuals,
 )
 from eigenshape.spectral.multilevel.vcycle import correct
+from eigenshape.spectral.pencils import normalize
 from eigenshape.spectral.signatures.heat import heat_kernel_signature
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver.kernel_values import from_pencil, require_readable
-from eigenshape.spectral.solver.pencil import Pencil, normalize
 from eigenshape.spectral.spectrum import exponential_decay
 
 LARGE = 100_000  # points beyond which the command line computes approximate signatures
@@ -167,7 +168,7 @@ def approximate_heat_signature(
     columns: Interpolated | Stored
     columns = Interpolated(start.tower, np.ascontiguousarray(start.below[0], np.float32))
     ritz = start.below[1]
-    estimate = _estimate(pencil, columns, ritz[:wanted], clock)
+    estimate = _estimate(laplacian.kernel, pencil, columns, ritz[:wanted], clock)
     bound = goal.accuracy * goal.scale(ritz)
     if (
         estimate.fall > bound
@@ -178,7 +179,7 @@ def approximate_heat_signature(
             start.tower, start.below, goal, on_level(report, 0, len(start.tower.levels))
         )
         columns = Stored(start.tower, stored)
-        estimate = _estimate(pencil, columns, ritz[:wanted], clock)
+        estimate = _estimate(laplacian.kernel, pencil, columns, ritz[:wanted], clock)
     report(0.95, "heat")
     heat = np.empty((pencil.n, len(clock)))
     decay = estimate.decay.astype(np.float32)
@@ -234,6 +235,7 @@ class _Estimate:
 
 
 def _estimate(
+    kernel: GaussianKernel | None,
     pencil: Pencil,
     columns: Interpolated | Stored,
     ritz: Float[np.ndarray, " k"],
@@ -246,8 +248,8 @@ def _estimate(
     constant of that height would.
     """
     values = pencil.values_out(ritz)
-    require_readable(pencil.kernel, values)
-    values = from_pencil(pencil.kernel, values)
+    require_readable(kernel, values)
+    values = from_pencil(kernel, values)
     decay = exponential_decay(np.maximum(values, 0), times)
     k, root = len(ritz), np.sqrt(columns.tower.levels[0].weights.sum())
     sample = np.unique(np.linspace(0, k - 1, min(k, SAMPLED_PAIRS)).round().astype(np.int64))

@@ -3,11 +3,11 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import positive_values, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import positive_values, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.spectral.spectrum import Spectrum, count_zero_modes, decay_factors
 
 # Relative difference between steps of log t up to which times count as a geometric sequence; the
@@ -146,9 +146,9 @@ def reflection_free_signature(
     --------
     >>> import eigenshape as es
     >>> mesh = es.shapes.grid(20, 20)
-    >>> laplacian, rim = es.cotangent_laplacian(mesh), es.geometry.boundary_vertices(mesh)
+    >>> laplacian, boundary = es.cotangent_laplacian(mesh), es.geometry.boundary_vertices(mesh)
     >>> free = es.solve_spectrum(laplacian, 60)
-    >>> fixed = es.solve_spectrum(laplacian, 60, fixed=rim)
+    >>> fixed = es.solve_spectrum(laplacian, 60, fixed=boundary)
     >>> es.spectral.reflection_free_signature(free, fixed, [0.02]).shape
     (441, 1)
     """

@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Float
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import finite_values, positive_values, whole_number
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike, Integer
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import finite_values, positive_values, whole_number
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.spectral.signatures.heat import positive_eigenvalues
 from eigenshape.spectral.spectrum import Spectrum
 

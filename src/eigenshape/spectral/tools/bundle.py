@@ -13,32 +13,29 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from eigenshape._arguments import describe_value, require_choice, require_each, require_type
-from eigenshape._arrays import ReadOnly, record, whole_number
-from eigenshape._errors import (
-    FileFormatError,
-    InvalidParameterError,
-    InvalidShapeError,
+from certeig.archive import (
+    open_archive,
+    require_finite_floats,
+    take_arrays,
+    write_arrays,
 )
+from certeig.kit.arguments import describe_value, require_choice, require_each, require_type
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.errors import FileFormatError, InvalidParameterError
+from certeig.kit.files import as_path
+from certeig.kit.progress import Callback, Progress
+from certeig.kit.typing import Integer
+from certeig.matrices import freeze_sparse
+from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
-from eigenshape._files import as_path
-from eigenshape._progress import Callback, Progress
-from eigenshape._typing import Integer
 from eigenshape._workers import Item, Workers, run_in_workers
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_mesh, as_shape
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.operators.catalog import build_laplacian
-from eigenshape.operators.laplacian import freeze_sparse
-from eigenshape.spectral.archive import (
-    open_archive,
-    require_finite_floats,
-    take_arrays,
-    write_arrays,
-)
+from eigenshape.spectral.cache import require_writable
 from eigenshape.spectral.solve import solve_spectrum
-from eigenshape.spectral.solver.cache import require_writable
 from eigenshape.spectral.tools.vertex_gradient import (
     Shape3,
     fit_gradient,
@@ -392,7 +389,7 @@ def _read_bundle(path: Path) -> dict[str, Any]:
     Raise FileFormatError if the file is not a bundle, is damaged or of another version, or its
     arrays do not fit together or are not finite.
     """
-    with open_archive(path, "bundle", FORMAT) as (_, archive):
+    with open_archive(path, "bundle", FORMAT, "eigenshape") as (_, archive):
         n, k = len(archive["mass"]), archive["eigenvalues"].size
         fields = take_arrays(archive, DENSE, SPARSE, n)
     shapes = {"frames": (n, 3, 3), "mass": (n,), "eigenvalues": (k,), "eigenvectors": (n, k)}

@@ -7,11 +7,11 @@ import scipy.linalg as sl
 from jaxtyping import Int
 from scipy.cluster.vq import vq
 
-from eigenshape._arguments import require_choice, require_type
-from eigenshape._arrays import as_array, whole_number
-from eigenshape._errors import InvalidParameterError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_choice, require_type
+from certeig.kit.arrays import as_array, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
 from eigenshape.operators.laplacian import Laplacian, require_matrix
 from eigenshape.spectral.spectrum import Spectrum, require_lowest
 from eigenshape.spectral.tools.embedding import count_constant_modes

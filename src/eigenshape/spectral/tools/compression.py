@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import describe_value
-from eigenshape._arrays import ReadOnly, record, whole_number
-from eigenshape._errors import FileFormatError
-from eigenshape._memory import available_memory
-from eigenshape._progress import Progress, silent
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import Integer
+from certeig.kit.arguments import describe_value
+from certeig.kit.arrays import ReadOnly, record, whole_number
+from certeig.kit.errors import FileFormatError
+from certeig.kit.memory import available_memory
+from certeig.kit.progress import Progress, silent
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one

@@ -5,7 +5,7 @@ from collections import deque
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 
 # What lies beyond an open side: nothing, a face with a new vertex, or a face whose third vertex is
 # the start of the open side that ends here, or the end of the one that begins here.

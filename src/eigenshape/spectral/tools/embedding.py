@@ -6,18 +6,18 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial.distance import cdist
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import (
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import (
     SHARE_OF_ARRAYS,
     positive_number,
     real_numbers,
     whole_number,
     whole_numbers,
 )
-from eigenshape._errors import InvalidParameterError
-from eigenshape._memory import require_memory
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.memory import require_memory
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
 from eigenshape.spectral.spectrum import (
     Spectrum,
     count_zero_modes,

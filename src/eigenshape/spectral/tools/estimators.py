@@ -9,9 +9,10 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
-from eigenshape._arguments import describe_value, require_choice
-from eigenshape._arrays import whole_number
-from eigenshape._errors import InvalidParameterError, MissingExtraError
+from certeig.kit.arguments import describe_value, require_choice
+from certeig.kit.arrays import whole_number
+from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import MissingExtraError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import SimplicialMesh

@@ -7,11 +7,13 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float
 
-from eigenshape._arguments import describe_value, require_choice, require_type
-from eigenshape._arrays import point_functions, real_numbers, require_finite_rows
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._threads import one_blas_thread
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import describe_value, require_choice, require_type
+from certeig.kit.arrays import real_numbers
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import one_blas_thread
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import point_functions, require_finite_rows
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh

@@ -3,10 +3,11 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._arguments import require_type
-from eigenshape._arrays import ReadOnly, record, vertex_values
-from eigenshape._errors import InvalidParameterError
-from eigenshape._typing import ArrayLike
+from certeig.kit.arguments import require_type
+from certeig.kit.arrays import ReadOnly, record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.typing import ArrayLike
+from eigenshape._arrays import vertex_values
 from eigenshape.calculus.level_sets import LevelSet, level_set
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facet_lists import label_components

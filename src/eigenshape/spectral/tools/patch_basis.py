@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from eigenshape._errors import ConvergenceError
+from certeig.kit.errors import ConvergenceError
 from eigenshape.geometry.topology import adjacency_matrix
 
 # Most vertices of a patch. A dense basis of 400 takes 0.04 s; with 800 files are 2 % smaller and

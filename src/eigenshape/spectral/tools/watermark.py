@@ -9,11 +9,12 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.special import betainc, ndtri
 
-from eigenshape._arguments import describe_value
-from eigenshape._arrays import positive_number, whole_number
-from eigenshape._errors import InvalidParameterError, InvalidShapeError
-from eigenshape._text import html_repr
-from eigenshape._typing import Integer
+from certeig.kit.arguments import describe_value
+from certeig.kit.arrays import positive_number, whole_number
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.text import html_repr
+from certeig.kit.typing import Integer
+from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one

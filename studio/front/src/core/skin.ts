@@ -2,7 +2,6 @@
 
 import * as three from "three";
 import { orderFaces } from "./order";
-import type { Surface } from "./surface";
 
 /** What the surface hands on to the split vertices: how they move, and how they are lit. */
 const SHARED = ["position", "normal", "exact", "exact_normal", "shares", "mark", "ambient"];
@@ -14,7 +13,7 @@ export class Skin extends three.Mesh<three.BufferGeometry, three.ShaderMaterial>
   private readonly sources: Uint32Array;
 
   constructor(
-    private readonly surface: Surface,
+    private readonly surface: three.Mesh<three.BufferGeometry, three.ShaderMaterial>,
     rows: Float32Array,
     corners: Uint32Array,
     readonly images: three.DataArrayTexture,

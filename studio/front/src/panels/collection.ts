@@ -1,6 +1,6 @@
 /** Collection: the mean shape, sliders for the modes in which specimens vary, and the specimens. */
 
-import type { Panel, Studio } from "../app";
+import type { App, Panel } from "../contract";
 import type { Collection, State } from "../core/backend";
 import { Form, h } from "../core/dom";
 import { alongNormals, bendByModes } from "../core/modes";
@@ -15,7 +15,7 @@ export class CollectionPanel implements Panel {
   readonly id = "collection";
   readonly title = "Collection";
   readonly needs = ["collection"];
-  private app!: Studio;
+  private app!: App;
   private readonly form = new Form(markup);
   private sliders: HTMLInputElement[] = [];
   private modes: Float32Array | null = null; // of the mean, one after the other
@@ -26,7 +26,7 @@ export class CollectionPanel implements Panel {
   private pose = "";
   private active = false;
 
-  build(app: Studio): HTMLElement {
+  build(app: App): HTMLElement {
     const { form } = this;
     this.app = app;
     form.on({

@@ -1,6 +1,6 @@
 /** What panels have in common that color the shape while they are shown. */
 
-import type { Panel, Studio } from "../app";
+import type { App, Panel } from "../contract";
 import type { State } from "../core/backend";
 import type { TypedArray } from "../core/wire";
 
@@ -9,13 +9,13 @@ export abstract class ColoringPanel implements Panel {
   abstract readonly id: string;
   abstract readonly title: string;
   readonly needs: string[] = [];
-  protected app!: Studio;
+  protected app!: App;
   protected active = false;
   private version = "";
   private ticket = 0;
   private readonly kept = new Map<string, Promise<TypedArray>>();
 
-  abstract build(app: Studio): HTMLElement;
+  abstract build(app: App): HTMLElement;
   /** What the arrays belong to: when it changes they are loaded again. */
   protected abstract versionOf(state: State): string;
   /** Load what is missing, and color the shape. */

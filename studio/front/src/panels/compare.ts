@@ -1,6 +1,6 @@
 /** Compare: a second shape beside this one, and which points of both correspond. */
 
-import type { Panel, Studio } from "../app";
+import type { App, Panel } from "../contract";
 import type { Change, Second, State } from "../core/backend";
 import { Beside } from "../core/beside";
 import { coverWith } from "../core/carry";
@@ -25,7 +25,7 @@ export class ComparePanel implements Panel {
   readonly id = "compare";
   readonly title = "Compare";
   readonly needs = ["beside"];
-  private app!: Studio;
+  private app!: App;
   private readonly form = new Form(markup);
   private key = ""; // tells the two shapes that are shown from others
   private map: Arrays | null = null;
@@ -36,7 +36,7 @@ export class ComparePanel implements Panel {
   private picking = false; // under the pointer
   private chosen: Both<number> | null = null; // points of a correction, -1 until chosen
 
-  build(app: Studio): HTMLElement {
+  build(app: App): HTMLElement {
     const { form } = this;
     this.app = app;
     form.on({

@@ -1,6 +1,6 @@
 /** Heat on the shape: how much stays at each point, or how it spreads from a picked source. */
 
-import type { Studio } from "../app";
+import type { App } from "../contract";
 import type { State } from "../core/backend";
 import { findRange, formatNumber } from "../core/colors";
 import type { Film } from "../core/film";
@@ -21,7 +21,7 @@ export class HeatPanel extends ColoringPanel {
   private view = "signature";
   private source = -1;
 
-  build(app: Studio): HTMLElement {
+  build(app: App): HTMLElement {
     const { form } = this;
     this.app = app;
     form.onChoice("heat", (view) => {

@@ -1,6 +1,6 @@
 /** Landmarks: named points that are placed, moved, saved, and carried to the second shape. */
 
-import type { Panel, Studio } from "../app";
+import type { App, Panel } from "../contract";
 import type { Landmark, State } from "../core/backend";
 import { partColors } from "../core/colors";
 import { download, Form, h, type NamedFile } from "../core/dom";
@@ -13,14 +13,14 @@ export class LandmarksPanel implements Panel {
   readonly id = "landmarks";
   readonly title = "Landmarks";
   readonly needs = ["beside"];
-  private app!: Studio;
+  private app!: App;
   private readonly form = new Form(markup);
   private active = false;
   private placing = false;
   private moving = -1; // row of the landmark that the next click moves
   private shownAs = ""; // what the list shows
 
-  build(app: Studio): HTMLElement {
+  build(app: App): HTMLElement {
     const { form } = this;
     this.app = app;
     form.on({

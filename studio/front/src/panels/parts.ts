@@ -1,7 +1,7 @@
 /** Parts: how many, applied at once, and the persistence diagram of heat. */
 
 import type uPlot from "uplot";
-import type { Studio } from "../app";
+import type { App } from "../contract";
 import type { State } from "../core/backend";
 import { formatNumber, partColors } from "../core/colors";
 import { download, Form } from "../core/dom";
@@ -29,7 +29,7 @@ export class PartsPanel extends ColoringPanel {
   private part = -1; // that is shown alone
   private index = -1; // of the chosen maximum
 
-  build(app: Studio): HTMLElement {
+  build(app: App): HTMLElement {
     const { form } = this;
     this.app = app;
     form.on({

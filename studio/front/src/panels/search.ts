@@ -1,6 +1,6 @@
 /** Search: the shapes of an index that are most like this one or a painted part of it. */
 
-import type { Panel, Studio } from "../app";
+import type { App, Panel } from "../contract";
 import type { Match, Matches, State } from "../core/backend";
 import type { Beside } from "../core/beside";
 import { rgbOf } from "../core/colors";
@@ -20,7 +20,7 @@ export class SearchPanel implements Panel {
   readonly id = "search";
   readonly title = "Search";
   readonly needs = ["query"];
-  private app!: Studio;
+  private app!: App;
   private readonly form = new Form(markup);
   private readonly list = this.form.get("matches");
   private found: Matches | null = null;
@@ -32,7 +32,7 @@ export class SearchPanel implements Panel {
   /** `painted` returns the vertices that are selected, if any are. */
   constructor(private readonly painted: () => Uint32Array) {}
 
-  build(app: Studio): HTMLElement {
+  build(app: App): HTMLElement {
     this.app = app;
     this.form.on({
       search: () => this.search(null),

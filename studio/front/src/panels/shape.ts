@@ -1,6 +1,6 @@
 /** The shape: its counts and health, repairs, values, and files to open and to save. */
 
-import type { Studio } from "../app";
+import type { App } from "../contract";
 import type { State, Vec3 } from "../core/backend";
 import { Vector3 } from "three";
 import { download, Form, h } from "../core/dom";
@@ -22,7 +22,7 @@ export class ShapePanel extends ColoringPanel {
   readonly title = "Shape";
   private readonly form = new Form(markup);
 
-  build(app: Studio): HTMLElement {
+  build(app: App): HTMLElement {
     const { form } = this;
     const can = app.state.capabilities;
     this.app = app;

@@ -1,7 +1,7 @@
 /** The spectrum: eigenvalues with their proof, and eigenfunctions with their nodal lines. */
 
 import type uPlot from "uplot";
-import type { Studio } from "../app";
+import type { App } from "../contract";
 import type { State } from "../core/backend";
 import { findRange, formatNumber } from "../core/colors";
 import type { Film } from "../core/film";
@@ -26,7 +26,7 @@ export class SpectrumPanel extends ColoringPanel {
   private view = "eigenfunction";
   private bent = false; // whether the shape is shown out of few modes
 
-  build(app: Studio): HTMLElement {
+  build(app: App): HTMLElement {
     const { form } = this;
     this.app = app;
     this.index = app.settings.get("eigenfunction", 1);

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.neuro.shared import NO_PARCEL, find_labels, shared_keys

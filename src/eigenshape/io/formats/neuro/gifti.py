@@ -14,8 +14,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._errors import FileFormatError
-from eigenshape._files import read_regular
+from certeig.kit.errors import FileFormatError
+from certeig.kit.files import read_regular
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.neuro.shared import (

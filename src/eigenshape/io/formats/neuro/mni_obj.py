@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.cells import CellLists
 from eigenshape.io.formats.numbers import Cursor
 

@@ -11,7 +11,8 @@ import math
 import numpy as np
 from jaxtyping import Float, Shaped
 
-from eigenshape._errors import FileFormatError, MissingExtraError
+from certeig.kit.errors import FileFormatError
+from eigenshape._errors import MissingExtraError
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.formats.neuro.shared import (
     UNNAMED,

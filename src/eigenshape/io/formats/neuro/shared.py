@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape._extras import import_extra
 from eigenshape.features.parcellation import Parcellation
 from eigenshape.geometry.mesh import TriangleMesh

@@ -9,7 +9,7 @@ Refused: a parent that is not there.
 import numpy as np
 from jaxtyping import Float, Int
 
-from eigenshape._errors import FileFormatError
+from certeig.kit.errors import FileFormatError
 from eigenshape.io.formats.numbers import (
     find_keys,
     lines_of,

@@ -1,6 +1,6 @@
 /** Bend: drag a limb, or choose and move regions, and the shape follows (chapter 6 of the thesis). */
 
-import type { Panel, Studio } from "../../app";
+import type { App, Panel } from "../../contract";
 import type { State } from "../../core/backend";
 import { Form, h } from "../../core/dom";
 import type { MotionKind } from "../../core/tools";
@@ -27,7 +27,7 @@ export class DeformPanel implements Panel {
   readonly title = "Bend";
   readonly needs = ["rig", "finish"];
   private readonly form = new Form(markup);
-  private app!: Studio;
+  private app!: App;
   private selection!: Selection;
   private motion!: Motion;
   limbs!: Limbs;
@@ -35,7 +35,7 @@ export class DeformPanel implements Panel {
   private pose = "";
   private active = false;
 
-  build(app: Studio): HTMLElement {
+  build(app: App): HTMLElement {
     const { form } = this;
     this.app = app;
     this.tool = app.settings.get<Tool>("tool", "limb");

@@ -1,10 +1,10 @@
 /** Edits and poses that come from files, or go into them. */
 
-import type { Studio } from "../../app";
+import type { App } from "../../contract";
 import { parseJson } from "../../core/dom";
 
 /** Apply the edits of a JSON file, which may have been made on another mesh of the shape. */
-export async function replayFile(app: Studio): Promise<void> {
+export async function replayFile(app: App): Promise<void> {
   const files = await app.choose(`.json,${app.state.suffixes}`, true);
   const written = files.find(({ name }) => name.endsWith(".json"));
   const source = files.find((file) => file !== written);
@@ -17,7 +17,7 @@ export async function replayFile(app: Studio): Promise<void> {
 }
 
 /** Carry the pose over to the shape of a file, which becomes the shape. */
-export async function transferToFile(app: Studio): Promise<void> {
+export async function transferToFile(app: App): Promise<void> {
   const [file] = await app.choose();
   if (!file) return;
   const { name, bytes } = file;

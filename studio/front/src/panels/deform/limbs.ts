@@ -4,7 +4,7 @@
  */
 
 import * as three from "three";
-import type { Studio } from "../../app";
+import type { App } from "../../contract";
 import type { Vec3 } from "../../core/backend";
 import { softenBorders } from "../../core/borders";
 import { isTouch } from "../../core/dom";
@@ -34,7 +34,7 @@ export class Limbs implements PointerTool {
   private readonly drag: PlainDrag;
 
   constructor(
-    private readonly app: Studio,
+    private readonly app: App,
     private readonly motion: Motion,
     private readonly selection: Selection,
   ) {

@@ -1,6 +1,6 @@
 /** How the regions move: by the pointer or by numbers, shown at once, and committed as an edit. */
 
-import type { Studio } from "../../app";
+import type { App } from "../../contract";
 import type { Change, Handle, Vec3 } from "../../core/backend";
 import { buildCoordinate, h, nextFrame, writeCoordinate, type Form } from "../../core/dom";
 import { FIXED } from "../../core/regions";
@@ -21,7 +21,7 @@ export class Motion {
   private motions = 0;
 
   constructor(
-    private readonly app: Studio,
+    private readonly app: App,
     private readonly form: Form,
     private readonly selection: Selection,
     private readonly events: { bound(): void; chooseRegion(region: number): void },

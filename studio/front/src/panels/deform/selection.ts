@@ -1,6 +1,6 @@
 /** Which vertices belong to which region: chosen by a box, a brush or parts. */
 
-import type { Studio } from "../../app";
+import type { App } from "../../contract";
 import type { State, Vec3 } from "../../core/backend";
 import type { Beside } from "../../core/beside";
 import { partColors, rgbOf } from "../../core/colors";
@@ -43,7 +43,7 @@ export class Selection {
   private painting: Promise<void> = Promise.resolve(); // discs of the brush, one after the other
 
   constructor(
-    private readonly app: Studio,
+    private readonly app: App,
     private readonly form: Form,
     private readonly events: SelectionEvents,
   ) {

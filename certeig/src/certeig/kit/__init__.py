@@ -1,0 +1,1 @@
+"""What packages built on certeig share: checks of arguments, arrays, files, threads, kernels in C."""

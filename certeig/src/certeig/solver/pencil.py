@@ -1,0 +1,369 @@
+"""The operator scaled to its own units, so that solvers are independent of the user's."""
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from scipy.sparse.csgraph import connected_components
+
+from certeig.advice import Advice
+from certeig.kit.arrays import record
+from certeig.kit.errors import InvalidParameterError
+from certeig.kit.threads import map_in_threads
+from certeig.solver.residual_loops import add_sums
+from certeig.sparse.elimination import Elimination, analyze_pattern
+from certeig.sparse.symmetric_factor import FactorMemory, factor_memory, factorize_symmetric
+
+EPS = float(np.finfo(np.float64).eps)
+# Columns that are processed together: enough for fast products, with little memory.
+COLUMNS_AT_ONCE = 64
+# Largest ratio of two diagonal entries: squares of vectors must not overflow.
+WIDEST_RANGE = 1e140
+# If trace W / trace B exceeds the median of W_ii/B_ii by this factor, the median is the pencil's
+# level: a few points must not set the unit of all tolerances.
+LARGEST_LEVEL_RATIO = 1e11
+ADVICE = Advice()
+
+
+@record
+class ShiftPattern:
+    """W and B in the union of their patterns, ready to factor W - σB for any σ.
+
+    Attributes
+    ----------
+    elimination : Elimination
+        Symbolic analysis of the union of both patterns.
+    stiffness, mass : (e,) float
+        The entries of W and B in this pattern, with zeros.
+    diagonal : (n,) int
+        The places of the diagonal entries.
+    memory : FactorMemory
+        For the factors of all shifts.
+    """
+
+    elimination: Elimination
+    stiffness: Float[np.ndarray, " e"]
+    mass: Float[np.ndarray, " e"]
+    diagonal: Int[np.ndarray, " n"]
+    memory: FactorMemory
+
+
+@record
+class Pencil:
+    """The problem W φ = λ B φ, scaled by powers of two, which change no digit.
+
+    Attributes
+    ----------
+    stiffness, mass : (n, n) sparse
+        W and B with largest diagonal entries between 1 and 4.
+    mass_diagonal : (n,) float
+        D, the diagonal of `mass`.
+    mass_floor : float
+        A proven c in (0, 1] with B ≥ c D as quadratic forms; 1 where B is diagonal.
+    labels : (n,) int
+        The connected part of W and B that each point belongs to, numbered by their first points.
+    level : float
+        trace W / trace B: about the mean of the eigenvalues, and the unit of every tolerance. For
+        several parts it is the harmonic mean, since small parts have few of the low eigenvalues. If
+        a few points make it far larger than the median of W_ii/B_ii, it is that median.
+    value_exponent, vector_exponent : int
+        Eigenvalues are 2**value_exponent times larger in the user's units, and vectors
+        2**vector_exponent times.
+    saturation : float
+        s of an operator whose eigenvalues are about level (1 - e^{-sx}) where others have level·x,
+        as those of Gaussian kernels are; 0 for others.
+    advice : Advice
+        What messages say.
+    """
+
+    stiffness: sp.csc_array
+    mass: sp.csc_array
+    mass_diagonal: Float[np.ndarray, " n"]
+    mass_floor: float
+    labels: Int[np.ndarray, " n"]
+    level: float
+    value_exponent: int
+    vector_exponent: int
+    saturation: float = 0.0
+    advice: Advice = ADVICE
+
+    @property
+    def n(self) -> int:
+        """Number of points."""
+        return len(self.mass_diagonal)
+
+    @cached_property
+    def shift_pattern(self) -> ShiftPattern:
+        """W and B in one pattern, analyzed once for the factors at all shifts."""
+        return _shift_pattern(self.stiffness, self.mass)
+
+    def weigh(self, vectors: Float[np.ndarray, "n b"]) -> Float[np.ndarray, "n b"]:
+        """Multiply by B."""
+        if self.mass_floor == 1.0:
+            return self.mass_diagonal[:, None] * vectors
+        return self.mass @ vectors
+
+    def values_out(self, values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Return eigenvalues in the user's units."""
+        return np.ldexp(values, self.value_exponent)
+
+    def vectors_out(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+        """Return B-normalized vectors in the user's units."""
+        return np.ldexp(vectors, self.vector_exponent)
+
+
+def normalize(
+    stiffness: sp.sparray,
+    mass: sp.sparray,
+    *,
+    known_floor: float = 0.0,
+    saturation: float = 0.0,
+    advice: Advice = ADVICE,
+) -> Pencil:
+    """Scale W and B by powers of two, and find a lower bound of B.
+
+    `known_floor` is a c with B ≥ c diag(B) that is known from how B was made, or 0.
+
+    Raises an InvalidParameterError if B is not positive definite, or entries on a diagonal lie too
+    far apart for floats.
+    """
+    _require_range("stiffness", stiffness.diagonal())
+    _require_range("mass", mass.diagonal())
+    pencil = _pencil(stiffness, mass, known_floor=known_floor)
+    return replace(pencil, saturation=saturation, advice=advice)
+
+
+def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
+    """Return the pencil of one part, given by its W and B, scaled to its own units."""
+    part = _pencil(stiffness, mass, known_floor=whole.mass_floor)
+    return replace(
+        part,
+        saturation=whole.saturation,
+        advice=whole.advice,
+        value_exponent=whole.value_exponent + part.value_exponent,
+        vector_exponent=whole.vector_exponent + part.vector_exponent,
+    )
+
+
+def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
+    """Make a pencil without scaling, for entries that are already of moderate size.
+
+    Raises an InvalidParameterError if B is not positive definite.
+    """
+    return _pencil(stiffness, mass, scaled=False)
+
+
+def _pencil(
+    stiffness: sp.sparray,
+    mass: sp.sparray,
+    *,
+    scaled: bool = True,
+    known_floor: float = 0.0,
+) -> Pencil:
+    up_w, up_b = (_exponent(stiffness), _exponent(mass)) if scaled else (0, 0)
+    up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
+    stiffness, mass = _scale(stiffness, -up_w), _scale(mass, -up_b)
+    diagonal = mass.diagonal()
+    mass_floor = _mass_floor(mass, diagonal, known_floor)
+    pattern = abs(stiffness) if mass_floor == 1.0 else abs(stiffness) + abs(mass)
+    labels = connected_components(pattern, directed=False)[1].astype(np.int64)
+    return Pencil(
+        stiffness=stiffness,
+        mass=mass,
+        mass_diagonal=diagonal,
+        mass_floor=mass_floor,
+        labels=labels,
+        level=_level(stiffness.diagonal(), diagonal, labels),
+        value_exponent=up_w - up_b,
+        vector_exponent=-(up_b // 2),
+    )
+
+
+def _require_range(name: str, diagonal: Float[np.ndarray, " n"]) -> None:
+    sizes = np.where(diagonal == 0, np.nan, np.abs(diagonal))
+    if np.isnan(sizes).all():
+        return
+    low, high = int(np.nanargmin(sizes)), int(np.nanargmax(sizes))
+    if sizes[high] / WIDEST_RANGE > sizes[low]:
+        raise InvalidParameterError(
+            f"Entries on the diagonal of {name} must lie within a factor of {WIDEST_RANGE:.0e}; entry {high} is "
+            f"{diagonal[high]:.3g} and entry {low} is {diagonal[low]:.3g}."
+        )
+
+
+def _level(
+    stiffness: Float[np.ndarray, " n"], mass: Float[np.ndarray, " n"], labels: Int[np.ndarray, " n"]
+) -> float:
+    mean = float(stiffness.sum() / mass.sum())
+    if labels.any() and mean > 0:
+        # The level that predicts the number of low eigenvalues of all parts (Weyl's law).
+        levels = np.bincount(labels, stiffness) / np.bincount(labels, mass)
+        counts, stiff = np.bincount(labels), levels > 0
+        mean = float(counts[stiff].sum() / (counts[stiff] / levels[stiff]).sum())
+    ratios = (stiffness / mass)[stiffness > 0]
+    if mean <= 0 or not ratios.size:
+        return 1.0
+    median = float(np.median(ratios))
+    return mean if mean < median * LARGEST_LEVEL_RATIO else median
+
+
+def _exponent(matrix: sp.sparray) -> int:
+    largest = float(np.abs(matrix.data).max(initial=0.0))
+    return int(np.frexp(largest)[1]) - 1 if largest > 0 else 0
+
+
+def _scale(matrix: sp.sparray, exponent: int) -> sp.csc_array:
+    scaled = sp.csc_array(matrix, dtype=np.float64, copy=True)
+    scaled.data = np.ldexp(scaled.data, exponent)
+    scaled.sum_duplicates()
+    return scaled
+
+
+def _shift_pattern(stiffness: sp.csc_array, mass: sp.csc_array) -> ShiftPattern:
+    # The sum of ones has an entry wherever W, B or the diagonal has one.
+    union = sp.eye_array(stiffness.shape[0], format="csc")
+    for matrix in (stiffness, mass):
+        ones = np.ones(matrix.nnz), matrix.indices, matrix.indptr
+        union = union + sp.csc_array(ones, shape=matrix.shape)
+    union.sort_indices()
+    keys = _keys(union)
+    diagonal = np.searchsorted(keys, np.arange(union.shape[1]) * (union.shape[1] + 1))
+    elimination = analyze_pattern(union)
+    return ShiftPattern(
+        elimination=elimination,
+        stiffness=_scatter(stiffness, keys),
+        mass=_scatter(mass, keys),
+        diagonal=diagonal,
+        memory=factor_memory(elimination),
+    )
+
+
+def _scatter(matrix: sp.csc_array, keys: Int[np.ndarray, " e"]) -> Float[np.ndarray, " e"]:
+    if matrix.nnz == len(keys):
+        return matrix.data
+    data = np.zeros(len(keys))
+    data[np.searchsorted(keys, _keys(matrix))] = matrix.data
+    return data
+
+
+def _keys(matrix: sp.csc_array) -> Int[np.ndarray, " e"]:
+    """Return the place of each entry in a full matrix, ascending if indices are sorted."""
+    n = matrix.shape[1]
+    return np.repeat(np.arange(n) * n, np.diff(matrix.indptr)) + matrix.indices
+
+
+def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"], known: float) -> float:
+    if (mass - sp.diags_array(diagonal)).count_nonzero() == 0:
+        return 1.0
+    # Linear elements have c = 1/2. The first of these that holds is used.
+    floors = 0.49 * 0.5 ** np.arange(12)
+    if known >= floors[-1]:
+        return float(floors[floors <= known].max())
+    # B - cD is positive definite exactly when all its pivots are positive.
+    pattern = _shift_pattern(mass, sp.csc_array(sp.diags_array(diagonal)))
+    for floor in floors.tolist():
+        lower = factorize_symmetric(pattern.elimination, pattern.stiffness - floor * pattern.mass)
+        if lower and (lower.pivots > 0).all():
+            return floor
+    place = int(np.argmax(lower.pivots <= 0)) if lower else 0
+    where = (
+        f", {lower.pivots[place]:.3g} at point {pattern.elimination.order[place]}" if lower else ""
+    )
+    raise InvalidParameterError(
+        f"mass must be positive definite; B - {floor:.1e} diag(B) has a pivot that is not positive{where}."
+    )
+
+
+def rayleigh_residuals(
+    pencil: Pencil, vectors: Float[np.ndarray, "n k"], near: Float[np.ndarray, " k"] | None = None
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """Return Rayleigh quotients of the columns and their error bounds (`residual_norms`).
+
+    Numbers near the quotients, where B is diagonal, save half of the products.
+    """
+    values, lengths, squares = _sums(pencil, vectors, near)
+    if near is not None:
+        # ‖Wφ - λBφ‖² = ‖Wφ - νBφ‖² - (λ - ν)² ‖Bφ‖² for ν near the quotient λ, in the norm of B⁻¹.
+        squares = np.maximum(squares - (values - near) ** 2 * lengths, EPS * squares)
+    return values, np.sqrt(squares / pencil.mass_floor / lengths)
+
+
+def residual_norms(
+    pencil: Pencil, values: Float[np.ndarray, " k"], vectors: Float[np.ndarray, "n k"]
+) -> Float[np.ndarray, " k"]:
+    """Bound the distance of each value to an eigenvalue.
+
+    |λ - eigenvalue| ≤ ‖Wφ - λBφ‖ / ‖φ‖ with the norms of B⁻¹ and B (Parlett 1998, theorem 15.9.1); B⁻¹ ≤ (cD)⁻¹.
+    """
+    _, lengths, squares = _sums(pencil, vectors, values)
+    return np.sqrt(squares / pencil.mass_floor / lengths)
+
+
+def _sums(
+    pencil: Pencil, vectors: Float[np.ndarray, "n k"], values: Float[np.ndarray, " k"] | None
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """Return φᵀWφ / φᵀBφ, φᵀBφ, and Σ (Wφ - λBφ)² / D of each column, λ as given or that quotient."""
+    sums = np.empty((3, vectors.shape[1]))
+    # One type of indices, whatever SciPy chose, as the kernel takes it.
+    stiffness, mass = (
+        (part.indptr.astype(np.int64), part.indices.astype(np.int64), part.data)
+        for part in (pencil.stiffness, pencil.mass)
+    )
+
+    def measure(columns: slice) -> None:
+        part = np.ascontiguousarray(vectors[:, columns])
+        k = part.shape[1]
+        scratch = np.empty((2, k)), np.zeros((3, k))
+        weights, own = pencil.mass_diagonal, np.zeros((3, k))
+        if values is None:
+            unused = np.zeros(k)
+            add_sums(stiffness, mass, part, unused, weights, False, *scratch, own)
+            given, own = own[0] / own[1], np.zeros((3, k))
+        else:
+            given = values[columns]
+        add_sums(stiffness, mass, part, given, weights, True, *scratch, own)
+        sums[:, columns] = own
+
+    map_in_threads(measure, column_chunks(vectors.shape[1]))
+    return sums[0] / sums[1], sums[1], sums[2]
+
+
+def gram_columns(
+    pencil: Pencil, vectors: Float[np.ndarray, "n k"], columns: slice, first: int = 0
+) -> Float[np.ndarray, "j c"]:
+    """Return ΦᵀBΦ - I in some columns, and in the rows from `first` to the last of these columns."""
+    weighed = pencil.weigh(vectors[:, columns])
+    rows = np.flatnonzero(weighed.any(axis=1))  # few where vectors live on parts
+    before = vectors[:, first : columns.stop]
+    every = len(rows) == pencil.n
+    off = before.T @ weighed if every else before[rows].T @ weighed[rows]
+    own = np.arange(off.shape[1])
+    off[columns.start - first + own, own] -= 1
+    return off
+
+
+def column_chunks(k: int) -> list[slice]:
+    """Split k columns into slices, so that intermediate results stay small."""
+    return [slice(start, min(start + COLUMNS_AT_ONCE, k)) for start in range(0, k, COLUMNS_AT_ONCE)]
+
+
+def to_user_vectors(pencil: Pencil, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    """Convert vectors in place to the user's units and the signs of `Spectrum`.
+
+    The result is read-only.
+    """
+    vectors = np.ascontiguousarray(vectors)
+    signs = np.ones(vectors.shape[1])
+
+    def choose_signs(columns: slice) -> None:
+        part = vectors[:, columns]
+        sizes = np.abs(part)
+        leading = np.argmax(sizes >= (1 - 1e-6) * sizes.max(axis=0), axis=0)
+        signs[columns] = np.where(part[leading, np.arange(part.shape[1])] < 0, -1.0, 1.0)
+
+    map_in_threads(choose_signs, column_chunks(vectors.shape[1]))
+    vectors *= pencil.vectors_out(signs[None])
+    vectors.flags.writeable = False
+    return vectors
