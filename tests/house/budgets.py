@@ -60,11 +60,14 @@ def read_budgets() -> dict[str, Row]:
 
 def write_budgets(rows: dict[str, Row]) -> None:
     """Write a row for each group, and the sum."""
+    rounded = {
+        group: {kind: round(number, 1) for kind, number in rows[group].items()} for group in GROUPS
+    }
     total: Counter[str] = Counter()
-    for group in GROUPS:
-        total.update(rows[group])
+    for row in rounded.values():
+        total.update(row)
     text = HEAD
-    for name, row in [*((group, rows[group]) for group in GROUPS), ("sum", total)]:
+    for name, row in (rounded | {"sum": total}).items():
         numbers = "".join(f"{kind} = {round(number, 1)}\n" for kind, number in row.items())
         text += f"\n[{name}]\n{numbers}"
     BUDGETS.write_text(text, encoding="utf-8")
