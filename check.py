@@ -48,10 +48,11 @@ def main() -> int:
         parser.error("a group is checked without options")
     # Tests start hundreds of processes, each of which would translate all modules anew.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    # Threads of BLAS burn a core while they wait for each other. Tests, docs and studio share two
-    # cores, where eigenvalues of a matrix of 300 rows took 130 times as long with two threads.
+    # Threads of BLAS and OpenMP burn a core while they wait for each other. Tests, docs and studio
+    # share two cores, where eigenvalues of a matrix of 300 rows took 130 times as long with two.
     if options.mode != "nightly":
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
     with tempfile.TemporaryDirectory() as site:
         if options.group:
             first, tests, beside = checks_of_group(options.group)

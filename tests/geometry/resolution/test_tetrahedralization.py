@@ -171,7 +171,9 @@ def test_bad_surfaces_are_refused(monkeypatch):
     with pytest.raises(InvalidShapeError, match=r"edge \[\d+, \d+\] has 1 \(3 such\)"):
         tetrahedralize(opened)
     assert es.geometry.is_closed(es.repair(opened, ["auto", "fill_holes"]).mesh)
-    fin = es.TriangleMesh([*BALL.vertices, [0, 0, 3]], [*BALL.faces, [*BALL.faces[0][:2], BALL.n_vertices]])
+    fin = es.TriangleMesh(
+        [*BALL.vertices, [0, 0, 3]], [*BALL.faces, [*BALL.faces[0][:2], BALL.n_vertices]]
+    )
     with pytest.raises(
         InvalidShapeError, match=r"has 3 \(3 such\)\. No repair here tells which of them to remove"
     ):
