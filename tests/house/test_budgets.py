@@ -15,8 +15,6 @@ ARROWS = [
     "core files eigenshape.io.mesh_files -> eigenshape.io.field_files:format_fields",
     "core files eigenshape.io.mesh_files -> eigenshape.io.field_files:read_field_attributes",
     "files neuro eigenshape.io.field_files -> eigenshape.io.formats.neuro.shared:side_of_file",
-    "match search eigenshape.collections.building -> eigenshape.io.folders:find_items",
-    "torch search eigenshape.torch.datasets -> eigenshape.io.folders:find_items",
 ]
 
 
