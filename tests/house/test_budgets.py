@@ -7,14 +7,7 @@ from groups import GROUPS, ROOT, arrows_against_walls, group_of, modules, privat
 
 # To be turned: a group, the one that it may not use, the module that does, and what it imports.
 ARROWS = [
-    "core files eigenshape.io.mesh_files -> eigenshape.io.attributes:MeshAttributes",
-    "core files eigenshape.io.mesh_files -> eigenshape.io.attributes:WriteJob",
-    "core files eigenshape.io.mesh_files -> eigenshape.io.attributes:label_attributes",
-    "core files eigenshape.io.mesh_files -> eigenshape.io.attributes:plain_attributes",
     "core files eigenshape.io.mesh_files -> eigenshape.io.carrying:carry_attributes",
-    "core files eigenshape.io.mesh_files -> eigenshape.io.field_files:format_fields",
-    "core files eigenshape.io.mesh_files -> eigenshape.io.field_files:read_field_attributes",
-    "files neuro eigenshape.io.field_files -> eigenshape.io.formats.neuro.shared:side_of_file",
 ]
 
 
