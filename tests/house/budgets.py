@@ -5,7 +5,7 @@
     python tests/house/budgets.py --grow    write what is there, more or less: the commit says what it is for
 
 Budgets stand in budgets.toml; private_across_walls.txt lists what groups import from others though no room names it.
-`python check.py --record` writes the CPU seconds, which no test compares.
+`python check.py --record` writes the CPU seconds, which no test compares; 0 is what has not been timed.
 """
 
 import argparse
