@@ -96,6 +96,13 @@ def public_names() -> dict[str, dict[str, str]]:
     return found
 
 
+# What every group may use: checks of arguments and arrays, errors, threads, kernels, files, workers
+TOOLKIT = (
+    "certeig.kit.",
+    *(f"eigenshape._{name}" for name in ("arrays", "errors", "sealed", "typing", "workers")),
+)
+
+
 @cache
 def private_across_walls() -> list[str]:
     """Return what groups import from other groups though no room names it: both groups, module and name."""
@@ -107,7 +114,7 @@ def private_across_walls() -> list[str]:
         {
             f"{group} {other} {each.origin}:{each.name}"
             for group, other, each in imports_across_walls()
-            if (each.origin, each.name) not in public
+            if (each.origin, each.name) not in public and not each.origin.startswith(TOOLKIT)
         }
     )
 
