@@ -74,9 +74,7 @@ def test_fronts_have_the_rows_of_their_definition_and_the_room_for_them(n, densi
     assert np.diff(e.places).tolist() == sizes
 
 
-@pytest.mark.parametrize(
-    "matrix", [surface(5000), laplacian(kronecker_sum(*[adjacency(10)] * 3))]
-)
+@pytest.mark.parametrize("matrix", [surface(5000), laplacian(kronecker_sum(*[adjacency(10)] * 3))])
 def test_surfaces_and_solids_below_zero_and_among_their_eigenvalues(matrix):
     stiffness, n = sp.csc_array(matrix), matrix.shape[0]
     elimination = analyze_pattern(stiffness)
@@ -135,9 +133,7 @@ def test_a_pivot_that_is_none(bad):
 
 
 def test_nothing_depends_on_the_run():
-    matrix = sp.csc_array(
-        surface(2000) + 0.1 * sp.eye_array(2000)
-    )
+    matrix = sp.csc_array(surface(2000) + 0.1 * sp.eye_array(2000))
     one, two = (factorize_symmetric(analyze_pattern(matrix), matrix.data) for _ in range(2))
     np.testing.assert_array_equal(one.panels, two.panels)
 

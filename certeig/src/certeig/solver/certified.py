@@ -173,7 +173,7 @@ def _complete(
     for _ in range(INTERVAL_RUNS):
         pairs = polish(pencil, factor, lowest_pairs(pencil, vectors, vectors.shape[1]))
         report(0.9)
-        gaps = _clear_gaps(pairs.values, interval)
+        gaps = _clear_gaps(pairs.values, interval, pencil.n)
         if gaps is None:
             return None
         (index, step), after = gaps
@@ -209,10 +209,12 @@ def _complete(
 
 
 def _clear_gaps(
-    values: Float[np.ndarray, " k"], interval: Interval
+    values: Float[np.ndarray, " k"], interval: Interval, n: int
 ) -> tuple[tuple[int, float], ...] | None:
     """Return where to count on each side: a pair, and the step from it into the widest gap outside the interval."""
     starts, ends = values[:-1], values[1:]
+    if interval.below_high == n:  # nothing lies above the interval, so the count is made there
+        starts, ends = values, np.append(ends, 1.01 * max(interval.high, float(values[-1])))
     before, after = (
         np.minimum(ends, interval.low) - starts,
         ends - np.maximum(starts, interval.high),
