@@ -29,6 +29,7 @@ TYPES_AND_LAYERS = {
 }
 # Each process takes half of the files in a row, so that tests of one file share what they make.
 TESTS = ["-m", "pytest", "--dist", "worksteal"]
+CERTEIG = ["-m", "pytest", "certeig/tests", "certeig/src"]  # with the options of its own package
 STUDIO = [
     "-m",
     "pytest",
@@ -55,6 +56,8 @@ def main() -> int:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with tempfile.TemporaryDirectory() as site:
         beside, tests = dict(TYPES_AND_LAYERS), {}
+        if "--fast" not in options:
+            beside["certeig"] = [*CERTEIG, *(["--types"] if everything else ["-m", "not long"])]
         if everything:
             pages = run_gallery(0, 1) if nightly else run_gallery(turn_of_commit(), TURNS)
             beside |= {"docs": [*DOCS, *pages, site], "studio": [*STUDIO, *nightly]}

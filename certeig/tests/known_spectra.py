@@ -94,10 +94,10 @@ def pencil_with(
     for _ in range(turns):
         order, angles = rng.permutation(n)[: 2 * (n // 2)], rng.uniform(0, 2 * np.pi, n // 2)
         one, two = order[::2], order[1::2]
-        turn = sp.lil_array(sp.eye_array(n))
-        turn[one, one] = turn[two, two] = np.cos(angles)
-        turn[one, two], turn[two, one] = np.sin(angles), -np.sin(angles)
-        rotation = sp.csr_array(turn) @ rotation
+        diagonal = np.ones(n)
+        diagonal[one] = diagonal[two] = np.cos(angles)
+        beside = sp.coo_array((np.sin(angles), (one, two)), shape=(n, n))
+        rotation = sp.csr_array(sp.diags_array(diagonal) + beside - beside.T) @ rotation
     few = rng.permutation(n)[:4]
     mirror = np.zeros((n, 1))
     mirror[few, 0] = rng.normal(size=len(few))

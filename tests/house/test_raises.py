@@ -4,6 +4,8 @@ import ast
 import re
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 ERRORS = {
     "InvalidShapeError",
@@ -15,8 +17,8 @@ ERRORS = {
 HOLE = "\0"
 
 
-def raised_messages():
-    for path in sorted((ROOT / "src").rglob("*.py")):
+def raised_messages(package):
+    for path in sorted((ROOT / package / "src").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             call = node.exc if isinstance(node, ast.Raise) else None
             if isinstance(call, ast.Call) and getattr(call.func, "id", "") in ERRORS and call.args:
@@ -34,7 +36,7 @@ def text_of(node):
 
 
 def expectations():
-    for path in sorted((ROOT / "tests").rglob("*.py")):
+    for path in [*ROOT.glob("tests/**/*.py"), *ROOT.glob("certeig/tests/**/*.py")]:
         for node in ast.walk(ast.parse(path.read_text())):
             if (
                 isinstance(node, ast.Constant)
@@ -51,11 +53,12 @@ def is_expected(message, wanted):
     return any(window in piece for piece in message.split(HOLE) for window in windows)
 
 
-def test_every_raise_is_expected_somewhere():
+@pytest.mark.parametrize("package", [".", "certeig"])
+def test_every_raise_is_expected_somewhere(package):
     wanted = list(expectations())
     missing = [
         f"{where} {message.replace(HOLE, '…')[:80]}"
-        for where, message in raised_messages()
+        for where, message in raised_messages(package)
         if message.strip(HOLE) and not any(is_expected(message, text) for text in wanted)
     ]
     assert not missing, "\n".join(missing)

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from certeig.kit.arrays import real_numbers, record
+from certeig.kit.arrays import record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import (
     SpareMemory,
@@ -55,8 +55,9 @@ class SymmetricFactor:
 
         Raises an InvalidParameterError if `right` does not have n rows of real numbers.
         """
-        right = real_numbers(right, "right")
-        n = len(self.pivots)
+        right, n = np.asarray(right), len(self.pivots)
+        if right.dtype.kind not in "biuf":
+            raise InvalidParameterError(f"right must be real numbers; the type is {right.dtype}.")
         if right.ndim not in (1, 2) or len(right) != n:
             raise InvalidParameterError(
                 f"right must have shape ({n},) or ({n}, b); its shape is {right.shape}."
