@@ -27,6 +27,7 @@ FORMAT, LINT, TYPES = ["-m", "ruff", "format", "--check"], ["-m", "ruff", "check
 LAYERS = ["-c", "from importlinter.cli import lint_imports_command as main; main()"]
 PYTEST = ["-m", "pytest", "--cpu", "40"]
 QUICK = ["-m", "not long"]
+CERTEIG = ["-m", "pytest", "certeig/tests", "certeig/src"]  # with the options of its own package
 DOCS = ["-m", "sphinx", "-q", "-W", "--keep-going", "docs"]
 
 Checks = dict[str, list[str]]
@@ -80,7 +81,10 @@ def checks_of_group(group: str) -> tuple[Checks, Checks, Checks]:
     quick = [*PYTEST, *QUICK, "--group", group, *tests]
     if group != "studio":  # which waits for a browser most of the time, in one process
         quick += two_processes()
-    return first, {"tests": quick}, {"types": [*TYPES, *sources]}
+    beside: Checks = {"types": [*TYPES, *sources]}
+    if group == "certeig":
+        beside["tests without shapes"] = CERTEIG
+    return first, {"tests": quick}, beside
 
 
 def checks_of_all(mode: str | None, site: str) -> tuple[Checks, Checks, Checks]:
@@ -94,10 +98,12 @@ def checks_of_all(mode: str | None, site: str) -> tuple[Checks, Checks, Checks]:
     if mode == "fast":
         return first, {}, beside
     if mode is None:
+        beside["certeig"] = CERTEIG
         return first, {"tests": [*PYTEST, *QUICK, *two_processes()]}, beside
     sweeps = ["--nightly"] if mode == "nightly" else []
     turn, turns = (0, 1) if sweeps else (turn_of_commit(), TURNS)
     beyond: Checks = {
+        "certeig": [*CERTEIG, "--types", "-m", ""],  # all, with the types of arguments checked
         "docs": [*DOCS, *run_gallery(turn, turns), site],
         "studio": [*PYTEST, *sweeps, "studio/tests"],
     }

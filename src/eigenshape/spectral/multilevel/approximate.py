@@ -22,6 +22,7 @@ from eigenshape.spectral.certificate import Certificate
 from eigenshape.spectral.multilevel.aggregation import build_levels
 from eigenshape.spectral.multilevel.davidson import WIDTH, Goal, finish_vectors, refine
 from eigenshape.spectral.multilevel.vcycle import Coarsest, Tower
+from eigenshape.spectral.pencils import ADVICE
 
 # Points up to which the exact solve is faster.
 EXACT_POINTS = 600
@@ -194,7 +195,7 @@ def _reorder(matrix: sp.sparray, order: Int[np.ndarray, " n"]) -> sp.csr_array:
 def _solve_coarsest(
     stiffness: sp.csr_array, mass: sp.csr_array, k: int, m: int
 ) -> tuple[Coarsest, Float[np.ndarray, " m"]]:
-    pencil = as_pencil(stiffness, mass)
+    pencil = as_pencil(stiffness, mass, ADVICE)
     pairs, _ = solve_lowest(pencil, m, silent)
     # The mean eigenvalue if all wanted ones are 0.
     last = max(float(pairs.values[k - 1]), pencil.level / pencil.n)
