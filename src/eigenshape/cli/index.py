@@ -107,7 +107,9 @@ def add(
         counts = f"{len(report.added)} described, {len(report.skipped)} indexed already"
         if pruned:
             counts += f", {len(pruned)} removed"
-        out.print(f"{counts}, {len(report.failed)} failed; the index holds {len(shelf)} shapes.")
+        out.print(
+            f"{counts}, {len(report.failed)} failed; the index holds {count_shapes(len(shelf))}."
+        )
         # On a terminal each file was named when it failed.
         for name, reason in () if out.is_terminal and err.is_terminal else report.failed:
             out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
@@ -190,7 +192,7 @@ def stats(index: Path, *, as_json: bool = False) -> None:
         )
         return
     each = n_bytes / max(len(records), 1) / KILOBYTE
-    out.print(f"{len(records)} shapes, {n_bytes / KILOBYTE:,.0f} KB, {each:.1f} KB a shape")
+    out.print(f"{count_shapes(len(records))}, {n_bytes / KILOBYTE:,.0f} KB, {each:.1f} KB a shape")
     if stage is not None:
         out.print(f"{escape_text(stage)}; shapes are added after that")
     rows = [[name, str(count)] for name, count in recipes.most_common()]
@@ -320,7 +322,7 @@ def duplicates(
         texts = [[one, two, f"{number:.3f}"] for one, two, number in pairs]
         print_table("Nearly the same", ["shape", "other", "score"], texts)
     else:
-        out.print(f"none of {len(shelf)} shapes is nearly the same as another")
+        out.print(f"none of {count_shapes(len(shelf))} is nearly the same as another")
 
 
 def learn(

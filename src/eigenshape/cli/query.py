@@ -19,6 +19,7 @@ from eigenshape._errors import StoreError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
+    count_shapes,
     err,
     escape_text,
     out,
@@ -254,7 +255,7 @@ def _print(answers: Sequence[_Answer], *, classify: bool) -> None:
     seconds = sum(sum(answer.seconds.values()) for answer in answers)
     n_compared = sum(answer.matches.n_compared for answer in answers)
     out.print(
-        f"described, and compared with {n_compared} shapes, in {seconds:.1f} s "
+        f"described, and compared with {count_shapes(n_compared)}, in {seconds:.1f} s "
         f"({answers[0].matches.method})"
     )
 
