@@ -64,7 +64,6 @@ class Shared:
         self.tree = es.merge_tree(self.animal, self.heat[:, -1])
         self.parts = es.segment(self.tree, n_regions=5)
         self.diagram = es.features.persistence_diagram(self.animal, self.heat[:, -1])
-        self.diagram2 = es.features.persistence_diagram(self.pose, self.heat[:, -1])
         self._make_bends()
         self._make_maps()
         self._make_descriptors()
@@ -391,7 +390,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ],
     "betti_numbers": lambda v: [es.geometry.betti_numbers(mesh) for mesh in (v.torus, v.solid)],
     "bind": lambda v: es.deformation.bind(v.rig, [v.region], fixed=v.fixed).shares,
-    "bottleneck_distance": lambda v: es.features.bottleneck_distance(v.diagram, v.diagram2),
     "bottleneck_matching": lambda v: es.stability.bottleneck_matching(
         v.on_one.points, v.on_two.points
     ),
