@@ -381,7 +381,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.animal, n_bases=40
     ),
     "average_onto_points": lambda v: es.calculus.average_onto_points(v.many, v.field),
-    "average_onto_simplices": lambda v: es.calculus.average_onto_simplices(v.many, v.many.vertices),
     "ball": lambda v: es.shapes.ball(3),
     "ball_eigenvalues": lambda v: es.shapes.ball_eigenvalues(9),
     "bend": lambda v: [
@@ -726,9 +725,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "replay": lambda v: es.deformation.replay(v.rig, [v.edit]).mesh,
     "rig_shape": lambda v: es.rig_shape(v.many, v.many_spectrum).factor,
-    "rotation_from_drag": lambda v: es.deformation.rotation_from_drag(
-        [0, 0, 0], [1, 0, 0], [0, 1, 0]
-    ),
     "sample_surface": lambda v: es.geometry.sample_surface(v.animal, 50, rng=rng()),
     "save_figure": lambda v: [
         saved(v, ".png"),

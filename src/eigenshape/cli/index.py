@@ -97,10 +97,9 @@ def add(
             recipe = es.retrieval.PatchRecipe(learned, n_frames=frames)
         report = steps.describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
     pruned = steps.prune(shelf, sources) if prune else []
-    doubles = steps.find_doubles(shelf, report.added)
     if as_json:
         facts = {"index": index, "shapes": len(shelf), **result_facts(report)}
-        print_json(facts | {"pruned": pruned, "doubles": doubles})
+        print_json(facts | {"pruned": pruned})
     else:
         for name, done in report.repaired:
             err.print(f"[yellow]repaired:[/] {escape_text(name)}: {escape_text('; '.join(done))}")
@@ -111,10 +110,6 @@ def add(
         # On a terminal each file was named when it failed.
         for name, reason in () if out.is_terminal and err.is_terminal else report.failed:
             out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
-        for one, two in doubles:
-            out.print(
-                f"  [yellow]{escape_text(two)}[/]: the same file content as {escape_text(one)}"
-            )
     if report.failed:
         raise typer.Exit(SOME_FAILED)
 

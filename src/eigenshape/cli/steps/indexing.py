@@ -137,21 +137,3 @@ def prune(shelf: ShapeIndex, sources: Sequence[Path]) -> list[str]:
     if gone:
         shelf.remove(*gone)  # in one step: each change of an index waits for the disk
     return gone
-
-
-def find_doubles(shelf: ShapeIndex, names: Sequence[str]) -> list[tuple[str, str]]:
-    """Pair each of some shapes with one of another name and the same content, if there is one.
-
-    A folder and one of its own folders name the same files differently, so both are indexed.
-    """
-    added = set(names)
-    records = sorted(shelf.records(), key=lambda record: record.name in added)
-    first: dict[str, str] = {}
-    pairs = []
-    for record in records:
-        if record.digest is None:
-            continue
-        known = first.setdefault(record.digest, record.name)
-        if known != record.name and record.name in added:
-            pairs.append((known, record.name))
-    return pairs
