@@ -17,18 +17,15 @@ from eigenshape.cli.console import (
     err,
     escape_text,
     out,
+    print_failures,
     print_json,
     print_table,
     print_written,
     progress_bar,
     result_facts,
 )
-from eigenshape.cli.inputs import Method, repair_names
+from eigenshape.cli.inputs import Memory, Method, Timeout, Workers, repair_names
 
-# Of the verbs that describe shapes in processes
-Workers = Annotated[int | None, typer.Option(min=1)]
-Timeout = Annotated[float, typer.Option(min=1)]
-Memory = Annotated[float | None, typer.Option(min=0.1)]
 Sides = Annotated[int | None, typer.Option(min=0, max=50)]
 
 KILOBYTE = 1000  # bytes
@@ -107,9 +104,7 @@ def add(
         if pruned:
             counts += f", {len(pruned)} removed"
         out.print(f"{counts}, {len(report.failed)} failed; the index holds {len(shelf)} shapes.")
-        # On a terminal each file was named when it failed.
-        for name, reason in () if out.is_terminal and err.is_terminal else report.failed:
-            out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
+        print_failures(report.failed)
     if report.failed:
         raise typer.Exit(SOME_FAILED)
 
