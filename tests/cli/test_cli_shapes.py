@@ -208,7 +208,7 @@ def test_an_operator_is_explained():
         ),
         (
             ("spectrum", "disc.off", "--set", "mass=heavy"),
-            "--set gives an option one of its values; those of mass are lumped, consistent, "
+            "--set gives an option one of its values; the values of mass are lumped, consistent, "
             "averaged, none, and it is 'heavy'",
         ),
         (

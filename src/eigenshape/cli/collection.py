@@ -97,7 +97,7 @@ def collection(
     written = ["mean.ply", "specimens.csv", "report.html"]
     carried = None
     warnings = [
-        f"landmarks: those of {name} are not used: it failed"
+        f"landmarks: the landmarks of {name} are not used, because it failed"
         for name in labelled
         if name not in known
     ]

@@ -255,7 +255,7 @@ def _read_settings(operator: str, settings: list[str]) -> dict[str, Any]:
             raise InvalidParameterError(
                 f"--set takes NAME=VALUE; the {operator} operator has the options "
                 f"{', '.join(known) or 'none'}, and it is {setting!r}. `eigenshape operators` lists "
-                "those of each operator."
+                "the options of each operator."
             )
         kinds = known[name]
         if text in kinds:
@@ -267,7 +267,7 @@ def _read_settings(operator: str, settings: list[str]) -> dict[str, Any]:
                 options[name] = float(text) if float in kinds else int(text)
             except ValueError as error:
                 raise InvalidParameterError(
-                    "--set gives an option one of its values; those of "
+                    "--set gives an option one of its values; the values of "
                     f"{name} are {', '.join(_values(kinds))}, and it is {text!r}."
                 ) from error
     return options

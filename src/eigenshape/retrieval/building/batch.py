@@ -182,7 +182,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
         require_each(recipes, AnyRecipe, "recipes")
     if learn and recipes is not None:
         raise InvalidParameterError(
-            "An index either learns a codebook or is given recipes; both were asked for. "
+            "An index either learns a codebook or is given recipes; both were given. "
             "Pass learn=False."
         )
     views = None if n_views is None else view_number(n_views, "n_views")

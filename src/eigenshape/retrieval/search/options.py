@@ -13,6 +13,8 @@ from certeig.kit.typing import Integer
 from eigenshape.retrieval.store.filters import choose_shapes
 from eigenshape.retrieval.store.state import IndexState
 
+MOST_MATCHES = 2**30  # no index holds as many shapes
+
 
 @dataclass(frozen=True)
 class QueryOptions:
@@ -36,7 +38,7 @@ class QueryOptions:
     must_know: bool = True
 
     def __post_init__(self) -> None:
-        whole_number(self.n_matches, "n_matches", 1)
+        whole_number(self.n_matches, "n_matches", 1, MOST_MATCHES)
 
     def choose(self, state: IndexState) -> "Choice":
         """Return which shapes of an index may be found; refuse what it does not know."""

@@ -96,7 +96,9 @@ class IndexReader:
         """Return the state that queries see now."""
         state = self._state
         if state is None:
-            raise StoreError("A reader must be open to be asked; it was closed. Open another one.")
+            raise StoreError(
+                "A reader must be open to be queried; it was closed. Open another one."
+            )
         return state
 
     def close(self) -> None:

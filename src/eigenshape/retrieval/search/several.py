@@ -20,7 +20,7 @@ from eigenshape.retrieval.kinds import Descriptor, describe_query
 from eigenshape.retrieval.patches.verification import N_VERIFIED
 from eigenshape.retrieval.search.chances import chances
 from eigenshape.retrieval.search.matches import Matches
-from eigenshape.retrieval.search.options import QueryOptions
+from eigenshape.retrieval.search.options import MOST_MATCHES, QueryOptions
 from eigenshape.retrieval.search.reader import IndexReader
 from eigenshape.retrieval.store.database import DATABASE
 
@@ -108,7 +108,7 @@ def query_indexes(
             )
     descriptor = describe_query(shape, _open_reader(paths[0]).default_recipe())
     wanted = int(n_matches)
-    more = replace(options, n_matches=wanted + N_VERIFIED)
+    more = replace(options, n_matches=min(wanted + N_VERIFIED, MOST_MATCHES))
     ask = partial(_ask, descriptor=descriptor, options=more)
     answers = list(map(ask, paths) if executor is None else executor.map(ask, paths))
     # Each index has matched the points of its own thirty nearest shapes. Here those count that are

@@ -129,7 +129,7 @@ def require_columns(recipe: AnyRecipe, n_columns: int, known: int) -> None:
     """Raise an error if rows by a recipe are longer or shorter than others."""
     if n_columns != known:
         raise InvalidParameterError(
-            f"All features of one recipe must have as many numbers; those of recipe "
+            f"All features of one recipe must have as many numbers; the features of recipe "
             f"{recipe.name!r} have {known}, and these have {n_columns}."
         )
 
