@@ -102,8 +102,8 @@ def query(
     side = steps.picture_side(view, up, picture, explain)
     steps.require_output(output, (".csv",), "A table")
     repairs, filters = repair_names(repair), steps.parse_filters(where)
-    shelf = es.ShapeIndex.open(index)
-    recipe = steps.query_recipe(shelf, method)
+    opened = es.ShapeIndex.open(index)
+    recipe = steps.query_recipe(opened, method)
     # Unlike the methods of Path, these say no to a text that cannot be a path, too.
     is_file, is_folder = isfile(scan), isdir(scan)  # noqa: PTH112, PTH113
     is_drawn = picture is not None or explain is not None
@@ -113,7 +113,7 @@ def query(
         )
 
     answers, failed = [], []
-    with shelf.reader() as reader:
+    with opened.reader() as reader:
         # Before scans are described, which takes seconds
         steps.choose_shapes(reader.state, filters)
         n_shown = max(n_matches, N_VOTES) if classify else n_matches

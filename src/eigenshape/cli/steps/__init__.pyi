@@ -12,7 +12,6 @@ from .facts import note_seams as note_seams
 from .facts import shape_facts as shape_facts
 from .indexing import choose_shapes as choose_shapes
 from .indexing import describe_all as describe_all
-from .indexing import find_doubles as find_doubles
 from .indexing import learn_codebook as learn_codebook
 from .indexing import parse_filters as parse_filters
 from .indexing import parse_part as parse_part
