@@ -43,6 +43,7 @@ class EIGENSHAPE_OT_match(Operation, bpy.types.Operator):  # noqa: N801
         part = self.read(context, context.object)
         whole = read_surface(context, other_object(context), repair=self.repair)
         scale, wanted = self.scale, self.transfer
+        colors = whole.read_colors() if "COLORS" in wanted else None
         match = yield lambda progress: es.match_shapes(
             part.mesh, whole.mesh, scale=scale, progress=progress
         )
@@ -55,8 +56,8 @@ class EIGENSHAPE_OT_match(Operation, bpy.types.Operator):  # noqa: N801
             part.write_groups(names, match.pull(weights))
         if "KEYS" in wanted:
             transfer_keys(whole, part, match)
-        if "COLORS" in wanted:
-            part.write_colors(match.pull(whole.read_colors()))
+        if colors is not None:
+            part.write_colors(match.pull(colors))
         sure = match.sure().mean()
         self.report({"INFO"}, f"{sure:.0%} of the vertices are right with a probability of 0.5")
         for line in match.report:
