@@ -3,11 +3,12 @@
 from math import atan2
 
 import bpy
-import eigenshape as es
 import numpy as np
 from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
+
+import eigenshape as es
 
 from .operation import CancelledError, Operation, Steps
 from .surface import Surface, move_points, new_object
@@ -22,7 +23,9 @@ class EIGENSHAPE_OT_bend(Operation, bpy.types.Operator):  # noqa: N801
     bl_idname = "eigenshape.bend"
     bl_label = "Bend"
 
-    group: StringProperty(name="Group", description="Vertex group that turns; by default, the active")
+    group: StringProperty(
+        name="Group", description="Vertex group that turns; by default, the active"
+    )
     axis: FloatVectorProperty(name="Axis", description="In the world", default=(0, 0, 1))
     angle: FloatProperty(name="Angle", subtype="ANGLE")
     mode: EnumProperty(

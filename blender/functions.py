@@ -1,9 +1,10 @@
 """Eigenfunctions and heat as attributes of the vertices, and attributes as colors."""
 
 import bpy
-import eigenshape as es
 import numpy as np
 from bpy.props import IntProperty, StringProperty
+
+import eigenshape as es
 
 from .operation import Operation, Steps
 

@@ -1,9 +1,10 @@
 """Match the active object to the selected one, and transfer what that one carries."""
 
 import bpy
-import eigenshape as es
 import numpy as np
 from bpy.props import EnumProperty
+
+import eigenshape as es
 
 from .operation import Operation, Steps
 from .surface import Surface, read_surface

@@ -6,8 +6,9 @@ from threading import Event, Thread
 from typing import Any
 
 import bpy
-import eigenshape as es
 from bpy.props import BoolProperty
+
+import eigenshape as es
 
 from .surface import Surface, read_surface
 

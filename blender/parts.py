@@ -3,9 +3,10 @@
 import re
 
 import bpy
-import eigenshape as es
 import numpy as np
 from bpy.props import FloatProperty
+
+import eigenshape as es
 
 from .operation import Operation, Steps
 

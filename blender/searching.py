@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import bpy
-import eigenshape as es
 import numpy as np
 from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, StringProperty
+
+import eigenshape as es
 
 from .operation import Operation, Steps
 from .surface import new_object

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import bpy
-import eigenshape as es
 import numpy as np
 from scipy.spatial import cKDTree
 
+import eigenshape as es
 
 # Attributes that hold a number for each vertex, and the type of the numbers.
 SCALARS = {("POINT", "FLOAT"): np.float32, ("POINT", "INT"): np.int32}
@@ -266,7 +266,9 @@ def coordinates(points: bpy.types.bpy_prop_collection) -> np.ndarray:
     return flat.reshape(-1, 3).astype(float)
 
 
-def move_points(data: bpy.types.Mesh, points: bpy.types.bpy_prop_collection, to: np.ndarray) -> None:
+def move_points(
+    data: bpy.types.Mesh, points: bpy.types.bpy_prop_collection, to: np.ndarray
+) -> None:
     """Give vertices or a shape key of a mesh other coordinates (N, 3)."""
     points.foreach_set("co", to.astype(np.float32).ravel())
     data.update()

@@ -13,9 +13,9 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix, Quaternion
 from eigenshape_extension import bending, build, matching, operation, panel
 from eigenshape_extension.surface import read_surface
+from mathutils import Matrix, Quaternion
 
 import eigenshape as es
 
@@ -127,14 +127,16 @@ def test_heat_is_that_of_the_library(animal):
 def test_an_attribute_becomes_colors(animal):
     bpy.ops.eigenshape.eigenfunctions(count=3)
     assert bpy.ops.eigenshape.color(name="eigenfunction 2", color_map="gray") == FINISHED
-    shown = np.array([each.color_srgb[:] for each in animal.data.color_attributes["eigenshape"].data])
+    shown = np.array(
+        [each.color_srgb[:] for each in animal.data.color_attributes["eigenshape"].data]
+    )
     expected = es.plot.value_colors(attribute(animal, "eigenfunction 2"), "gray")
     np.testing.assert_allclose(shown[:, :3], expected / 255, atol=1 / 255)
 
 
 def test_a_color_needs_an_attribute_of_the_vertices(animal):
     animal.data.attributes.new("side", "INT", "FACE")
-    with pytest.raises(RuntimeError, match="a number for each vertex; 'animal' has .* not 'side'"):
+    with pytest.raises(RuntimeError, match=r"number for each vertex; 'animal' has .* not 'side'"):
         bpy.ops.eigenshape.color(name="side")
 
 
