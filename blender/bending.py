@@ -50,7 +50,8 @@ class EIGENSHAPE_OT_bend(Operation, bpy.types.Operator):  # noqa: N801
         turn, mode = es.Rotation(pivot, self.axis, self.angle), self.mode
         bent = yield lambda _: es.deformation.bend(binding, [turn], mode=mode)
         surface.adopt()
-        surface.move(bent.vertices, "bent")
+        # Where there are shape keys, Blender shows these, and not the vertices.
+        surface.write_key("bent" if surface.data.shape_keys else None, bent.vertices)
 
     def _follow_mouse(
         self,

@@ -14,7 +14,6 @@ import tempfile
 import tomllib
 import zipfile
 from pathlib import Path
-from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -24,32 +23,28 @@ PYTHON = "3.11"  # of Blender 4.5 and 5.0
 NUMPY = "numpy==1.26.4"
 
 
-class Platform(NamedTuple):
-    """A platform: its name for the compiler of the kernels, and the tags of wheels that it takes."""
-
-    target: str
-    tags: tuple[str, ...]
-
-
+# For each platform of Blender, its name for the compiler of the kernels, and the tags of its wheels.
 PLATFORMS = {
-    "linux-x64": Platform(
-        "linux-x86_64", ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64")
+    "linux-x64": (
+        "linux-x86_64",
+        ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux2014_x86_64"],
     ),
-    "macos-arm64": Platform("macosx-arm64", ("macosx_12_0_arm64",)),
-    "macos-x64": Platform("macosx-x86_64", ("macosx_12_0_x86_64",)),
-    "windows-x64": Platform("win-amd64", ("win_amd64",)),
+    "macos-arm64": ("macosx-arm64", ["macosx_12_0_arm64"]),
+    "macos-x64": ("macosx-x86_64", ["macosx_12_0_x86_64"]),
+    "windows-x64": ("win-amd64", ["win_amd64"]),
 }
 
 
-def collect_wheels(platform: Platform, folder: Path) -> None:
+def collect_wheels(platform: str, folder: Path) -> None:
     """Build the wheels of certeig and eigenshape, and download what they need."""
+    target, tags = PLATFORMS[platform]
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
-    kernels = os.environ | {"CERTEIG_TARGET": platform.target}
+    kernels = os.environ | {"CERTEIG_TARGET": target}
     wheel = ["wheel", "--no-deps", "--wheel-dir", str(folder), str(ROOT / "certeig"), str(ROOT)]
     subprocess.run([*pip, *wheel], check=True, env=kernels)
     own = sorted(str(path) for path in folder.glob("*.whl"))
-    tags = [option for tag in platform.tags for option in ("--platform", tag)]
-    choice = ["--only-binary=:all:", "--python-version", PYTHON, "--implementation", "cp", *tags]
+    choice = ["--only-binary=:all:", "--python-version", PYTHON, "--implementation", "cp"]
+    choice += [f"--platform={tag}" for tag in tags]
     subprocess.run([*pip, "download", "--dest", str(folder), *choice, NUMPY, *own], check=True)
     for path in folder.glob("numpy-*.whl"):
         path.unlink()
@@ -89,7 +84,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         wheels = Path(folder)
-        collect_wheels(PLATFORMS[options.platform], wheels)
+        collect_wheels(options.platform, wheels)
         path = zip_extension(options.platform, wheels, options.output)
     sys.stdout.write(f"{path} ({path.stat().st_size / 1e6:.0f} MB)\n")
 

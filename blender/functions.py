@@ -1,8 +1,8 @@
-"""Eigenfunctions and heat as attributes of the vertices, and attributes as colors."""
+"""Eigenfunctions and heat as attributes of the vertices."""
 
 import bpy
 import numpy as np
-from bpy.props import IntProperty, StringProperty
+from bpy.props import IntProperty
 
 import eigenshape as es
 
@@ -62,26 +62,6 @@ class EIGENSHAPE_OT_heat(Operation, bpy.types.Operator):  # noqa: N801
         surface.write_colors(es.plot.value_colors(np.log(heat[:, n_times // 2]), "inferno"))
 
 
-class EIGENSHAPE_OT_color(Operation, bpy.types.Operator):  # noqa: N801
-    """Show an attribute of the vertices as colors (shading of the viewport: Attribute)."""
-
-    bl_idname = "eigenshape.color"
-    bl_label = "Color by Attribute"
-
-    name: StringProperty(name="Attribute", description="By default, the active attribute")
-    color_map: StringProperty(name="Color Map", description="Of matplotlib", default="viridis")
-
-    def steps(self, context: bpy.types.Context) -> Steps:
-        """Color each vertex; nothing is computed that takes time."""
-        surface = self.read(context, context.object)
-        active = surface.data.attributes.active
-        name = self.name or (active.name if active else "")
-        values = surface.read_attribute(name)
-        surface.adopt()
-        surface.write_colors(es.plot.value_colors(values, self.color_map))
-        yield from ()
-
-
 register, unregister = bpy.utils.register_classes_factory(
-    [EIGENSHAPE_OT_eigenfunctions, EIGENSHAPE_OT_heat, EIGENSHAPE_OT_color]
+    [EIGENSHAPE_OT_eigenfunctions, EIGENSHAPE_OT_heat]
 )

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Generator
+from concurrent.futures import Future, wait
 from threading import Event, Thread
 from typing import Any
 
@@ -25,35 +26,26 @@ class CancelledError(Exception):
 
 
 class Job:
-    """A computation in a thread of its own, which must not touch Blender's data.
-
-    Attributes
-    ----------
-    fraction : float
-        How much is done, 0 to 1.
-    notes : list of str
-        The warnings so far.
-    """
+    """A computation in a thread of its own, which must not touch Blender's data."""
 
     def __init__(self, compute: Compute) -> None:
-        self.fraction = 0.0
-        self.notes: list[str] = []
-        self._compute = compute
-        self._cancelled, self._done = Event(), Event()
-        self._result: Any = None
-        self._error: BaseException | None = None
+        self.fraction = 0.0  # how much is done, 0 to 1
+        self.notes: list[str] = []  # the warnings, when it is done
+        self._cancelled = Event()
+        self._future: Future[Any] = Future()
         # A daemon does not keep Blender open that is closed meanwhile.
-        Thread(target=self._run, daemon=True).start()
+        Thread(target=self._run, args=[compute], daemon=True).start()
 
-    def _run(self) -> None:
+    def _run(self, compute: Compute) -> None:
         try:
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always", UserWarning)
-                self._result = self._compute(self._progress)
-            self.notes = [str(each.message) for each in caught]
+                result = compute(self._progress)
         except BaseException as error:  # noqa: BLE001 - raised again in Blender's thread
-            self._error = error
-        self._done.set()
+            self._future.set_exception(error)
+        else:
+            self.notes = [str(each.message) for each in caught]
+            self._future.set_result(result)
 
     def _progress(self, fraction: float, _message: str) -> None:
         if self._cancelled.is_set():
@@ -66,13 +58,11 @@ class Job:
 
     def wait(self, seconds: float) -> bool:
         """Wait for the end, at most so long; return whether it was reached."""
-        return self._done.wait(seconds)
+        return bool(wait([self._future], seconds).done)
 
     def result(self) -> Any:
         """Return what was computed, or raise the error that ended it."""
-        if self._error is not None:
-            raise self._error
-        return self._result
+        return self._future.result()
 
 
 class Operation:
@@ -104,6 +94,11 @@ class Operation:
 
     def read(self, context: bpy.types.Context, owner: bpy.types.Object | None) -> Surface:
         """Read the mesh of an object with the options of the operator, and report repairs."""
+        if owner is not None and owner.data is not None and not owner.data.is_editable:
+            raise es.InvalidParameterError(
+                f"The object must belong to this file; {owner.name!r} is linked from another one. "
+                "Choose Object > Relations > Make Local > Selected Objects and Data."
+            )
         surface = read_surface(
             context, owner, apply_modifiers=self.apply_modifiers, repair=self.repair
         )
@@ -170,6 +165,9 @@ class Operation:
             remedy = "" if self.repair or "repair(" not in str(error) else " Here: tick Repair."
             self.report({"ERROR"}, f"{error}{remedy}")
             return {"CANCELLED"}
+        except Exception:  # a fault of ours, which Blender shows: it calls nothing afterwards
+            self._end(context, {"CANCELLED"})
+            raise
         if compute is not None:
             self._job = Job(compute)
         return {"RUNNING_MODAL"}

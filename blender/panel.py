@@ -4,7 +4,7 @@ import bpy
 
 ROWS = {
     "Parts": ("find_parts", "bend"),
-    "Functions": ("eigenfunctions", "heat", "color"),
+    "Functions": ("eigenfunctions", "heat"),
 }
 
 

@@ -9,40 +9,21 @@ from scipy.spatial import cKDTree
 
 import eigenshape as es
 
-# Attributes that hold a number for each vertex, and the type of the numbers.
-SCALARS = {("POINT", "FLOAT"): np.float32, ("POINT", "INT"): np.int32}
-
 
 @dataclass(frozen=True)
 class Surface:
     """A mesh as eigenshape computes with it, and the object that it was read from.
 
     Blender's mesh has N vertices, some of which may have no face; the triangles have n.
-
-    Attributes
-    ----------
-    owner : bpy.types.Object
-    data : bpy.types.Mesh
-        The mesh of the object, or a new one with its modifiers applied (see `adopt`).
-    mesh : TriangleMesh
-        Its faces as triangles, in world coordinates and Blender units.
-    places : (N,) int
-        For each vertex of the object, its vertex in `mesh`.
-    used : (N,) bool
-        Whether the vertex is in `mesh` at all.
-    sources : (n,) int
-        For each vertex of `mesh`, a vertex of the object.
-    report : tuple of str
-        What was repaired.
     """
 
     owner: bpy.types.Object
-    data: bpy.types.Mesh
-    mesh: es.TriangleMesh
-    places: np.ndarray
-    used: np.ndarray
-    sources: np.ndarray
-    report: tuple[str, ...]
+    data: bpy.types.Mesh  # of the owner, or a new one with its modifiers applied (see `adopt`)
+    mesh: es.TriangleMesh  # in world coordinates and Blender units
+    places: np.ndarray  # (N,): for each vertex of `data`, its vertex in `mesh`
+    used: np.ndarray  # (N,): whether it is in `mesh` at all
+    sources: np.ndarray  # (n,): for each vertex of `mesh`, a vertex of `data`
+    report: tuple[str, ...]  # what was repaired
 
     def adopt(self) -> None:
         """Give the object the mesh that was read, if its modifiers were applied."""
@@ -129,33 +110,11 @@ class Surface:
             colors = sums / np.bincount(corners, minlength=len(sums)).clip(1)[:, None]
         return 255 * colors[self.sources, :3].astype(float)
 
-    def read_attribute(self, name: str) -> np.ndarray:
-        """Return an attribute of the vertices, (n,), of whole numbers or floats."""
-        attribute = self.data.attributes.get(name)
-        if attribute is None or (attribute.domain, attribute.data_type) not in SCALARS:
-            known = [
-                each.name
-                for each in self.data.attributes
-                if (each.domain, each.data_type) in SCALARS
-            ]
-            raise es.InvalidParameterError(
-                f"The attribute must be a number for each vertex; {self.owner.name!r} has {known} "
-                f"of this kind, and not {name!r}. Choose one in the tab Data."
-            )
-        values = np.empty(len(self.places), SCALARS[attribute.domain, attribute.data_type])
-        attribute.data.foreach_get("value", values)
-        return values[self.sources]
-
-    def move(self, vertices: np.ndarray, key_name: str) -> None:
-        """Move the vertices of the object as those of `mesh` move to new places (n, 3).
-
-        Each moves by the same vector as its vertex in `mesh`; those without a face stay. If there
-        are shape keys, Blender shows these and not the vertices: then this is a new one.
-        """
-        self.write_key(None if self.data.shape_keys is None else key_name, vertices)
-
     def write_key(self, name: str | None, vertices: np.ndarray, value: float = 1.0) -> None:
-        """Write places (n, 3) in the world as a shape key, or as vertices if there is no name."""
+        """Write places (n, 3) in the world as a shape key, or as vertices if there is no name.
+
+        Each vertex of the object moves by the same vector as its vertex in `mesh`.
+        """
         shift = (vertices - self.mesh.vertices)[self.places]
         shift[~self.used] = 0
         inverse = np.linalg.inv(world_matrix(self.owner)[:3, :3])
@@ -179,25 +138,9 @@ def read_surface(
 ) -> Surface:
     """Read the mesh of an object.
 
-    Parameters
-    ----------
-    context : bpy.types.Context
-    owner : bpy.types.Object or None
-    apply_modifiers : bool
-        Whether to read the mesh as the modifiers make it. `Surface.adopt` then applies them.
-    repair : bool
-        Whether to repair what eigenshape would refuse, by its repair "auto".
-
-    Returns
-    -------
-    Surface
-
-    Raises
-    ------
-    es.InvalidParameterError
-        If there is no object, it has no mesh, or its modifiers cannot be applied.
-    es.InvalidShapeError
-        If the mesh has no face, or eigenshape refuses it.
+    With `apply_modifiers` it is read as the modifiers make it, and `Surface.adopt` applies them.
+    With `repair`, what eigenshape would refuse is repaired in the triangles (its repair "auto").
+    Raise InvalidParameterError if there is no mesh, and InvalidShapeError if it is refused.
     """
     if owner is None:
         raise es.InvalidParameterError(
@@ -221,7 +164,13 @@ def read_surface(
     world = world_matrix(owner)
     points = coordinates(data.vertices) @ world[:3, :3].T + world[:3, 3]
     triangles = corners.reshape(-1, 3)
-    if np.linalg.det(world[:3, :3]) < 0:  # a mirrored object: its faces would look inward
+    orientation = np.linalg.det(world[:3, :3])
+    if orientation == 0:
+        raise es.InvalidParameterError(
+            f"The scale must not be 0 along an axis; that of {owner.name!r} is "
+            f"{tuple(owner.matrix_world.to_scale())}. Set it in the sidebar (N, Item)."
+        )
+    if orientation < 0:  # a mirrored object: its faces would look inward
         triangles = triangles[:, ::-1]
     # Loose vertices and edges are common in Blender, and are no part of the surface.
     names = ["drop_unreferenced", "auto"] if repair else ["drop_unreferenced"]

@@ -124,20 +124,12 @@ def test_heat_is_that_of_the_library(animal):
         np.testing.assert_allclose(attribute(animal, f"heat {number}"), function, rtol=SINGLE)
 
 
-def test_an_attribute_becomes_colors(animal):
+def test_the_last_eigenfunction_is_shown_as_colors(animal):
     bpy.ops.eigenshape.eigenfunctions(count=3)
-    assert bpy.ops.eigenshape.color(name="eigenfunction 2", color_map="gray") == FINISHED
-    shown = np.array(
-        [each.color_srgb[:] for each in animal.data.color_attributes["eigenshape"].data]
-    )
-    expected = es.plot.value_colors(attribute(animal, "eigenfunction 2"), "gray")
-    np.testing.assert_allclose(shown[:, :3], expected / 255, atol=1 / 255)
-
-
-def test_a_color_needs_an_attribute_of_the_vertices(animal):
-    animal.data.attributes.new("side", "INT", "FACE")
-    with pytest.raises(RuntimeError, match=r"number for each vertex; 'animal' has .* not 'side'"):
-        bpy.ops.eigenshape.color(name="side")
+    shown = animal.data.color_attributes["eigenshape"].data
+    expected = es.plot.value_colors(attribute(animal, "eigenfunction 2"), "RdBu_r")
+    found = np.array([each.color_srgb[:3] for each in shown])
+    np.testing.assert_allclose(found, expected / 255, atol=1 / 255)
 
 
 def test_a_vertex_without_a_face_has_no_part(add, creature):
@@ -203,6 +195,28 @@ def test_what_cannot_be_computed_is_named(add):
     bpy.ops.object.camera_add()
     with pytest.raises(RuntimeError, match="'Camera' is of the type CAMERA"):
         bpy.ops.eigenshape.bend()
+
+
+def test_an_object_of_another_file_is_refused_until_it_is_local(animal, tmp_path: Path):
+    path = str(tmp_path / "other.blend")
+    bpy.data.libraries.write(path, {animal})
+    bpy.data.objects.remove(animal)
+    with bpy.data.libraries.load(path, link=True) as (there, here):
+        here.objects = there.objects
+    (linked,) = here.objects
+    bpy.context.collection.objects.link(linked)
+    bpy.context.view_layer.objects.active = linked
+    with pytest.raises(RuntimeError, match="'animal' is linked from another one"):
+        bpy.ops.eigenshape.eigenfunctions(count=2)
+    linked.select_set(True)
+    bpy.ops.object.make_local(type="SELECT_OBDATA")
+    assert bpy.ops.eigenshape.eigenfunctions(count=2) == FINISHED
+
+
+def test_a_flat_object_is_refused(animal):
+    animal.scale = (1, 1, 0)
+    with pytest.raises(RuntimeError, match="not be 0 along an axis; that of 'animal' is"):
+        bpy.ops.eigenshape.eigenfunctions(count=2)
 
 
 def test_edit_mode_is_refused_with_its_key(animal):
@@ -275,6 +289,7 @@ def pair(add):
     return whole, other
 
 
+@pytest.mark.long
 def test_a_match_transfers_weights_keys_and_colors(pair):
     whole, other = pair
     one, two = (read_surface(bpy.context, each).mesh for each in (other, whole))
@@ -468,6 +483,16 @@ def test_esc_ends_an_operator_without_its_result(context):
     assert job.wait(60)
     assert (doubling.total, doubling.closed) == (0, True)
     assert doubling.reports == [("INFO", "Double: cancelled")]
+
+
+def test_a_fault_of_an_operator_is_shown_and_its_timer_ends(context):
+    doubling = Doubling()
+    doubling.compute = lambda progress: 1 / 0
+    doubling.invoke(context, event("LEFTMOUSE"))
+    assert doubling._job.wait(60)
+    with pytest.raises(ZeroDivisionError):
+        doubling.modal(context, event("TIMER"))
+    assert context.window_manager.calls[-2:] == ["progress_end", "event_timer_remove"]
 
 
 def test_a_script_waits_for_the_end(context):
