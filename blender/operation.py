@@ -161,7 +161,7 @@ class Operation:
             return {"FINISHED"}
         except CancelledError:
             return {"CANCELLED"}
-        except es.EigenshapeError as error:
+        except (es.EigenshapeError, OSError) as error:
             remedy = "" if self.repair or "repair(" not in str(error) else " Here: tick Repair."
             self.report({"ERROR"}, f"{error}{remedy}")
             return {"CANCELLED"}

@@ -1,5 +1,6 @@
 """The operators of the extension, run without a window: what they write, undo and refuse."""
 
+import importlib.util
 import re
 import subprocess
 import sys
@@ -10,17 +11,60 @@ from pathlib import Path
 from threading import Event
 from types import SimpleNamespace
 
-import bpy
 import numpy as np
 import pytest
-from eigenshape_extension import bending, build, matching, operation, panel
-from eigenshape_extension.surface import read_surface
-from mathutils import Matrix, Quaternion
 
 import eigenshape as es
 
+bpy = pytest.importorskip("bpy", reason="needs Blender as a module: pip install 'bpy==4.5.*'")
+
+# Load the folder as Blender does, under a name of its own: `eigenshape` is the library.
+FOLDER = Path(__file__).parent.parent
+spec = importlib.util.spec_from_file_location("eigenshape_extension", FOLDER / "__init__.py")
+extension = importlib.util.module_from_spec(spec)
+sys.modules["eigenshape_extension"] = extension
+spec.loader.exec_module(extension)
+
+from eigenshape_extension import bending, build, matching, operation, panel  # noqa: E402
+from eigenshape_extension.surface import read_surface  # noqa: E402
+from mathutils import Matrix, Quaternion  # noqa: E402
+
 FINISHED = {"FINISHED"}
 SINGLE = 1e-6  # relative rounding of Blender's coordinates, in single precision
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _registered():
+    extension.register()
+    yield
+    extension.unregister()
+
+
+@pytest.fixture(autouse=True)
+def _empty_scene():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+@pytest.fixture
+def add():
+    """Return a function that adds a mesh to the scene, selected and active."""
+
+    def add_object(name, vertices, faces):
+        data = bpy.data.meshes.new(name)
+        data.from_pydata(vertices, [], faces)
+        made = bpy.data.objects.new(name, data)
+        bpy.context.collection.objects.link(made)
+        made.select_set(True)
+        bpy.context.view_layer.objects.active = made
+        return made
+
+    return add_object
+
+
+@pytest.fixture(scope="session")
+def creature():
+    """Return a quadruped with 1,000 vertices."""
+    return es.make_creature("quadruped", n_vertices=1000)
 
 
 def coordinates(owner):
@@ -361,6 +405,12 @@ def test_a_search_lists_what_was_added(animal, add, tmp_path: Path):
     assert loaded.name == "fish"
     upright = read_surface(bpy.context, loaded).mesh.vertices
     np.testing.assert_allclose(upright[:, 2], fish.vertices[:, 1], atol=1e-5)
+
+
+def test_a_file_that_is_gone_is_named(tmp_path: Path):
+    with pytest.raises(RuntimeError, match=r"Error: .*gone\.ply"):
+        bpy.ops.eigenshape.load(source=str(tmp_path / "gone.ply"))
+    assert not bpy.data.objects
 
 
 def test_a_search_needs_an_index(animal, tmp_path: Path):
