@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Guess: `read_triangle_mesh` reads the GLB file that `write_triangle_mesh` wrote: 12 triangles of a box.
 # Behavior: writing reports success, and reading gives no points and no triangles, with a warning on the
-#   terminal and no error. The same box as .gltf comes back. Older versions ended the process instead.
+#   terminal and no error. The same box as .gltf comes back.
 # Output: glb: written True, read 0 triangles; gltf: written True, read 12 triangles
 # Matters: a pipeline that saves GLB loses its shapes at the next step, unless it counts triangles.
 # Versions: open3d 0.20.0, numpy 2.4.6, Python 3.11.
