@@ -3,6 +3,7 @@
 import copy
 import json
 import mimetypes
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -53,6 +54,7 @@ from eigenshape.io.formats.gltf import (
     turn_back,
     view_of,
 )
+from eigenshape.io.formats.gltf_fit import fit_columns, fit_scene
 from eigenshape.io.formats.rounding import rounding_loss
 from eigenshape.io.formats.stl import single_precision
 from eigenshape.io.opening import SourceFile
@@ -229,7 +231,7 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
     return tuple(names)
 
 
-class _Document:
+class Document:
     """A glTF tree and the contents of its views, to which accessors are added."""
 
     def __init__(self, tree: Entry, contents: Iterable[bytes | memoryview] = ()) -> None:
@@ -300,7 +302,9 @@ def write(job: WriteJob) -> dict[Path, bytes]:
     source = job.attributes.source
     if source and source.suffix in (".glb", ".gltf"):
         return {job.path: _rewrite(source, job)}
-    job.lose(["fields"])
+    fields = job.attributes.fields.values()
+    if not all(_is_column(values, job.attributes.mesh) for values in fields):
+        job.lose(["fields"])
     places, offset = _local_places(job.mesh)
     job.lost.extend(rounding_loss(job.mesh, (places + offset)[job.mesh.faces]))
     return {job.path: write_new(job.attributes, job.mesh)}
@@ -321,6 +325,7 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     places = mesh.vertices[mesh.faces]
     found = np.zeros_like(places)  # where the written file puts the corners
     normals = corner_normals(attributes, mesh)
+    fit = None if attributes.places is None else fit_scene(gltf, scene, attributes, mesh, document)
     written: dict[int, list[Entry]] = {}
     for node, place in scene.placements.items():
         primitives = gltf.entry("meshes", place.mesh)["primitives"]
@@ -331,25 +336,30 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
             if not chosen.size:
                 continue
             # The rows of the file that the corners come from, and what each gives to each corner
-            blends = attributes.corners[(3 * chosen[:, None] + [0, 1, 2]).ravel()]
+            corners = (3 * chosen[:, None] + [0, 1, 2]).ravel()
+            vertices = mesh.faces[chosen].ravel()
+            blends = attributes.corners[corners]
             used, inverse = np.unique(blends.indices, return_inverse=True)
             rows = file_rows[used]
             blends = csr_array((blends.data, inverse.ravel(), blends.indptr))
             columns = _carry_columns(gltf, shared, rows, blends)
             old = decode(*columns[0].pop("POSITION"))
             normal = np.empty((blends.shape[0], 0))
-            if normals is not None and "NORMAL" in shared["attributes"]:
+            if normals is not None and ("NORMAL" in shared["attributes"] or fit):
                 normal = normals[chosen].reshape(-1, 3)
+            shown = place
+            if fit:
+                shown = fit.placements[node]
+                fit_columns(gltf, fit, node, place, columns, corners, vertices)
+            columns[0] |= field_columns(attributes, vertices)
             # Corners of the file agree if their rows do, others if all their values do.
             keys = [rows[blends.indices]]
             if blends.nnz > 3 * len(chosen):
                 keys = [values for table in columns for values, _ in table.values()]
-            first, indices = _split_corners(
-                [mesh.faces[chosen].ravel(), *keys, np.rint(normal * 1e5)]
-            )
+            first, indices = _split_corners([vertices, *keys, np.rint(normal * 1e5)])
             columns = [_choose_rows(table, first) for table in columns]
             wanted = places[chosen].reshape(-1, 3)[first]
-            turned, put = _place_vertices(place, columns, old[first], wanted, normal[first])
+            turned, put = _place_vertices(shown, columns, old[first], wanted, normal[first])
             triangles = indices.reshape(-1, 3)
             found[chosen] = put[triangles]
             triangles = turn_back(triangles, turned)  # as the reader does
@@ -369,6 +379,21 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     _replace_meshes(document.tree, written)
     job.lost.extend(_drop_extensions(document.tree, written))
     return document.pack()
+
+
+def field_columns(attributes: MeshAttributes, vertices: np.ndarray) -> Columns:
+    """Return functions on vertices as attributes of corners; other programs find them by these names."""
+    found: Columns = {}
+    for name, values in attributes.fields.items():
+        if _is_column(values, attributes.mesh):
+            rows = values[vertices].reshape(len(vertices), -1).astype("<f4")
+            found["_" + re.sub(r"\W", "_", name, flags=re.ASCII).upper()] = rows, False
+    return found
+
+
+def _is_column(values: np.ndarray, mesh: TriangleMesh) -> bool:
+    """Return whether an attribute of vertices can hold a field: up to four numbers for each."""
+    return len(values) == mesh.n_vertices and values.size <= 4 * len(values)
 
 
 def _choose_rows(columns: Columns, chosen: np.ndarray) -> Columns:
@@ -464,11 +489,11 @@ def _blend(gltf: Gltf, index: int, name: str, rows: np.ndarray, blends: csr_arra
     return interpolate(blends, values, blend=not is_chosen), is_normalized
 
 
-def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document:
+def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> Document:
     """Copy a tree, with the contents of its views, and images of other files as views."""
     tree = copy.deepcopy(gltf.tree)
     count = len(tree.get("bufferViews", []))
-    document = _Document(tree, [view_of(gltf, index)[0] for index in range(count)])
+    document = Document(tree, [view_of(gltf, index)[0] for index in range(count)])
     for entry in tree.get("images", []):
         uri = str(entry.get("uri", "data:"))
         if uri.startswith("data:"):
@@ -514,7 +539,7 @@ def _accessors_of(meshes: list[Entry]) -> set[int]:
 
 def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
     """Write a GLB file with a node for each group and a primitive for each of its materials."""
-    document = _Document({"asset": {"version": "2.0", "generator": "eigenshape"}, "scene": 0})
+    document = Document({"asset": {"version": "2.0", "generator": "eigenshape"}, "scene": 0})
     nodes: list[Entry] = []
     meshes: list[Entry] = []
     places, offset = _local_places(mesh)
@@ -539,16 +564,14 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
             for name, table in tables.items()
         }
         if not tables and len(groups) == 1:  # vertices keep their order, also those without a face
-            first, indices, positions = np.arange(mesh.n_vertices), corners, places
+            first = vertices = np.arange(mesh.n_vertices)
+            indices = corners
         else:
             first, indices = _split_corners([corners, *rows.values()])
-            positions = places[corners]
-        columns = document.add_columns(
-            {
-                name: (values[first], False)
-                for name, values in {"POSITION": positions, **rows}.items()
-            }
-        )
+            vertices = corners[first]
+        table: Columns = {name: (values[first], False) for name, values in rows.items()}
+        table |= {"POSITION": (places[vertices], False)} | field_columns(attributes, vertices)
+        columns = document.add_columns(table)
         materials = attributes.face_materials[in_group]
         primitives: list[Entry] = []
         for material in np.unique(materials).tolist():
@@ -577,7 +600,7 @@ def _local_places(
     return (mesh.vertices - middle).astype(np.float32), middle
 
 
-def _write_material(document: _Document, material: Material) -> Entry:
+def _write_material(document: Document, material: Material) -> Entry:
     *tint, alpha = material.color
     color = [*linear_colors(np.array(tint)).tolist(), alpha]
     pbr: Entry = {"baseColorFactor": color, "metallicFactor": 0.0}
