@@ -387,7 +387,7 @@ def _placements(gltf: Gltf, scene: int | None) -> dict[int, Placement]:
 
 
 def world_matrices(gltf: Gltf, scene: int | None) -> tuple[dict[int, np.ndarray], set[int]]:
-    """Return the matrices of all nodes of a scene, and which of these nodes are hidden."""
+    """Return the matrices of all nodes of a scene, parents first, and which of these nodes are hidden."""
     nodes = gltf.entries("nodes")
     coarser = _named_nodes(_list(extension(node, LEVELS), "ids") for node in nodes)
     if scene is None:
@@ -461,6 +461,7 @@ def _instances(gltf: Gltf, node: Entry) -> np.ndarray:
 
 
 def local_matrix(node: Entry) -> np.ndarray:
+    """Return the matrix of a node from its coordinates to those of its parent."""
     if "matrix" in node:
         return _numbers(node, "matrix", [0.0] * 16).reshape(4, 4).T  # stored by columns
     return _compose(
@@ -562,6 +563,12 @@ def skin_weights(
     """Return the joints of each vertex, their weights with sum 1, and how many sums were others."""
     # Each set has four joints and weights, and the first one must be there.
     sets = sorted({"JOINTS_0", *(name for name in attributes if name.startswith("JOINTS"))})
+    wanted = [name.replace("JOINTS", kind) for name in sets for kind in SKINS]
+    if missing := [name for name in wanted if name not in attributes]:
+        raise FileFormatError(
+            f"A mesh with a skin must have {', '.join(wanted)}; it has no {', '.join(missing)}. "
+            "Without its skin, or bound to its joints again by the program that wrote it, it can be read."
+        )
     joints, weights = (
         np.hstack([read(name.replace("JOINTS", kind)) for name in sets]) for kind in SKINS
     )

@@ -5,7 +5,7 @@ import json
 import mimetypes
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,10 +29,8 @@ from eigenshape.io.carrying import interpolate
 from eigenshape.io.formats.gltf import (
     COMPRESSIONS,
     INSTANCES,
-    KINDS,
     LEVELS,
     SURFACES,
-    WIDTHS,
     Column,
     Entry,
     Gltf,
@@ -43,7 +41,6 @@ from eigenshape.io.formats.gltf import (
     extension,
     families,
     member,
-    pack,
     place_triangles,
     pose_matrices,
     raw_accessor,
@@ -54,13 +51,12 @@ from eigenshape.io.formats.gltf import (
     turn_back,
     view_of,
 )
-from eigenshape.io.formats.gltf_fit import fit_columns, fit_scene
+from eigenshape.io.formats.gltf_document import Columns, Document
+from eigenshape.io.formats.gltf_fit import fit_scene
 from eigenshape.io.formats.rounding import rounding_loss
 from eigenshape.io.formats.stl import single_precision
 from eigenshape.io.opening import SourceFile
 
-COMPONENTS = {kind[-2:]: number for number, kind in KINDS.items()}
-TYPES = {width: name for name, width in WIDTHS.items()}
 # What a document may hold besides a scene with materials.
 EXTRAS = ("skins", "animations", "cameras", "extensions")
 TANGENTS = "tangents, which viewers compute anew"
@@ -77,7 +73,6 @@ OF_GEOMETRY = {
 # A shape that lies this many times its size from the origin is written about its own middle: three
 # of the 24 binary digits of single precision are worth a node that is moved.
 FAR = 8
-Columns = dict[str, Column]
 
 
 def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
@@ -231,72 +226,6 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
     return tuple(names)
 
 
-class Document:
-    """A glTF tree and the contents of its views, to which accessors are added."""
-
-    def __init__(self, tree: Entry, contents: Iterable[bytes | memoryview] = ()) -> None:
-        self.tree, self.contents = tree, list(contents)
-
-    def add_view(self, data: bytes, **entry: Any) -> int:
-        self.contents.append(data)
-        self.tree.setdefault("bufferViews", []).append(entry)
-        return len(self.contents) - 1
-
-    def add_accessor(self, rows: np.ndarray, view: int, **entry: Any) -> int:
-        accessors: list[Any] = self.tree.setdefault("accessors", [])
-        kind = {"componentType": COMPONENTS[rows.dtype.str[1:]], "type": TYPES[rows.shape[1]]}
-        accessors.append({"bufferView": view, "count": len(rows), **kind, **entry})
-        return len(accessors) - 1
-
-    def add_columns(self, columns: Columns) -> dict[str, int]:
-        """Add columns, and return their accessors by name."""
-        found = {}
-        for name, (values, is_normalized) in columns.items():
-            rows = np.ascontiguousarray(values)
-            octets = rows.view(np.uint8).reshape(len(rows), -1)
-            # Rows of attributes begin at multiples of four bytes.
-            padded = np.pad(octets, ((0, 0), (0, -octets.shape[1] % 4)))
-            view = self.add_view(padded.tobytes(), byteStride=padded.shape[1], target=34962)
-            facts: Entry = {"normalized": True} if is_normalized else {}
-            if name == "POSITION":
-                facts |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
-            found[name] = self.add_accessor(rows, view, **facts)
-        return found
-
-    def add_indices(self, indices: np.ndarray, n_vertices: int) -> int:
-        rows = indices.astype("<u2" if n_vertices < 2**16 - 1 else "<u4").reshape(-1, 1)
-        return self.add_accessor(rows, self.add_view(rows.tobytes(), target=34963))
-
-    def pack(self) -> bytes:
-        """Write the document, without views that nothing uses."""
-        users = list(_view_users(self.tree))
-        views: list[Entry] = []
-        places = {}
-        binary = bytearray()
-        for index in sorted({user["bufferView"] for user in users}):
-            data = self.contents[index]
-            places[index] = len(views)
-            place = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(data)}
-            views.append({**self.tree["bufferViews"][index], **place})
-            binary += data
-            binary += b"\0" * (-len(binary) % 4)
-        for user in users:
-            user["bufferView"] = places[user["bufferView"]]
-        self.tree |= {"bufferViews": views, "buffers": [{"byteLength": len(binary)}]}
-        return pack(self.tree, bytes(binary))
-
-
-def _view_users(value: Any) -> Iterator[Entry]:
-    """Give all objects of a tree that name a view; extensions do so by the same key."""
-    if isinstance(value, dict):
-        if type(value.get("bufferView")) is int:
-            yield value
-        value = list(value.values())
-    if isinstance(value, list):
-        for part in value:
-            yield from _view_users(part)
-
-
 def write(job: WriteJob) -> dict[Path, bytes]:
     """Write a GLB file: that of the source with other positions and triangles, or a new one."""
     source = job.attributes.source
@@ -310,7 +239,7 @@ def write(job: WriteJob) -> dict[Path, bytes]:
     return {job.path: write_new(job.attributes, job.mesh)}
 
 
-def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
+def _rewrite(source: SourceFile, job: WriteJob) -> bytes:  # noqa: PLR0915 - a file from top to bottom
     """Write a glTF file again as GLB with other positions and triangles, and name what is lost.
 
     Everything else in the file stays as it is: nodes, materials, images, skins, animations and
@@ -325,7 +254,9 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     places = mesh.vertices[mesh.faces]
     found = np.zeros_like(places)  # where the written file puts the corners
     normals = corner_normals(attributes, mesh)
-    fit = None if attributes.places is None else fit_scene(gltf, scene, attributes, mesh, document)
+    fit = None
+    if attributes.places is not None:
+        fit = fit_scene(document, gltf, scene, attributes, mesh)
     written: dict[int, list[Entry]] = {}
     for node, place in scene.placements.items():
         primitives = gltf.entry("meshes", place.mesh)["primitives"]
@@ -347,10 +278,7 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
             normal = np.empty((blends.shape[0], 0))
             if normals is not None and ("NORMAL" in shared["attributes"] or fit):
                 normal = normals[chosen].reshape(-1, 3)
-            shown = place
-            if fit:
-                shown = fit.placements[node]
-                fit_columns(gltf, fit, node, place, columns, corners, vertices)
+            shown = fit.fit_columns(gltf, node, columns, corners, vertices) if fit else place
             columns[0] |= field_columns(attributes, vertices)
             # Corners of the file agree if their rows do, others if all their values do.
             keys = [rows[blends.indices]]

@@ -1,6 +1,6 @@
 """Skins, skeletons, morph targets and animations of a glTF file, fitted to another shape."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -18,7 +18,6 @@ from eigenshape.io.attributes import MeshAttributes
 from eigenshape.io.formats.gltf import (
     PLACES,
     SKINS,
-    Column,
     Entry,
     Gltf,
     Placement,
@@ -30,10 +29,8 @@ from eigenshape.io.formats.gltf import (
     skin_weights,
     world_matrices,
 )
+from eigenshape.io.formats.gltf_document import Columns, Document
 from eigenshape.operators.robust import robust_laplacian
-
-if TYPE_CHECKING:
-    from eigenshape.io.formats.gltf_attributes import Document
 
 # Around each vertex, turn and size of a shape are means within this share of the root of its area:
 # wide enough that errors of single vertices cancel, and less than the width of a head.
@@ -43,25 +40,56 @@ WINDOW = 0.05
 RING = 0.02
 # Weight of vertices that neither the joint nor its parent moves: only where there are no others
 STRANGERS = 1e-3
-TINY = 1e-12
-NONE = np.empty(0), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+TINY = 1e-12  # where all around a vertex was contracted, it still has a mean
 
 
 class Fit(NamedTuple):
-    """How a file is fitted to another shape."""
+    """How the content of a file is fitted to another shape."""
 
-    placements: dict[int, Placement]  # by node, as the moved skeleton places them
+    before: dict[int, Placement]  # of nodes with a mesh
+    after: dict[int, Placement]  # as the moved skeleton places them
     weights: csr_array  # (3 f, nodes) weight of each joint at each corner
     frames: np.ndarray  # (n, 3, 3) rotation about each vertex
     factors: np.ndarray  # (n,) change of size about each vertex
 
+    def fit_columns(
+        self,
+        gltf: Gltf,
+        node: int,
+        columns: list[Columns],
+        corners: np.ndarray,
+        vertices: np.ndarray,
+    ) -> Placement:
+        """Fit weights of joints, and motions of morph targets, in the columns of corners of a mesh.
+
+        Return how the node shows the mesh now.
+        """
+        table, *targets = columns
+        before, after = self.before[node], self.after[node]
+        poses = [place.matrix[None] for place in (before, after)]
+        if before.skin is not None:
+            joints = gltf.entry("skins", before.skin)["joints"]
+            weights = csr_array(self.weights[corners][:, joints])
+            bones = [np.asarray(place.bones).reshape(-1, 16) for place in (before, after)]
+            poses = [(weights @ each).reshape(-1, 4, 4) for each in bones]
+            table |= _largest_weights(weights, sum(name.startswith("JOINTS") for name in table))
+        # From the file into the world, onto the other shape, and back into the file
+        linear, linear_after = (pose[:, :3, :3] for pose in poses)
+        turns = np.linalg.pinv(linear_after) @ self.frames[vertices] @ linear
+        for target in targets:
+            for name, column in target.items():
+                moved = np.einsum("cij,cj->ci", turns, decode(*column))
+                if name == "POSITION":
+                    moved *= self.factors[vertices, None]
+                target[name] = moved.astype("<f4"), False
+        return after
+
 
 def fit_scene(
-    gltf: Gltf, scene: Scene, attributes: MeshAttributes, mesh: TriangleMesh, document: "Document"
+    document: Document, gltf: Gltf, scene: Scene, attributes: MeshAttributes, mesh: TriangleMesh
 ) -> Fit:
     """Move the skeleton of a document to the corresponding places of a mesh; return how vertices follow."""
-    assert attributes.places is not None  # for the type checker
-    places = TriangleMesh(attributes.places, mesh.faces)
+    places = TriangleMesh(np.asarray(attributes.places), mesh.faces)
     areas = dual_volumes(mesh)
     weights = csr_array(attributes.corners @ _file_weights(gltf, scene))
     used, corners = np.unique(mesh.faces, return_index=True)
@@ -80,7 +108,8 @@ def fit_scene(
 
         around = fit_similarities(average, places.vertices, mesh.vertices)
         frames, factors = around.rotations, around.factors
-    return Fit(_place_again(document.tree, scene, matrices), weights, frames, factors)
+    after = _place_again(document.tree, scene, matrices)
+    return Fit(scene.placements, after, weights, frames, factors)
 
 
 def _file_weights(gltf: Gltf, scene: Scene) -> csr_array:
@@ -97,21 +126,24 @@ def _file_weights(gltf: Gltf, scene: Scene) -> csr_array:
             chosen = np.flatnonzero((scene.nodes == node) & (scene.piece.primitives == number))
             if not chosen.size:
                 continue
-            table = part["attributes"]
-            joints, weights, _ = skin_weights(
-                table, lambda name, table=table: read_accessor(gltf, table[name], 4), len(names)
-            )
+            columns = {
+                name: read_accessor(gltf, index, 4)
+                for name, index in part["attributes"].items()
+                if name.startswith(SKINS)
+            }
+            joints, weights, _ = skin_weights(columns, columns.__getitem__, len(names))
             of_corners = rows[chosen].ravel()
             corners = np.repeat((3 * chosen[:, None] + [0, 1, 2]).ravel(), joints.shape[1])
             entries.append(
                 (weights[of_corners].ravel(), corners, names[joints[of_corners]].ravel())
             )
-    values, corners, nodes = map(np.concatenate, zip(*entries, strict=True)) if entries else NONE
+    entries.append((np.empty(0), *np.empty((2, 0), dtype=np.int64)))
+    values, corners, nodes = (np.concatenate(column) for column in zip(*entries, strict=True))
     return csr_array(coo_array((values, (corners, nodes)), shape=(rows.size, n_nodes)))
 
 
 def _move_skeleton(
-    document: "Document",
+    document: Document,
     gltf: Gltf,
     scene: Scene,
     influence: csr_array,
@@ -160,7 +192,7 @@ def _move_skeleton(
             if joint in new:
                 bind[:3] = np.linalg.pinv(new[joint])[:3]
         rows = binds.transpose(0, 2, 1).reshape(-1, 16).astype("<f4")
-        skin["inverseBindMatrices"] = document.add_accessor(rows, document.add_view(rows.tobytes()))
+        skin["inverseBindMatrices"] = document.add_rows(rows)
     _scale_motions(document, gltf, steps, float(whole.factors[0]))
     return new
 
@@ -197,14 +229,14 @@ def _weighted_fit(
 
 
 def _scale_motions(
-    document: "Document", gltf: Gltf, steps: dict[int, tuple[np.ndarray, np.ndarray]], factor: float
+    document: Document, gltf: Gltf, steps: dict[int, tuple[np.ndarray, np.ndarray]], factor: float
 ) -> None:
     """Let animations move joints about their new places, as far as the size of the shape asks.
 
     Rotations stay: those of a joint are from its parent, which was turned as it was.
     """
     for animation in document.tree.get("animations", []):
-        samplers = []
+        samplers: list[Entry] = []
         for channel in animation["channels"]:
             sampler = dict(animation["samplers"][channel["sampler"]])
             channel["sampler"] = len(samplers)
@@ -220,8 +252,7 @@ def _scale_motions(
                 is_place = np.arange(len(rows)) % 3 == 1
             moved = factor * rows
             moved[is_place] += after - factor * before
-            moved = moved.astype("<f4")
-            sampler["output"] = document.add_accessor(moved, document.add_view(moved.tobytes()))
+            sampler["output"] = document.add_rows(moved.astype("<f4"))
         animation["samplers"] = samplers
 
 
@@ -239,38 +270,7 @@ def _place_again(
     return found
 
 
-def fit_columns(
-    gltf: Gltf,
-    fit: Fit,
-    node: int,
-    place: Placement,
-    columns: list[dict[str, Column]],
-    corners: np.ndarray,
-    vertices: np.ndarray,
-) -> None:
-    """Write weights of joints, and motions of morph targets, of corners of a mesh into their columns."""
-    table, *targets = columns
-    after = fit.placements[node]
-    poses = [each.matrix[None] for each in (place, after)]
-    if place.skin is not None and place.bones is not None and after.bones is not None:
-        names = gltf.entry("skins", place.skin)["joints"]
-        weights = csr_array(fit.weights[corners][:, names])
-        poses = [
-            (weights @ each.bones.reshape(-1, 16)).reshape(-1, 4, 4) for each in (place, after)
-        ]
-        table |= _largest_weights(weights, sum(name.startswith("JOINTS") for name in table))
-    # From the file into the world, onto the other shape, and back into the file
-    before, now = (pose[:, :3, :3] for pose in poses)
-    turn = np.linalg.pinv(now) @ fit.frames[vertices] @ before
-    for target in targets:
-        for name, (values, _) in target.items():
-            moved = np.einsum("cij,cj->ci", turn, decode(values, target[name][1]))
-            if name == "POSITION":
-                moved *= fit.factors[vertices, None]
-            target[name] = moved.astype("<f4"), False
-
-
-def _largest_weights(weights: csr_array, n_sets: int) -> dict[str, Column]:
+def _largest_weights(weights: csr_array, n_sets: int) -> Columns:
     """Return attributes with the largest weights of each row, four in a set, that sum to 1."""
     count = weights.shape[0]
     weights.sum_duplicates()
@@ -284,7 +284,7 @@ def _largest_weights(weights: csr_array, n_sets: int) -> dict[str, Column]:
     shares[rows[kept], ranks] = weights.data[kept]
     joints[rows[kept], ranks] = np.where(weights.data[kept] > 0, weights.indices[kept], 0)
     shares /= shares.sum(axis=1, keepdims=True)
-    found: dict[str, Column] = {}
+    found: Columns = {}
     for number in range(n_sets):
         block = slice(4 * number, 4 * number + 4)
         values = joints[:, block], shares[:, block].astype("<f4")
