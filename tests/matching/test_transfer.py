@@ -80,9 +80,10 @@ def test_no_face_spans_the_texture(hero, worn, tmp_path):
     mesh = rig("biped", 2600)[0]
     outfit = es.matching.transfer(worn, mesh)
     widths = np.ptp(outfit.attributes.texture_coordinates[:, :, 0], axis=1)
-    there = np.ptp(worn.texture_coordinates[:, :, 0], axis=1)
-    # At the crown, around the axis, faces of the source are wide, too.
-    assert (widths > 0.3).mean() <= (there > 0.3).mean()
+    # On the axis, at the crown, all coordinates meet.
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    beside = np.hypot(middles[:, 0], middles[:, 2]) > 0.05
+    assert widths[beside].max() < 0.3
     seam = (np.ptp(unwrap(mesh)[:, :, 0] % 1.0, axis=1) > 0.7).sum()
     assert seam > 30  # faces that lie across it
 
@@ -200,8 +201,8 @@ def test_a_piece_in_doubt_stays_as_it_was_mapped(tmp_path):
 
 
 def fields_of(mesh, fields, folder):
-    es.io.write_fields(mesh, folder / "fields.ply", fields)
-    return es.read_mesh(folder / "fields.ply", attributes=True)[1]
+    es.io.write_fields(mesh, folder / "fields.vtp", fields)
+    return es.read_mesh(folder / "fields.vtp", attributes=True)[1]
 
 
 def test_fields_labels_and_landmarks_go_along(tmp_path):
@@ -284,7 +285,9 @@ def test_a_skin_without_weights_is_named(hero, tmp_path):
     gltf = read_gltf(hero.read_bytes())
     del gltf.tree["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"]
     (tmp_path / "a.glb").write_bytes(pack(gltf.tree, gltf.buffers[0]))
-    with pytest.raises(es.FileFormatError, match="must have JOINTS_0, WEIGHTS_0; it has no WEIGHTS_0"):
+    with pytest.raises(
+        es.FileFormatError, match="must have JOINTS_0, WEIGHTS_0; it has no WEIGHTS_0"
+    ):
         es.read_mesh(tmp_path / "a.glb", attributes=True)
 
 

@@ -69,8 +69,8 @@ class Outfit(ReadOnly):
     >>> import numpy as np
     >>> import eigenshape as es
     >>> mesh = es.icosphere(1)
-    >>> es.io.write_fields(mesh, "ball.ply", {"height": mesh.vertices[:, 2]})
-    >>> _, worn = es.read_mesh("ball.ply", attributes=True)
+    >>> es.io.write_fields(mesh, "ball.vtp", {"height": mesh.vertices[:, 2]})
+    >>> _, worn = es.read_mesh("ball.vtp", attributes=True)
     >>> outfit = es.matching.transfer(worn, es.icosphere(2))
     >>> outfit.attributes.fields["height"].shape
     (162,)

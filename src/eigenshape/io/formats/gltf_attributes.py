@@ -232,8 +232,8 @@ def write(job: WriteJob) -> dict[Path, bytes]:
     if source and source.suffix in (".glb", ".gltf"):
         return {job.path: _rewrite(source, job)}
     fields = job.attributes.fields.values()
-    if not all(_is_column(values, job.attributes.mesh) for values in fields):
-        job.lose(["fields"])
+    all_fit = all(_is_column(values, job.attributes.mesh) for values in fields)
+    job.lose([] if all_fit else ["fields"])
     places, offset = _local_places(job.mesh)
     job.lost.extend(rounding_loss(job.mesh, (places + offset)[job.mesh.faces]))
     return {job.path: write_new(job.attributes, job.mesh)}
