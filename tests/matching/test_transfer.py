@@ -1,5 +1,7 @@
 """What a character wears on another one: textures, skins, blend shapes, fields, landmarks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from characters import blend_shapes, rig, texture_error, unwrap, write_character
@@ -167,37 +169,58 @@ def test_places_in_doubt_are_filled_and_named(worn, moved):
     match = identity_match(mesh, np.where(head, 0.1, 0.9))
     # What the map says of the head is wrong: it lies on a foot.
     foot = int(mesh.vertices[:, 1].argmin())
-    faces, corners, weights = match.faces.copy(), match.corners.copy(), match.weights.copy()
-    faces[head], corners[head], weights[head] = (
-        match.faces[foot],
-        match.corners[foot],
-        match.weights[foot],
-    )
-    wrong = es.matching.ShapeMatch(
-        match.vertices, faces, corners, weights, match.confidence, match.evidence,
-        1.0, 1.0, 1.0, True, 1, 1.0, (),
-    )  # fmt: skip
-    outfit = es.matching.transfer(worn, target, match=wrong)
+    for name in ("faces", "corners", "weights"):
+        values = getattr(match, name).copy()
+        values[head] = values[foot]
+        match = replace(match, **{name: values})
+    outfit = es.matching.transfer(worn, target, match=match)
     np.testing.assert_array_equal(outfit.filled, head)
     sizes = np.linalg.norm(outfit.places[head] - mesh.vertices[head], axis=1)
     assert sizes.max() < 0.3  # the foot is 2 away
     (sentence,) = outfit.report
     assert f"{len(np.unique(mesh.vertices[head], axis=0))} vertices" in sentence
-    assert "mean confidence of 0.10: interpolated from around" in sentence
+    assert "mean confidence of 0.10: taken from the surface around" in sentence
     np.testing.assert_array_equal(outfit.attributes.fields["confidence"], outfit.confidence)
 
 
-def test_a_piece_in_doubt_stays_as_it_was_mapped(tmp_path):
-    ball, other = es.icosphere(2), es.icosphere(1)
-    both = es.geometry.disjoint_union(
-        ball, es.TriangleMesh(other.vertices + np.array([3, 0, 0]), other.faces)
-    )
-    sure = np.r_[np.full(ball.n_vertices, 0.9), np.full(other.n_vertices, 0.1)]
+def test_a_piece_in_doubt_goes_along_with_what_is_nearest(tmp_path):
+    ball, eye = es.icosphere(3), es.icosphere(1)
+    eye = es.TriangleMesh(0.1 * eye.vertices + np.array([0, 0, 1.05]), eye.faces)
+    both = es.geometry.disjoint_union(ball, eye)
+    sure = np.r_[np.full(ball.n_vertices, 0.9), np.full(eye.n_vertices, 0.1)]
     worn = fields_of(both, {"height": both.vertices[:, 2]}, tmp_path)
-    outfit = es.matching.transfer(worn, both, match=identity_match(both, sure))
+    match = identity_match(both, sure)
+    # The map puts the eye at one point on the other side.
+    far = int(both.vertices[:, 2].argmin())
+    for name in ("faces", "corners", "weights"):
+        values = getattr(match, name).copy()
+        values[ball.n_vertices :] = values[far]
+        match = replace(match, **{name: values})
+    moved = es.TriangleMesh(2 * both.vertices, both.faces)
+    outfit = es.matching.transfer(worn, moved, match=match)
+    np.testing.assert_array_equal(outfit.filled, sure < 0.5)
+    assert "taken from the surface around" in outfit.report[0]
+    np.testing.assert_allclose(outfit.places, both.vertices, atol=0.01)
+    np.testing.assert_allclose(outfit.attributes.fields["height"], both.vertices[:, 2], atol=0.01)
+
+
+def test_the_same_faces_correspond_by_number(tmp_path):
+    mesh = es.shapes.grid(3, 2)
+    worn = fields_of(mesh, {"x": mesh.vertices[:, 0]}, tmp_path)
+    rolled = es.TriangleMesh(mesh.vertices[:, [2, 0, 1]] + 5.0, mesh.faces)
+    outfit = es.matching.transfer(worn, rolled)
+    assert outfit.report == ("both have the same faces: vertices of one number correspond",)
+    np.testing.assert_array_equal(outfit.attributes.fields["x"], mesh.vertices[:, 0])
+
+
+def test_nothing_is_sure(tmp_path):
+    ball = es.icosphere(2)
+    worn = fields_of(ball, {"height": ball.vertices[:, 2]}, tmp_path)
+    match = identity_match(ball, np.zeros(ball.n_vertices))
+    outfit = es.matching.transfer(worn, ball, match=match)
     assert not outfit.filled.any()
-    assert "left as mapped, since it is a whole piece" in outfit.report[0]
-    np.testing.assert_allclose(outfit.attributes.fields["height"], both.vertices[:, 2], atol=1e-12)
+    assert "100.00% of the area" in outfit.report[0]
+    assert "left as mapped, since none is sure" in outfit.report[0]
 
 
 def fields_of(mesh, fields, folder):

@@ -16,6 +16,7 @@ from eigenshape.geometry.topology import edge_table
 # How much the rotation of points follows a given one, as a share of their moments: a rotation about
 # the own axis of a limb as round as a finger, or of an eye, is hardly shown by its points.
 FOLLOW = 0.02
+ONE_PLACE = 1e-14  # mean square distance, in sizes², that is lost in rounding
 
 
 def scale_to_unit(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
@@ -302,7 +303,9 @@ def fit_similarities(
     if follow is not None:
         moments += FOLLOW * np.linalg.norm(moments, axis=(1, 2), keepdims=True) * follow
     rotations, stretches = rotations_and_stretches(moments)
-    factors = stretches.sum(axis=1) / np.maximum(spreads, np.finfo(np.float64).tiny)
+    # Points in one place have no size: they keep theirs.
+    has_size = spreads > ONE_PLACE
+    factors = np.divide(stretches.sum(axis=1), spreads, out=np.ones_like(spreads), where=has_size)
     return Similarities(
         rotations,
         factors * (size_after / size),

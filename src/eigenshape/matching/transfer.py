@@ -34,6 +34,9 @@ DOUBTFUL = 0.3
 # surface with other triangles. A triangle leaves its surface by edge² / (8 radius): on creatures of
 # 600 vertices by 0.1 edges, and individuals whose limbs differ by 10 % are 0.3 edges apart.
 SAME_SURFACE = 0.15
+# Surface about a loose piece that decides where it goes, as a share of the root of the area: weights fall
+# with distance⁴ beyond it.
+NEARBY = 0.02
 TINY = 1e-9  # share of a vertex of no confidence, so that shares have a sum
 
 
@@ -112,8 +115,9 @@ def transfer(
     target : MeshLike
         With n vertices, in the pose that is to be its rest pose.
     match : ShapeMatch, optional
-        Of ``match_shapes(target, source.mesh)``. By default the nearest points are taken if the two
-        are one surface with other triangles, perhaps moved and scaled, and else it is computed.
+        Of ``match_shapes(target, source.mesh)``. By default vertices of one number correspond if both
+        have the same faces, nearest points if the two are one surface with other triangles, perhaps
+        moved and scaled, and else the match is computed.
     landmarks : Landmarks, optional
         On the source.
     progress : callable, optional
@@ -161,11 +165,14 @@ def transfer(
         )
     # Vertices that are double along seams of a texture are one place of the surface.
     (ours, _), (theirs, numbers) = join_places(source.mesh), join_places(target)
-    if match is None:
+    firsts = np.unique(numbers, return_index=True)[1]
+    if match is None and np.array_equal(source.mesh.faces, target.faces):
+        found, sure = closest_points(ours, source.mesh.vertices[firsts]), np.ones(len(firsts))
+        report: tuple[str, ...] = ("both have the same faces: vertices of one number correspond",)
+    elif match is None:
         found, sure, report = _correspond(ours, theirs, progress)
     else:
         _require_match(match, target, source.mesh, ours)
-        firsts = np.unique(numbers, return_index=True)[1]
         found = place_points(ours, match.faces[firsts], match.weights[firsts])
         sure, report = _sureness(match)[firsts], match.report
     found, filled, sentences = _fill_doubtful(ours, theirs, found, sure)
@@ -267,15 +274,32 @@ def _fill_doubtful(
     doubtful = sure < DOUBTFUL
     if not doubtful.any():
         return found, doubtful, ()
-    # A component without one sure vertex has nothing to be filled from, and stays as it was mapped.
+    areas = dual_volumes(target)
     pieces = vertex_components(target)[1]
     filled = doubtful & np.isin(pieces, pieces[~doubtful])
-    fixed = ~filled
-    places = solve_harmonic(robust_laplacian(target), np.flatnonzero(fixed), found.points[fixed])
-    nearest = closest_points(source, places[filled])
     points, faces, weights = (
         values.copy() for values in (found.points, found.simplices, found.weights)
     )
+    points[filled] = solve_harmonic(
+        robust_laplacian(target), np.flatnonzero(~filled), points[~filled]
+    )[filled]
+    # A piece without one sure vertex, such as an eye, goes along with the surface that is nearest.
+    sure_rows = np.flatnonzero(~doubtful)
+    for piece in np.unique(pieces[doubtful & ~filled]) if sure_rows.size else ():
+        rows = np.flatnonzero(pieces == piece)
+        center = target.vertices[rows].mean(axis=0)
+        away = np.sum((target.vertices[sure_rows] - center) ** 2, axis=1) / areas.sum()
+        near = areas[sure_rows] / (away + NEARBY**2) ** 2
+        near = near[None] / near.sum()
+
+        def average(values: np.ndarray, near: np.ndarray = near) -> np.ndarray:
+            means: np.ndarray = near @ values
+            return means
+
+        along = fit_similarities(average, target.vertices[sure_rows], points[sure_rows])
+        points[rows] = along.move(target.vertices[rows])
+        filled[rows] = True
+    nearest = closest_points(source, points[filled])
     points[filled], faces[filled], weights[filled] = (
         nearest.points,
         nearest.simplices,
@@ -284,15 +308,14 @@ def _fill_doubtful(
     edges = edge_table(target).edges
     inside = edges[doubtful[edges].all(axis=1)]
     regions = label_components(target.n_vertices, *inside.T)[1]
-    areas = dual_volumes(target)
     report = []
     for region in np.unique(regions[doubtful]):
         rows = np.flatnonzero(regions == region)
         lowest = rows[np.argmin(sure[rows])]
         way = (
-            "interpolated from around"
+            "taken from the surface around"
             if filled[lowest]
-            else "left as mapped, since it is a whole piece"
+            else "left as mapped, since none is sure"
         )
         report.append(
             f"{len(rows)} vertices ({areas[rows].sum() / areas.sum():.2%} of the area) about vertex "

@@ -497,8 +497,9 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
         else:
             first, indices = _split_corners([corners, *rows.values()])
             vertices = corners[first]
-        table: Columns = {name: (values[first], False) for name, values in rows.items()}
-        table |= {"POSITION": (places[vertices], False)} | field_columns(attributes, vertices)
+        table: Columns = {"POSITION": (places[vertices], False)}
+        table |= {name: (values[first], False) for name, values in rows.items()}
+        table |= field_columns(attributes, vertices)
         columns = document.add_columns(table)
         materials = attributes.face_materials[in_group]
         primitives: list[Entry] = []

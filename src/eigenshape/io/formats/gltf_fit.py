@@ -35,6 +35,9 @@ from eigenshape.operators.robust import robust_laplacian
 # Around each vertex, turn and size of a shape are means within this share of the root of its area:
 # wide enough that errors of single vertices cancel, and less than the width of a head.
 WINDOW = 0.05
+# Blend shapes of a part that is larger or smaller than elsewhere grow at most this much, so that errors
+# of the map cannot tear a face apart.
+MOST_GROWTH = 4.0
 # A joint is placed by the surface around it: weights fall with distance⁴ from this share of the
 # size of the shape, so that the nearest ring counts.
 RING = 0.02
@@ -107,7 +110,9 @@ def fit_scene(
             return means
 
         around = fit_similarities(average, places.vertices, mesh.vertices)
-        frames, factors = around.rotations, around.factors
+        usual = float(np.median(around.factors))
+        frames = around.rotations
+        factors = around.factors.clip(usual / MOST_GROWTH, usual * MOST_GROWTH)
     after = _place_again(document.tree, scene, matrices)
     return Fit(scene.placements, after, weights, frames, factors)
 
