@@ -219,8 +219,8 @@ def test_nothing_is_sure(tmp_path):
     match = identity_match(ball, np.zeros(ball.n_vertices))
     outfit = es.matching.transfer(worn, ball, match=match)
     assert not outfit.filled.any()
-    assert "100.00% of the area" in outfit.report[0]
-    assert "left as mapped, since none is sure" in outfit.report[0]
+    assert "100% of the area is in doubt" in outfit.report[0]
+    assert "all is left as mapped" in outfit.report[0]
 
 
 def fields_of(mesh, fields, folder):

@@ -30,6 +30,8 @@ from eigenshape.operators.robust import robust_laplacian
 # Confidence below which a place is taken from the map around it. That of a map that fits as well as
 # another one is halved, without being worse than it.
 DOUBTFUL = 0.3
+# Largest share of the area in doubt that is filled: a few sure vertices do not say where a body lies
+MOST_FILLED = 0.5
 # Root mean square gap, in mean edge lengths of the coarser shape, below which two shapes are one
 # surface with other triangles. A triangle leaves its surface by edge² / (8 radius): on creatures of
 # 600 vertices by 0.1 edges, and individuals whose limbs differ by 10 % are 0.3 edges apart.
@@ -275,6 +277,13 @@ def _fill_doubtful(
     if not doubtful.any():
         return found, doubtful, ()
     areas = dual_volumes(target)
+    share = areas[doubtful].sum() / areas.sum()
+    if share > MOST_FILLED:
+        sentence = (
+            f"{share:.0%} of the area is in doubt, with a mean confidence of {sure[doubtful].mean():.2f}: "
+            "all is left as mapped, since too little is sure. Look at the result, or pass another match"
+        )
+        return found, np.zeros_like(doubtful), (sentence,)
     pieces = vertex_components(target)[1]
     filled = doubtful & np.isin(pieces, pieces[~doubtful])
     points, faces, weights = (
@@ -285,7 +294,7 @@ def _fill_doubtful(
     )[filled]
     # A piece without one sure vertex, such as an eye, goes along with the surface that is nearest.
     sure_rows = np.flatnonzero(~doubtful)
-    for piece in np.unique(pieces[doubtful & ~filled]) if sure_rows.size else ():
+    for piece in np.unique(pieces[doubtful & ~filled]):
         rows = np.flatnonzero(pieces == piece)
         center = target.vertices[rows].mean(axis=0)
         away = np.sum((target.vertices[sure_rows] - center) ** 2, axis=1) / areas.sum()
@@ -312,14 +321,9 @@ def _fill_doubtful(
     for region in np.unique(regions[doubtful]):
         rows = np.flatnonzero(regions == region)
         lowest = rows[np.argmin(sure[rows])]
-        way = (
-            "taken from the surface around"
-            if filled[lowest]
-            else "left as mapped, since none is sure"
-        )
         report.append(
             f"{len(rows)} vertices ({areas[rows].sum() / areas.sum():.2%} of the area) about vertex "
             f"{lowest} at {target.vertices[lowest].round(4).tolist()} are in doubt, with a mean "
-            f"confidence of {sure[rows].mean():.2f}: {way}"
+            f"confidence of {sure[rows].mean():.2f}: taken from the surface around"
         )
     return SurfacePoints(points, faces, weights), filled, tuple(report)
