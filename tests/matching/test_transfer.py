@@ -179,6 +179,7 @@ def test_places_in_doubt_are_filled_and_named(worn, moved):
     assert sizes.max() < 0.3  # the foot is 2 away
     (sentence,) = outfit.report
     assert f"{len(np.unique(mesh.vertices[head], axis=0))} vertices" in sentence
+    assert any(f"about vertex {vertex} at" in sentence for vertex in np.flatnonzero(head))
     assert "mean confidence of 0.10: taken from the surface around" in sentence
     np.testing.assert_array_equal(outfit.attributes.fields["confidence"], outfit.confidence)
 

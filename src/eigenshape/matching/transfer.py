@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
@@ -177,7 +177,7 @@ def transfer(
         _require_match(match, target, source.mesh, ours)
         found = place_points(ours, match.faces[firsts], match.weights[firsts])
         sure, report = _sureness(match)[firsts], match.report
-    found, filled, sentences = _fill_doubtful(ours, theirs, found, sure)
+    found, filled, sentences = _fill_doubtful(ours, theirs, found, sure, firsts)
     places = found.points[numbers]
     worn = wear_attributes(source, target, places, found.simplices[numbers])
     carried = None
@@ -271,8 +271,12 @@ def _fill_doubtful(
     target: TriangleMesh,
     found: SurfacePoints,
     sure: Float[np.ndarray, " n"],
+    numbers: Int[np.ndarray, " n"],
 ) -> tuple[SurfacePoints, Bool[np.ndarray, " n"], tuple[str, ...]]:
-    """Interpolate places with little confidence from those around; return also which, and a report."""
+    """Interpolate places with little confidence from those around; return also which, and a report.
+
+    The report names vertices by given numbers.
+    """
     doubtful = sure < DOUBTFUL
     if not doubtful.any():
         return found, doubtful, ()
@@ -323,7 +327,7 @@ def _fill_doubtful(
         lowest = rows[np.argmin(sure[rows])]
         report.append(
             f"{len(rows)} vertices ({areas[rows].sum() / areas.sum():.2%} of the area) about vertex "
-            f"{lowest} at {target.vertices[lowest].round(4).tolist()} are in doubt, with a mean "
+            f"{numbers[lowest]} at {target.vertices[lowest].round(4).tolist()} are in doubt, with a mean "
             f"confidence of {sure[rows].mean():.2f}: taken from the surface around"
         )
     return SurfacePoints(points, faces, weights), filled, tuple(report)
