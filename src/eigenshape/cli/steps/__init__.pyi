@@ -31,6 +31,7 @@ from .reading import load_shape as load_shape
 from .reading import load_surface as load_surface
 from .reading import read_examples as read_examples
 from .reading import read_map as read_map
+from .reading import repair_worn as repair_worn
 from .recipes import index_recipe as index_recipe
 from .recipes import query_recipe as query_recipe
 from .sheets import CAPTION as CAPTION
