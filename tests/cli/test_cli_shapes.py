@@ -213,11 +213,11 @@ def test_an_operator_is_explained():
         ),
         (
             ("spectrum", "sphere.xyz", "--set", "t=wide"),
-            "those of t are NUMBER, none, and it is 'wide'",
+            "the values of t are NUMBER, none, and it is 'wide'",
         ),
         (
             ("spectrum", "sphere.xyz", "--operator", "robust", "--set", "n_neighbors=2.5"),
-            "those of n_neighbors are NUMBER, none, and it is '2.5'",
+            "the values of n_neighbors are NUMBER, none, and it is '2.5'",
         ),
         (("spectrum", "disc.off", "--operator", "best", "--set", "t=1"), "operator must be one of"),
         (
