@@ -31,6 +31,14 @@ from eigenshape.matching.pairs import (
 )
 from eigenshape.matching.spectral_refinement import Modes, smooth_places
 from eigenshape.matching.surface import Surface
+from eigenshape.matching.turns import (
+    NEARLY_RIGID,
+    Turn,
+    is_rigid,
+    rolled_turns,
+    settle_map,
+    turned_fit,
+)
 
 # Of rough bends, the best ones are grown, the first few before the others; of grown maps, the best
 # few once more
@@ -41,6 +49,7 @@ N_GROWN, N_FIRST_GROWN, N_GROWN_AGAIN = 9, 4, 4
 N_TRIED = 10
 # Modes that make a map smooth before the part is bent again: 30 and 100 lower the misfit less.
 N_LOW_MODES = 60
+N_BENT_ROLLS = 2  # rolls of a nearly rigid part from which it is bent
 MOST_SMOOTHINGS = 2  # it ends earlier if a bend is no better
 # Misfit up to which a map is as good as any, and the same in mean edges of the whole, which is more
 # on coarse meshes. The best rivals of 24 balls, ellipsoids, rings, cylinders and boxes, turned into
@@ -104,16 +113,24 @@ def _best_first(maps: list[FittedMap]) -> list[FittedMap]:
 
 def find_maps(
     plan: FitPlan, differences: Float[np.ndarray, "m k"], ours: Modes, theirs: Modes
-) -> list[FittedMap]:
-    """Return maps of a part, the best fit first, which low modes made smooth and which slid.
+) -> tuple[list[FittedMap], Turn | None]:
+    """Return maps of a part, the best fit first, and the rigid turn in which the best one settles.
 
-    A part with so few points that it bends to any map has none.
+    A rigid part is turned. Of others, the best map is made smooth by low modes, and slides. A part
+    with so few points that it bends to any map has none.
     """
     maps = grow_maps(plan, differences) if len(plan.part.points) >= N_FAR else []
     if not maps:
-        return []
+        return [], None
     # Bend the part again from the best map, made smooth by low modes, as long as that is better.
     # The new map takes the place of the one that it was made from, and keeps its pairs.
+    turn = settle_map(plan, maps[0].fit.places)
+    if not is_rigid(plan, turn) and turn.gap < NEARLY_RIGID:
+        # Bending forgives a roll about a long axis, so that starts that are rolled are missing.
+        maps = _best_first(maps + _rolled_maps(plan, differences, turn))
+        turn = settle_map(plan, maps[0].fit.places)
+    if is_rigid(plan, turn):
+        return [FittedMap(maps[0].pairs, turned_fit(plan, turn)), *maps[1:]], turn
     best = maps[0]
     for _ in range(MOST_SMOOTHINGS):
         places, _ = smooth_places(ours, theirs, best.fit.places, N_LOW_MODES)
@@ -121,7 +138,20 @@ def find_maps(
         if fit.misfit >= best.fit.misfit:
             break
         best = FittedMap(best.pairs, fit)
-    return [FittedMap(best.pairs, slide_part(plan, best.fit)), *maps[1:]]
+    return [FittedMap(best.pairs, slide_part(plan, best.fit)), *maps[1:]], turn
+
+
+def _rolled_maps(
+    plan: FitPlan, differences: Float[np.ndarray, "m k"], turn: Turn
+) -> list[FittedMap]:
+    """Return maps that are bent from the best rolls of a turn."""
+    maps = []
+    for rolled in rolled_turns(plan, turn)[:N_BENT_ROLLS]:
+        start = turned_fit(plan, rolled)
+        pairs = _grow_again(plan, descriptor_costs(differences), [start.select(plan.part.points)])
+        if pairs:
+            maps.append(FittedMap(pairs[0], fit_part(plan, start.places[plan.frames])))
+    return maps
 
 
 def grow_maps(
@@ -185,7 +215,7 @@ def _grow_again(plan: FitPlan, costs: Float[np.ndarray, "m k"], fits: list[Fit])
 
 
 def equally_good_maps(
-    plan: FitPlan, differences: Float[np.ndarray, "m k"], maps: Sequence[FittedMap]
+    plan: FitPlan, differences: Float[np.ndarray, "m k"], maps: Sequence[FittedMap], turn: Turn
 ) -> tuple[int, Float[np.ndarray, " n"]]:
     """Count maps that differ from each other and fit as well as any, the first one among them.
 
@@ -204,7 +234,16 @@ def equally_good_maps(
     taken = plan.whole.between[ends] < TAKEN
     unlike = differences + np.median(differences) * taken
     others = grow_maps(plan, unlike, wanted=NEARLY_AS_GOOD * most, known=best)
-    for one in [*maps[1:], *others]:
+    rivals = [*maps[1:], *others]
+    if is_rigid(plan, turn):
+        # What bends to another place is no rival of what fits as it is.
+        turns = [settle_map(plan, one.fit.places) for one in rivals]
+        rivals = [
+            FittedMap(one.pairs, turned_fit(plan, turn))
+            for one, turn in zip(rivals, turns, strict=True)
+            if is_rigid(plan, turn)
+        ]
+    for one in rivals:
         if one.fit.misfit <= most and all(_differ(plan, one, other) for other in found):
             found.append(one)
             n_places += _placed_apart(plan, best, one)

@@ -49,6 +49,7 @@ from eigenshape.matching.target import (
     as_target,
     require_matchable,
 )
+from eigenshape.matching.turns import is_rigid
 
 # Support of the part turned inside out, as a share of that of the part, from which nothing tells
 # the outside from the inside, and so left from right.
@@ -281,12 +282,12 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
     # Steps 2 to 5: pairs that support each other, starts, bends
     modes = modes_of_part(part.mesh, target.modes)
     plan = plan_fit(part, whole)
-    maps = find_maps(plan, differences, modes, target.modes)
-    if maps:
+    maps, turn = find_maps(plan, differences, modes, target.modes)
+    if turn is not None:
         best = maps[0]
         quality = rate_map(part, whole, differences, best.pairs, best.fit.places)
         evidence = vertex_evidence(part, whole, differences, maps, quality)
-        if len(target.modes.eigenvalues) < N_MODES[-1]:
+        if is_rigid(plan, turn) or len(target.modes.eigenvalues) < N_MODES[-1]:
             # A coarse whole has few modes, which would move vertices away from where they lie:
             # animals of 400 vertices in two poses have an error of 3.6 with them, and of 1.5 here.
             faces, weights = places_in_faces(
@@ -295,7 +296,7 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
         else:
             # Step 6: make the best map smooth.
             faces, weights = refine_places(modes, target.modes, whole.mesh, best.fit.places)
-        n_perfect, n_places = equally_good_maps(plan, differences, maps)
+        n_perfect, n_places = equally_good_maps(plan, differences, maps, turn)
         sure = confidence(evidence)
     else:
         # Too few points agree for a map: take the most similar patch of each, and trust none.
