@@ -13,7 +13,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "ch7_matching"))
 from pairs import Pair, pair_of, read_shape, stretched
 from rows import read
 
-N_VERTICES = 1200
+N_VERTICES = 1000
 HALVES = ("choosing", "reporting")
 COARSE = 300, 800  # vertices of coarse meshes, least and most
 PLATE = 0.06  # half the thickness of a plate, beside a radius of about 1
@@ -96,7 +96,7 @@ def shapes() -> Iterator[tuple[str, str, str, tuple[es.TriangleMesh, es.Triangle
     }
     machines = {
         "choosing": ("machine/idler_riser.STL", "retrieval/mech/psb324.ply", "retrieval/mech/psb336.ply", "retrieval/bearing/psb344.ply"),
-        "reporting": ("machine/featuretype.STL", "machine/angle_block.STL", "retrieval/mech/psb326.ply", "retrieval/bearing/psb354.ply"),
+        "reporting": ("retrieval/mech/psb326.ply", "retrieval/bearing/psb354.ply", "retrieval/mech/psb332.ply", "retrieval/bearing/psb346.ply"),
     }
     coarse = {
         "choosing": ("teddy/psb162", "hand/psb182", "bird/psb242", "armadillo/psb282", "vase/psb362"),

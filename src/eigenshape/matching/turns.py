@@ -16,8 +16,8 @@ from eigenshape.matching.spectral_refinement import places_in_faces
 N_ROLLS = 12  # about the long axis, each also with the ends exchanged
 N_ROLLED = 80  # samples by which rolls are compared
 N_ROLL_STEPS, N_STEPS = 6, 10  # of nearest points; a roll of 15 degrees settles in six
-# Mean distance from the surface, in units, up to which a turn is the whole answer, and the same in
-# mean edges of the whole, which is more on coarse meshes. Copies with other triangles have 1e-4 to
+# Mean distance from the surface up to which a turn is the whole answer, in roots of the part's area, and
+# in mean edges of the whole, which is more on coarse meshes. Copies with other triangles have 1e-4 to
 # 1e-3 (0.01 to 0.02 edges); other poses, other bones and mirror images have 7e-3 and more.
 RIGID, RIGID_IN_EDGES = 0.003, 0.06
 # The same, up to which rolls are tried: two metacarpals have 0.014, two poses of an animal 0.03.
@@ -77,7 +77,8 @@ def settle_map(plan: FitPlan, places: Int[np.ndarray, " n"]) -> Turn:
 def is_rigid(plan: FitPlan, turn: Turn) -> bool:
     """Return whether a turn alone places the part as well as the triangles allow."""
     edge = float(edge_lengths(plan.whole.mesh).mean())
-    return turn.gap < max(RIGID, RIGID_IN_EDGES * edge)
+    size = float(np.sqrt(plan.part.area))
+    return turn.gap < max(RIGID * size, RIGID_IN_EDGES * edge)
 
 
 def turned_fit(plan: FitPlan, turn: Turn) -> Fit:
