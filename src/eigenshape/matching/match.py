@@ -294,7 +294,6 @@ def _match_pieces(
         handed=all(one.handed for one in found),
         n_equally_good=n_equally_good,
         scale=factor,
-        mirrored=False,
         report=report,
     )
     return match, found[0].mirror_support

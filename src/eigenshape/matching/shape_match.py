@@ -85,8 +85,8 @@ class ShapeMatch(ReadOnly):
     handed: bool
     n_equally_good: int
     scale: float
-    mirrored: bool
     report: tuple[str, ...]
+    mirrored: bool = False
 
     @property
     def n_vertices(self) -> int:
