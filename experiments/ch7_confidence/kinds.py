@@ -85,7 +85,10 @@ def plate(seed: int) -> es.TriangleMesh:
 
 def shapes() -> Iterator[tuple[str, str, str, tuple[es.TriangleMesh, es.TriangleMesh]]]:
     """Yield kind, half, name, and two shapes with the same faces: two poses, or twice the same."""
-    creatures = {"choosing": ("quadruped", "biped", "lizard"), "reporting": ("giraffe", "hand", "bird")}
+    creatures = {
+        "choosing": ("quadruped", "biped", "lizard"),
+        "reporting": ("giraffe", "hand", "bird"),
+    }
     poses = {
         "choosing": (("sumner_cat-02", "sumner_cat-06"), ("sumner_horse-03", "sumner_horse-08")),
         "reporting": (("sumner_lion-03", "sumner_lion-07"), ("sumner_lion-02", "sumner_lion-08")),
@@ -95,12 +98,24 @@ def shapes() -> Iterator[tuple[str, str, str, tuple[es.TriangleMesh, es.Triangle
         "reporting": ("arm_r_3mc", "arm_r_3proxph", "arm_r_humerus", "arm_r_3midph"),
     }
     machines = {
-        "choosing": ("machine/idler_riser.STL", "retrieval/mech/psb324.ply", "retrieval/mech/psb336.ply", "retrieval/bearing/psb344.ply"),
-        "reporting": ("retrieval/mech/psb326.ply", "retrieval/bearing/psb354.ply", "retrieval/mech/psb332.ply", "retrieval/bearing/psb346.ply"),
+        "choosing": ("retrieval/bearing/psb344.ply", "retrieval/mech/psb324.ply"),
+        "reporting": ("retrieval/bearing/psb346.ply", "retrieval/mech/psb326.ply"),
     }
     coarse = {
-        "choosing": ("teddy/psb162", "hand/psb182", "bird/psb242", "armadillo/psb282", "vase/psb362"),
-        "reporting": ("teddy/psb164", "hand/psb184", "plier/psb204", "armadillo/psb284", "cup/psb24"),
+        "choosing": (
+            "teddy/psb162",
+            "hand/psb182",
+            "bird/psb242",
+            "armadillo/psb282",
+            "vase/psb362",
+        ),
+        "reporting": (
+            "teddy/psb164",
+            "hand/psb184",
+            "plier/psb204",
+            "armadillo/psb284",
+            "cup/psb24",
+        ),
     }
     for number, half in enumerate(HALVES):
         for kind in creatures[half]:
@@ -130,7 +145,11 @@ def draw(*, quick: bool) -> Iterator[Drawn]:
     for number, (kind, half, name, (one, other)) in enumerate(shapes()):
         ways = [("wholes", False), ("cuts", False), ("wholes", True), ("scans", False)]
         # Poses stretch animals already; of the others, a third is bent and stretched.
-        chosen = [ways[0], ways[1 + number % 3]] if kind != "animals" else [ways[1], ways[(0, 3)[number % 2]]]
+        chosen = (
+            [ways[0], ways[1 + number % 3]]
+            if kind != "animals"
+            else [ways[1], ways[(0, 3)[number % 2]]]
+        )
         if kind == "long bones":
             chosen = [ways[0], ways[1], ways[2]]
         if quick:
@@ -141,7 +160,9 @@ def draw(*, quick: bool) -> Iterator[Drawn]:
             if kind == "coarse":
                 sizes = tuple(int(n) for n in rng.integers(*COARSE, 2))
             first = stretched(one, rng) if stretch else one
-            pair = pair_of(f"{name} {way}{' stretched' * stretch}", first, other, way, rng, sizes=sizes)
+            pair = pair_of(
+                f"{name} {way}{' stretched' * stretch}", first, other, way, rng, sizes=sizes
+            )
             yield Drawn(kind, half, pair)
             if way == "cuts" or kind == "coarse":
                 strangers[half].append(pair)
@@ -153,6 +174,11 @@ def draw(*, quick: bool) -> Iterator[Drawn]:
             )
             part = es.TriangleMesh(size * ours.part.vertices, ours.part.faces)
             pair = Pair(
-                f"{ours.name} on {theirs.name}", part, theirs.whole, ours.vertices, ours.points, ours.distances
+                f"{ours.name} on {theirs.name}",
+                part,
+                theirs.whole,
+                ours.vertices,
+                ours.points,
+                ours.distances,
             )
             yield Drawn("strangers", half, pair, belongs=False)

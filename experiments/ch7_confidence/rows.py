@@ -67,7 +67,7 @@ def said(match: es.matching.ShapeMatch) -> dict[str, object]:
         "said": float(match.confidence.mean()),
         "places": match.n_equally_good,
         "scale": match.scale,
-        "mirrored": getattr(match, "mirrored", False),
+        "mirrored": match.mirrored,
         "report": list(match.report),
     }
 
@@ -88,7 +88,9 @@ def bones(part: str, whole: str) -> dict[str, object]:
 
 def fragment(suffix: str) -> dict[str, object]:
     """Map a fragment of a stone flake on the whole, by whose known turn it is right or not."""
-    part, whole = (es.read_mesh(DATA / f"flakes/{name}{suffix}.ply") for name in ("fragment", "flake"))
+    part, whole = (
+        es.read_mesh(DATA / f"flakes/{name}{suffix}.ply") for name in ("fragment", "flake")
+    )
     turn = np.loadtxt(DATA / f"flakes/turn{suffix}.txt")
     truth = part.vertices @ (turn if suffix else turn.T)
     return right(es.match_shapes(part, whole), whole, truth)
@@ -167,15 +169,3 @@ def rows() -> Iterator[tuple[str, Callable[[], dict[str, object]]]]:
         yield f"foot {limb}", lambda limb=limb: foot(0, 1, limb, 0)
         yield f"foot {limb} of another", lambda limb=limb: foot(0, 0, limb, 1)
     yield "hands", hands
-
-
-if __name__ == "__main__":
-    import json, time
-    out = {}
-    pat = sys.argv[1] if len(sys.argv) > 1 else ""
-    for name, measure in rows():
-        if pat and pat not in name: continue
-        t=time.process_time()
-        try: out[name] = measure()
-        except Exception as e: out[name]=repr(e)
-        print(name, json.dumps(out[name], default=float), f"{time.process_time()-t:.1f}s", flush=True)

@@ -101,6 +101,10 @@ def match_shapes(
        more, nearly free to move along the surface.
     6. Eigenfunctions of both shapes make the best map smooth, if the whole has 750 vertices or more.
 
+    A rigid turn decides what bending leaves open. If the turn in which the best map settles (nearest
+    points, Besl and McKay 1992) leaves the part on the surface, that turn is the map. If it nearly does,
+    the part is also bent from rolls about its long axis, as bones are round.
+
     Parameters
     ----------
     part : MeshLike
