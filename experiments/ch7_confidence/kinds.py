@@ -161,7 +161,7 @@ def draw(*, quick: bool) -> Iterator[Drawn]:
                 sizes = tuple(int(n) for n in rng.integers(*COARSE, 2))
             first = stretched(one, rng) if stretch else one
             pair = pair_of(
-                f"{name} {way}{' stretched' * stretch}", first, other, way, rng, sizes=sizes
+                f"{name} {way}{' stretched' * stretch}", (first, other), way, rng, sizes=sizes
             )
             yield Drawn(kind, half, pair)
             if way == "cuts" or kind == "coarse":

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from kinds import HALVES, draw
+from kinds import HALVES, Drawn, draw
 from rich.progress import track
 from rows import rows
 from scipy.optimize import minimize
@@ -17,8 +17,8 @@ from sklearn.metrics import roc_auc_score
 
 import eigenshape as es
 
-HERE = Path(__file__).resolve()
-sys.path.extend([str(HERE.parents[1]), str(HERE.parents[1] / "ch7_matching")])
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "ch7_matching"))
 from frame import rounded
 from outputs import give_out, options_of
 from pairs import errors
@@ -29,7 +29,7 @@ PENALTY = 5e-3  # on squares of factors of columns of spread 1: few pairs, 16 co
 N_BINS = 10
 
 
-def measure(drawn) -> dict[str, object]:
+def measure(drawn: Drawn) -> dict[str, object]:
     """Match a pair: evidence, confidence, the number of places, and whether vertices are right."""
     pair = drawn.pair
     match = es.match_shapes(pair.part, pair.whole)

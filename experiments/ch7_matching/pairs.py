@@ -179,24 +179,24 @@ def make_pair(
         first = stretched(first, np.random.default_rng(seed + 7))
     name = f"{kind} {seed}: {poses[0]} on {poses[1]}"
     rest = read_shape(SYMMETRIC[animal]) if animal in SYMMETRIC else None
-    return pair_of(name, first, second, kind, np.random.default_rng(seed), rest=rest)
+    return pair_of(name, (first, second), kind, np.random.default_rng(seed), rest=rest)
 
 
 def pair_of(
     name: str,
-    first: es.TriangleMesh,
-    second: es.TriangleMesh,
+    poses: tuple[es.TriangleMesh, es.TriangleMesh],
     kind: str,
     rng: np.random.Generator,
     *,
     sizes: tuple[int, int] = (N_VERTICES, N_VERTICES),
     rest: es.TriangleMesh | None = None,
 ) -> Pair:
-    """Return a part of the first shape and the second one, which has the same faces, as a whole.
+    """Return a part of the first of two shapes with the same faces, and the second one as a whole.
 
     `sizes` are the vertices of the first shape before it is cut and of the whole; `rest` is a pose
     that is its own mirror image.
     """
+    first, second = poses
     whole = remesh(second, sizes[1], np.random.default_rng(1))
     part = cut(remesh(first, sizes[0], np.random.default_rng(2)), kind, rng)
     foot = es.geometry.closest_points(first, part.vertices)

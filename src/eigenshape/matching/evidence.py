@@ -32,8 +32,8 @@ TINY = np.finfo(float).tiny
 # fitted as in experiments/ch7_confidence, to 35 pairs of its choosing half: animals, long bones, flat and
 # irregular pieces, and pairs that do not belong together.
 CALIBRATION = np.array(
-    [-2.81, 0.733, -32.4, -4.99, -6.6, 0.496, -36.2, 0.673, 0.0525, 3.56, 0.588, -0.965, -0.174]
-    + [-0.196, 1.67, -0.293]
+    (-2.81, 0.733, -32.4, -4.99, -6.6, 0.496, -36.2, 0.673, 0.0525, 3.56, 0.588, -0.965)
+    + (-0.174, -0.196, 1.67, -0.293)
 )
 N_COLUMNS = len(CALIBRATION) - 1
 
