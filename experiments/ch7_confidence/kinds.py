@@ -1,4 +1,4 @@
-"""Pairs with known maps of seven kinds, in two halves that share no individual."""
+"""Pairs with known maps of six kinds, and strangers, in two halves that share no individual."""
 
 import sys
 from collections.abc import Iterator

@@ -10,7 +10,9 @@ from scipy.spatial.transform import Rotation
 import eigenshape as es
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
-from real_shapes import DATA
+from frame import rounded
+from outputs import give_out, options_of
+from real_shapes import DATA, require_data
 
 N_STEPS = 30  # of point to point, from where two bones of one frame lie
 FOOT_SHARE = 0.07  # of the area of a creature
@@ -169,3 +171,15 @@ def rows() -> Iterator[tuple[str, Callable[[], dict[str, object]]]]:
         yield f"foot {limb}", lambda limb=limb: foot(0, 1, limb, 0)
         yield f"foot {limb} of another", lambda limb=limb: foot(0, 0, limb, 1)
     yield "hands", hands
+
+
+def main() -> None:
+    """Measure all pairs, or with --quick the fragment of a flake."""
+    arguments = options_of(__doc__, quick="one fragment", out="ch7-rows.json").parse_args()
+    require_data()
+    wanted = {name: measure for name, measure in rows() if name == "flake b" or not arguments.quick}
+    give_out(rounded({name: measure() for name, measure in wanted.items()}), arguments.out)
+
+
+if __name__ == "__main__":
+    main()

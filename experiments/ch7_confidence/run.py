@@ -1,7 +1,7 @@
 """Is confidence a probability on every kind of shape? Fits its constants on one half, reports both.
 
-Pairs of seven kinds whose maps are known, and pairs that do not belong together; the halves share no
-individual. With --rows, single pairs on which maps or confidences were once wrong.
+Pairs of six kinds whose maps are known, and pairs that do not belong together; the halves share no
+individual.
 """
 
 import sys
@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from kinds import HALVES, Drawn, draw
 from rich.progress import track
-from rows import rows
 from scipy.optimize import minimize
 from scipy.special import expit
 from sklearn.metrics import roc_auc_score
@@ -98,17 +97,10 @@ def judge(measured: list[dict[str, object]]) -> dict[str, float]:
 
 
 def main() -> None:
-    """Match, fit, and print constants and tables; or measure the single pairs."""
+    """Match, fit, and print constants and tables."""
     parser = options_of(__doc__, quick="few pairs", out="ch7-confidence.json")
-    parser.add_argument("--rows", action="store_true", help="measure the single pairs")
     arguments = parser.parse_args()
     require_data()
-    if arguments.rows:
-        chosen = list(rows())[3:4] if arguments.quick else list(rows())
-        give_out(
-            rounded({name: measure_row() for name, measure_row in track(chosen)}), arguments.out
-        )
-        return
     measured = [measure(drawn) for drawn in track(list(draw(quick=arguments.quick)))]
     results: dict[str, object] = {}
     for half in HALVES:

@@ -32,8 +32,24 @@ TINY = np.finfo(float).tiny
 # fitted as in experiments/ch7_confidence, to 35 pairs of its choosing half: animals, long bones, flat and
 # irregular pieces, and pairs that do not belong together.
 CALIBRATION = np.array(
-    (-2.81, 0.733, -32.4, -4.99, -6.6, 0.496, -36.2, 0.673, 0.0525, 3.56, 0.588, -0.965)
-    + (-0.174, -0.196, 1.67, -0.293)
+    [
+        -2.81,  # constant
+        0.733,  # local orientation
+        -32.4,  # misfit of distances
+        -4.99,  # distance to the next matched point
+        -6.6,  # distance to places by other starts
+        0.496,  # local stretch
+        -36.2,  # gap after bending
+        0.673,  # weight of the patch
+        0.0525,  # difference of the patch
+        3.56,  # orientation
+        0.588,  # support
+        -0.965,  # mean difference
+        -0.174,  # gap times the root of strain
+        -0.196,  # gap after a rigid turn
+        1.67,  # lead over the best rival
+        -0.293,  # share of the area
+    ]
 )
 N_COLUMNS = len(CALIBRATION) - 1
 
