@@ -9,18 +9,17 @@ from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from certeig.kit.arrays import record
-from eigenshape.geometry.measure import edge_lengths, nearest_rotations
+from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.matching.fitting import LARGEST_GAP, NORMAL_LENGTH, Fit, FitPlan
 from eigenshape.matching.spectral_refinement import places_in_faces
 
 N_ROLLS = 12  # about the long axis, each also with the ends exchanged
 N_ROLLED = 80  # samples by which rolls are compared
 N_ROLL_STEPS, N_STEPS = 6, 10  # of nearest points; a roll of 15 degrees settles in six
-# Mean distance from the surface up to which a turn is the whole answer, in roots of the part's area, and
-# in mean edges of the whole, which is more on coarse meshes. Copies with other triangles have 1e-4 to
-# 1e-3 (0.01 to 0.02 edges); other poses, other bones and mirror images have 7e-3 and more.
-RIGID, RIGID_IN_EDGES = 0.003, 0.06
-# The same, up to which rolls are tried: two metacarpals have 0.014, two poses of an animal 0.03.
+# Mean distance from the surface up to which a turn is the whole answer, in roots of the part's area. Copies
+# with other triangles have 1e-4 to 1e-3; other poses, other bones and mirror images have 7e-3 and more.
+RIGID = 0.003
+# Mean distance, in units, up to which rolls are tried: two metacarpals have 0.014, two poses of an animal 0.03.
 NEARLY_RIGID = 0.025
 # Two turns differ if they place samples this far apart on average, in units.
 APART = 0.06
@@ -54,7 +53,7 @@ def settle(
     starts, weights = part.mesh.vertices[vertices], part.areas[vertices]
     weights = weights / weights.sum()
     middle = weights @ starts
-    for _ in range(steps):
+    for step in range(steps):
         target = weights @ ends
         products = ((ends - target) * weights[:, None]).T @ (starts - middle)
         rotation = nearest_rotations(products[None])[0]
@@ -62,9 +61,11 @@ def settle(
         normals = part.normals[vertices] @ rotation.T
         nearest = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))[1]
         ends = whole.vertices[nearest]
-    faces, shares = places_in_faces(whole, whole.vertices, points, nearest)
-    feet = np.einsum("vc,vcd->vd", shares, whole.vertices[whole.faces[faces]])
-    gap = float(weights @ np.linalg.norm(points - feet, axis=1))
+        # Vertices show the way; on a coarse whole, the surface between them ends it.
+        if 2 * step + 1 >= steps:
+            faces, shares = places_in_faces(whole, whole.vertices, points, nearest)
+            ends = np.einsum("vc,vcd->vd", shares, whole.vertices[whole.faces[faces]])
+    gap = float(weights @ np.linalg.norm(points - ends, axis=1))
     return Turn(rotation, target - rotation @ middle, nearest, gap)
 
 
@@ -75,10 +76,8 @@ def settle_map(plan: FitPlan, places: Int[np.ndarray, " n"]) -> Turn:
 
 
 def is_rigid(plan: FitPlan, turn: Turn) -> bool:
-    """Return whether a turn alone places the part as well as the triangles allow."""
-    edge = float(edge_lengths(plan.whole.mesh).mean())
-    size = float(np.sqrt(plan.part.area))
-    return turn.gap < max(RIGID * size, RIGID_IN_EDGES * edge)
+    """Return whether a turn alone places the part as well as can be expected."""
+    return turn.gap < RIGID * float(np.sqrt(plan.part.area))
 
 
 def turned_fit(plan: FitPlan, turn: Turn) -> Fit:
