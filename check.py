@@ -1,11 +1,15 @@
 """Run the checks: format, lint, types, layers, tests. CI runs this same file.
 
-python check.py            all of it but the long tests; two to five minutes on two cores
-python check.py --all      the long tests, the docs site and the studio in a browser, too
+python check.py            all of it but the long tests and the studio; four minutes on two cores
+python check.py core       only the files and quick tests of a group of tests/house/groups.toml; two minutes
+python check.py --all      the long tests, the docs site and the studio in a browser, too; twenty minutes
+python check.py --rest     what `python check.py` leaves of `--all`
 python check.py --nightly  as --all, with every part of the broad sweeps; a commit runs a tenth of these
 python check.py --fast     without the tests
+python check.py --record   the quick tests alone, and write their CPU seconds into tests/house/budgets.toml
 """
 
+import argparse
 import os
 import platform
 import re
@@ -16,63 +20,96 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np  # noqa: F401  brings the BLAS that is looked for
-from conftest import TURNS, turn_of_commit
+from conftest import GROUPS, TURNS, turn_of_commit
 from threadpoolctl import threadpool_info
 
-FIRST = {
-    "format": ["-m", "ruff", "format", "--check", "."],
-    "lint": ["-m", "ruff", "check", "."],
-}
-TYPES_AND_LAYERS = {
-    "types": ["-m", "mypy"],
-    "layers": ["-c", "from importlinter.cli import lint_imports_command as main; main()"],
-}
-# Each process takes half of the files in a row, so that tests of one file share what they make.
-TESTS = ["-m", "pytest", "--dist", "worksteal"]
-STUDIO = [
-    "-m",
-    "pytest",
-    "studio/tests",
-]  # in one process, which waits for a browser most of the time
+FORMAT, LINT, TYPES = ["-m", "ruff", "format", "--check"], ["-m", "ruff", "check"], ["-m", "mypy"]
+LAYERS = ["-c", "from importlinter.cli import lint_imports_command as main; main()"]
+PYTEST = ["-m", "pytest", "--cpu", "40"]
+QUICK = ["-m", "not long"]
+CERTEIG = ["-m", "pytest", "certeig/tests", "certeig/src"]  # with the options of its own package
 DOCS = ["-m", "sphinx", "-q", "-W", "--keep-going", "docs"]
-OPTIONS = {"--all", "--nightly", "--fast"}
+
+Checks = dict[str, list[str]]
 
 
 def main() -> int:
     """Run the checks and print which failed."""
-    options = set(sys.argv[1:])
-    if unknown := options - OPTIONS:
-        sys.exit(
-            f"check.py takes --all, --nightly or --fast; it was given {', '.join(sorted(unknown))}."
-        )
-    everything = options & {"--all", "--nightly"}
-    nightly = sorted(options & {"--nightly"})  # an option of pytest, too
+    parser = argparse.ArgumentParser(
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("group", nargs="?", choices=GROUPS)
+    modes = parser.add_mutually_exclusive_group()
+    for mode in ("all", "rest", "nightly", "fast", "record"):
+        modes.add_argument(f"--{mode}", dest="mode", action="store_const", const=mode)
+    options = parser.parse_args()
+    if options.group and options.mode:
+        parser.error("a group is checked without options")
     # Tests start hundreds of processes, each of which would translate all modules anew.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    # Threads of BLAS burn a core while they wait for each other. Tests, docs and studio share two
-    # cores, where eigenvalues of a matrix of 300 rows took 130 times as long with two threads.
-    if not nightly:
+    # Threads of BLAS and OpenMP burn a core while they wait for each other. Tests, docs and studio
+    # share two cores, where eigenvalues of a matrix of 300 rows took 130 times as long with two.
+    if options.mode != "nightly":
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
     with tempfile.TemporaryDirectory() as site:
-        beside, tests = dict(TYPES_AND_LAYERS), {}
-        if everything:
-            pages = run_gallery(0, 1) if nightly else run_gallery(turn_of_commit(), TURNS)
-            beside |= {"docs": [*DOCS, *pages, site], "studio": [*STUDIO, *nightly]}
-            tests["all tests"] = [*TESTS, *two_processes(), *nightly]
-        elif "--fast" not in options:
-            tests["tests"] = [*TESTS, *two_processes(), "-m", "not long"]
-        failed = run_checks(FIRST)
+        if options.group:
+            first, tests, beside = checks_of_group(options.group)
+        else:
+            first, tests, beside = checks_of_all(options.mode, site)
+        failed = run_checks(first)
         # Beside the tests, so that no core waits: types take one, and the studio half of one.
         with ThreadPoolExecutor(2) as pool:
             for found in pool.map(run_checks, [tests, beside]):
                 failed += found
-    print("== readability, for looking and not for enforcing", flush=True)
-    subprocess.run([sys.executable, "tests/house/readability.py"], check=True)
-    print("== figures that are older than what they time, for looking", flush=True)
-    subprocess.run([sys.executable, "benchmarks/figures.py", "--stale"], check=True)
-    names = [*FIRST, *beside, *tests]
+    if not options.group and options.mode != "record":
+        print("== readability, for looking and not for enforcing", flush=True)
+        subprocess.run([sys.executable, "tests/house/readability.py"], check=True)
+        print("== figures that are older than what they time, for looking", flush=True)
+        subprocess.run([sys.executable, "benchmarks/figures.py", "--stale"], check=True)
+    names = [*first, *beside, *tests]
     print(f"failed: {', '.join(failed)}" if failed else f"passed: {', '.join(names)}")
     return 1 if failed else 0
+
+
+def checks_of_group(group: str) -> tuple[Checks, Checks, Checks]:
+    """Return the checks of the files of one group, and its quick tests."""
+    sources, tests = GROUPS[group]["sources"], GROUPS[group]["tests"]
+    first = {"format": [*FORMAT, *sources, *tests], "lint": [*LINT, *sources, *tests]}
+    quick = [*PYTEST, *QUICK, "--group", group, *tests]
+    if group != "studio":  # which waits for a browser most of the time, in one process
+        quick += two_processes()
+    beside: Checks = {"types": [*TYPES, *sources]}
+    if group == "certeig":
+        beside["tests without shapes"] = CERTEIG
+    return first, {"tests": quick}, beside
+
+
+def checks_of_all(mode: str | None, site: str) -> tuple[Checks, Checks, Checks]:
+    """Return the checks to begin with, the tests, and what runs beside them; the docs go to the folder `site`."""
+    if mode == "record":
+        # The same seconds on every day: all by one kernel, and no other process.
+        quick = [*PYTEST, *QUICK, "--record"]
+        return {}, {"tests": quick, "tests of the studio": [*quick, "studio/tests"]}, {}
+    first: Checks = {"format": [*FORMAT, "."], "lint": [*LINT, "."]}
+    beside: Checks = {"types": TYPES, "layers": LAYERS}
+    if mode == "fast":
+        return first, {}, beside
+    if mode is None:
+        beside["certeig"] = CERTEIG
+        return first, {"tests": [*PYTEST, *QUICK, *two_processes()]}, beside
+    sweeps = ["--nightly"] if mode == "nightly" else []
+    turn, turns = (0, 1) if sweeps else (turn_of_commit(), TURNS)
+    beyond: Checks = {
+        "certeig": [*CERTEIG, "--types", "-m", ""],  # all, with the types of arguments checked
+        "docs": [*DOCS, *run_gallery(turn, turns), site],
+        "studio": [*PYTEST, *sweeps, "studio/tests"],
+    }
+    if mode == "rest":
+        return {}, {"long tests": [*PYTEST, "-m", "long", *two_processes()]}, beyond
+    return first, {"all tests": [*PYTEST, *sweeps, *two_processes()]}, beside | beyond
 
 
 def two_processes() -> list[str]:
@@ -82,15 +119,17 @@ def two_processes() -> list[str]:
     that they begin with. Kernels are chosen by OpenBLAS on x86 alone.
     """
     blas = [library for library in threadpool_info() if library["internal_api"] == "openblas"]
+    # Each takes half of the files in a row, so that tests of one file share what they make.
+    shared = ["--dist", "worksteal"]
     if not blas or platform.machine() not in ("x86_64", "AMD64"):
-        return ["-n", "2"]
+        return ["-n", "2", *shared]
     used = {library["architecture"] for library in blas}
     # OpenBLAS takes Zen for Haswell, so that Haswell would be no other kernel there.
     kernel = "Sandybridge" if used <= {"Haswell", "Zen"} else "Haswell"
     processes = ["popen", f"popen//env:OPENBLAS_CORETYPE={kernel}"]
     if turn_of_commit() % 2:
         processes.reverse()
-    return ["--tx", processes[0], "--tx", processes[1]]
+    return ["--tx", processes[0], "--tx", processes[1], *shared]
 
 
 def run_gallery(turn: int, turns: int) -> list[str]:

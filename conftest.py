@@ -1,7 +1,8 @@
-"""Options of all tests, those of the studio too: which share of the broad sweeps is run, and what tests cost."""
+"""Options of all tests, those of the studio too: whose tests, which share of the broad sweeps, what they cost."""
 
 import os
 import subprocess
+import sys
 from collections import Counter
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
@@ -10,6 +11,10 @@ from zlib import crc32
 import pytest
 
 ROOT = Path(__file__).resolve().parent
+sys.path.append(str(ROOT / "tests" / "house"))
+from budgets import SECONDS, read_budgets, write_budgets  # noqa: E402
+from groups import GROUPS, group_of  # noqa: E402
+
 TURNS = 10  # commits until every part of every sweep has been run
 TURN = pytest.StashKey[int | None]()
 COST = "CPU seconds"
@@ -20,6 +25,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("eigenshape")
     group.addoption("--nightly", action="store_true", help="run every part of the broad sweeps")
     group.addoption("--turn", type=int, choices=range(TURNS), help="the part of sweeps to run")
+    group.addoption("--group", choices=GROUPS, help="collect the tests of one group alone")
+    group.addoption(
+        "--record", action="store_true", help="write the CPU time of groups into budgets.toml"
+    )
     group.addoption(
         "--cpu", type=int, metavar="N", help="print the CPU time of folders and N tests"
     )
@@ -51,6 +60,14 @@ def pytest_report_header(config: pytest.Config) -> str:
     if turn is None:
         return "sweeps: every turn"
     return f"sweeps: turn {turn} of 0..{TURNS - 1} (the same again: --turn {turn}; all: --nightly)"
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave out files of other groups unread."""
+    group = config.getoption("--group")
+    if group is None or collection_path.is_dir():
+        return None
+    return group_of(collection_path, "tests") != group or None
 
 
 @pytest.hookimpl(trylast=True)  # after other files have marked their tests
@@ -101,22 +118,25 @@ pytest_runtest_setup = pytest_runtest_call = pytest_runtest_teardown = _measure
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Print where the CPU time went."""
-    n_dearest = config.getoption("--cpu")
-    if n_dearest is None:
-        return
+    """Print where the CPU time went, and record it."""
     costs: Counter[str] = Counter()
-    folders: Counter[str] = Counter()
+    groups: Counter[str] = Counter()
     for reports in terminalreporter.stats.values():
         for report in reports:
             if getattr(report, "when", None) == "teardown":
                 cost = sum(value for name, value in report.user_properties if name == COST)
                 costs[report.nodeid] = cost
-                folders["/".join(report.nodeid.split("::")[0].split("/")[:-1])] += cost
+                file = ROOT / report.nodeid.split("::")[0]
+                groups[group_of(file, "tests") or "the whole house"] += cost
+    if config.getoption("--record"):
+        budgets = read_budgets()
+        for group in GROUPS.keys() & groups.keys():
+            budgets[group][SECONDS] = groups[group]
+        write_budgets(budgets)
+    n_dearest = config.getoption("--cpu")
+    if n_dearest is None:
+        return
     terminalreporter.section("CPU seconds, those of processes that were started included")
-    for place, cost in [
-        ("all", costs.total()),
-        *folders.most_common(),
-        *costs.most_common(n_dearest),
-    ]:
+    rows = [("all", costs.total()), *groups.most_common(), *costs.most_common(n_dearest)]
+    for place, cost in rows:
         terminalreporter.write_line(f"{cost:9.2f}  {place}")

@@ -105,7 +105,7 @@ def measure(folder: str) -> Row:
     name = reader.query(query)[0].name
     timed("descriptors of one shape", lambda: index.descriptors(name, RECIPE))
     timed("picture of one shape", lambda: index.thumbnail(name))
-    index.update([es.retrieval.Record(name, "new", None, None, (), {}, ())])
+    index.update([es.retrieval.Record(name, label="new")])
     timed("refresh after 1 was changed", reader.refresh)
     return {"rows": rows}
 

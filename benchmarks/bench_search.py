@@ -42,6 +42,7 @@ from eigenshape.retrieval.patches.matching import PatchPoints
 from eigenshape.retrieval.search.candidates import choose_candidates, n_compared
 from eigenshape.retrieval.search.coarse import CoarseRows
 from eigenshape.retrieval.search.engines import FaissEngine, QdrantEngine
+from eigenshape.retrieval.search.options import QueryOptions
 
 FULL, QUICK = (10_000, 100_000), (2_500,)
 N_QUERIES = 40
@@ -222,8 +223,8 @@ def measure(folder: str, pickled: list[bytes], method: str) -> Row:
                 lambda: coarse,
                 allowed,
                 isolations,
-                n_matches=N_MATCHES,
-                supplier=supplier,
+                QueryOptions(N_MATCHES),
+                supplier,
             ).places
             choosing.append(time.process_time() - start)
             start = time.process_time()

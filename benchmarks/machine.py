@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_info
 
+import certeig
 from certeig.kit.kernels import load_library
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -22,7 +23,7 @@ STATUS, CLEAR = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 def describe(packages: list[str]) -> dict[str, object]:
     """Name the processor, cores, memory, load, BLAS, kernels, and the versions of these packages."""
     np.ones((2, 2)) @ np.ones((2, 2))  # a BLAS is listed once it is loaded
-    _, library = load_library()
+    _, library = load_library(Path(certeig.__file__).parent)
     level = f"level {library.stem.rpartition('-')[2]}"  # of processors, as in kernels-3.so
     return {
         "cpu": _field("/proc/cpuinfo", r"model name\s*:\s*(.+)")

@@ -60,6 +60,8 @@ sphinx_gallery_conf = {
     "remove_config_comments": True,
     "write_computation_times": False,
     "download_all_examples": False,
+    # Colab has none of our packages; elsewhere this changes nothing.
+    "first_notebook_cell": "%pip install -q 'eigenshape[neuro,decimate,sklearn]'",
     "abort_on_example_error": True,
 }
 

@@ -26,6 +26,12 @@ def pytest_configure(config: pytest.Config) -> None:
         runtime_types.Limit.calls = sys.maxsize
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave folders that are beyond the quick part unread, where it is asked for alone."""
+    is_beyond = collection_path.parent == TESTS and collection_path.name in BEYOND_THE_QUICK_PART
+    return (is_beyond and config.option.markexpr == "not long") or None
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Begin to count the calls whose types are checked."""
     runtime_types.Limit.test += 1

@@ -58,6 +58,21 @@ EVENTS = {
 }
 
 
+class StoreWarning(UserWarning):
+    """A part of an index on disk is damaged; the rest is served.
+
+    See Also
+    --------
+    ShapeIndex.verify : List all damage.
+
+    Examples
+    --------
+    >>> import eigenshape as es
+    >>> issubclass(es.retrieval.StoreWarning, UserWarning)
+    True
+    """
+
+
 @dataclass(frozen=True)
 class Kind:
     """A kind of sealed file, and the words of its errors.

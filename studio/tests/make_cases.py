@@ -56,9 +56,14 @@ def cases() -> dict:
 
 
 def _deformation_case() -> dict:
-    """Return drags and how the library turns by them."""
+    """Return drags, and the smallest rotations that turn their starts towards their ends."""
     drags = np.random.default_rng(2).standard_normal((4, 3, 3))
-    turns = [es.deformation.rotation_from_drag(*drag) for drag in drags]
+    turns = []
+    for pivot, start, end in drags:
+        before, after = start - pivot, end - pivot
+        axis = np.cross(before, after)
+        angle = np.arctan2(np.linalg.norm(axis), before @ after)
+        turns.append(es.Rotation(pivot, axis, float(angle)))
     return {
         "drags": [
             {"points": drag.tolist(), "axis": _plain(turn.axis), "angle": _plain([turn.angle])[0]}

@@ -328,15 +328,16 @@ def test_features_of_large_meshes_say_how_far_heat_is_off(tmp_path, monkeypatch)
 
 
 @pytest.mark.long
-def test_an_index_names_files_that_it_holds_twice_and_the_methods_that_it_lacks(tmp_path):
+def test_an_index_lists_files_that_it_holds_twice_and_names_the_methods_that_it_lacks(tmp_path):
     folder = tmp_path / "meshes" / "fish"
     folder.mkdir(parents=True)
     write_mesh(make_creature("fish", n_vertices=500), folder / "one.ply")
     options = ("--method", "scale-free", "--views", 0, "--workers", 1)
-    whole = run("index", "add", tmp_path / "db", tmp_path / "meshes", *options)
-    assert "same file content" not in whole.stdout
-    again = run("index", "add", tmp_path / "db", folder, *options)
-    assert "one: the same file content as fish/one" in again.stdout
+    run("index", "add", tmp_path / "db", tmp_path / "meshes", *options)
+    assert run_json("index", "duplicates", tmp_path / "db")["pairs"] == []
+    run("index", "add", tmp_path / "db", folder, *options)  # named by another folder
+    (pair,) = run_json("index", "duplicates", tmp_path / "db")["pairs"]
+    assert pair == {"shape": "fish/one", "other": "one", "score": 0.0}
 
     found = run("query", tmp_path / "db", folder / "one.ply", "--method", "scale-free")
     assert "score: 0 for the same description, lower is more alike" in found.stdout

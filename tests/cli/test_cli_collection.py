@@ -151,7 +151,10 @@ def test_landmarks_of_a_specimen_that_fails_or_in_another_order_are_named(scans,
     es.morphometrics.write_landmarks(given, table)
     options = ("-o", output, "--landmarks", table, "--workers", 1)
     facts = run_json("collection", scans, *options, code=3)
-    assert any("those of broken are not used: it failed" in text for text in facts["warnings"])
+    assert any(
+        "the landmarks of broken are not used, because it failed" in text
+        for text in facts["warnings"]
+    )
     assert any(text.startswith("landmarks: 4 of 4 of hand 2") for text in facts["warnings"])
     assert facts["doubtful"]["hand 2"] == NAMES
     rows = csv.DictReader((output / "landmarks.csv").read_text().splitlines())

@@ -32,6 +32,7 @@ def test_a_mirror_image_of_a_form_without_symmetry_is_noticed():
     assert error(found, mesh, moved) < 0.2
 
 
+@pytest.mark.long
 def test_of_a_symmetric_form_it_cannot_be_told_whether_it_is_reflected_unless_it_is_known():
     fish, other = (es.make_creature("fish", individual=i, n_vertices=500) for i in (0, 1))
     found = es.collections.align_surfaces(mirror(other), fish)

@@ -4,7 +4,8 @@ import errno
 import re
 import shutil
 import sqlite3
-from contextlib import closing
+from contextlib import closing, contextmanager
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,16 +23,33 @@ def spoil(folder, query):
         database.execute(query)
 
 
-@pytest.fixture
-def quick(monkeypatch):
+@pytest.fixture(scope="module", autouse=True)
+def few_turns():
+    """Place specimens by few starts and steps, which are enough for these."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(alignment, "N_TURNS", 4)
+        patch.setattr(alignment, "FINE_REACH", np.geomspace(0.2, 0.05, 8))
+        yield
+
+
+@contextmanager
+def rough_fits():
     """Make fits rough, for tests of how they are kept."""
     levels = tuple(level._replace(n_rounds=1, n_points=200) for level in surface_fit.LEVELS[:2])
-    monkeypatch.setattr(surface_fit, "LEVELS", levels)
-    monkeypatch.setattr(building, "SECOND_LEVELS", levels)
-    monkeypatch.setattr(alignment, "N_POINTS", 120)
-    monkeypatch.setattr(alignment, "N_ROUGH", 40)
-    monkeypatch.setattr(surface_fit, "POSES_DIFFER", np.inf)
-    monkeypatch.setattr(surface_fit, "STRAINED", np.inf)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(surface_fit, "LEVELS", levels)
+        patch.setattr(building, "SECOND_LEVELS", levels)
+        patch.setattr(alignment, "N_POINTS", 120)
+        patch.setattr(alignment, "N_ROUGH", 40)
+        patch.setattr(surface_fit, "POSES_DIFFER", np.inf)
+        patch.setattr(surface_fit, "STRAINED", np.inf)
+        yield
+
+
+@pytest.fixture
+def quick():
+    with rough_fits():
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +125,7 @@ def test_what_is_done_is_kept_and_what_is_damaged_is_done_again(folder, built, m
     assert [step[2] for step in steps if step[3]] == ["broken"]
 
 
-def test_too_few_specimens_are_refused(tmp_path):
+def test_too_few_specimens_are_refused(tmp_path, quick):
     ball = make_specimen(0)
     with pytest.raises(es.InvalidParameterError, match="must have at least two specimens"):
         es.collections.build_collection({"one": ball}, tmp_path)
@@ -141,10 +159,24 @@ def test_what_is_no_collection_is_said(tmp_path, built):
         built.read_specimen("broken")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def scans(folder):
     """The files of the folder, without the collection that it holds."""
     return {path.stem: path for path in folder.glob("*.ply")}
+
+
+@pytest.fixture(scope="module")
+def fresh_of(scans, tmp_path_factory):
+    """Return a function that builds the collection of a template by rough fits, once."""
+
+    @cache
+    def build(template):
+        with rough_fits():
+            return es.collections.build_collection(
+                scans, tmp_path_factory.mktemp("fresh"), template=template
+            )
+
+    return build
 
 
 @pytest.fixture
@@ -166,7 +198,7 @@ class StoppedError(Exception):
 
 @pytest.mark.parametrize("step", [4, 7, 10, 11])
 def test_a_stopped_build_with_another_template_leaves_the_last_collection(
-    scans, built, copy, step, quick
+    scans, built, copy, step, fresh_of, quick
 ):
     def stop(n_done, *_):
         if n_done == step:
@@ -178,7 +210,7 @@ def test_a_stopped_build_with_another_template_leaves_the_last_collection(
     assert same(opened, built)
     assert (opened.template, opened.names) == (built.template, built.names)
     after_stop = es.collections.build_collection(scans, copy, template="ball 1")
-    fresh = es.collections.build_collection(scans, copy.with_name("fresh"), template="ball 1")
+    fresh = fresh_of("ball 1")
     assert same(after_stop, fresh)
     assert {path.name for path in copy.iterdir()} == {path.name for path in fresh.folder.iterdir()}
 
@@ -197,7 +229,7 @@ def test_a_surface_that_has_changed_is_not_taken_for_that_of_the_collection(tmp_
 
 
 def test_a_file_that_changes_while_it_is_fitted_is_a_failure(scans, copy, quick):
-    scans["extra"] = shutil.copy(scans["ball 1"], copy.with_name("extra.ply"))
+    scans = scans | {"extra": shutil.copy(scans["ball 1"], copy.with_name("extra.ply"))}
 
     def change(n_done, n_steps, name, error):
         if n_done == 5:  # all are read
@@ -207,7 +239,7 @@ def test_a_file_that_changes_while_it_is_fitted_is_a_failure(scans, copy, quick)
     assert "A file must not change while it is fitted" in found.failures["extra"]
 
 
-def test_two_builds_at_once_are_both_right(scans, copy, quick):
+def test_two_builds_at_once_are_both_right(scans, copy, fresh_of, quick):
     other = "ball 1"
 
     def build_other(n_done, *_):
@@ -215,7 +247,7 @@ def test_two_builds_at_once_are_both_right(scans, copy, quick):
             es.collections.build_collection(scans, copy, template=other)
 
     first = es.collections.build_collection(scans, copy, template="ball 2", callback=build_other)
-    fresh = es.collections.build_collection(scans, copy.with_name("fresh"), template="ball 2")
+    fresh = fresh_of("ball 2")
     assert same(first, fresh)
     assert same(es.collections.open_collection(copy), fresh)
     names = ("mean.ply", "specimens.csv")

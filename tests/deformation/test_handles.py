@@ -3,7 +3,7 @@ import pytest
 
 import eigenshape as es
 from certeig.kit.errors import InvalidParameterError
-from eigenshape.deformation.handles import Rotation, Translation, affine_offset, rotation_from_drag
+from eigenshape.deformation.handles import Rotation, Translation, affine_offset
 
 QUARTER = np.pi / 2
 POINTS = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 5.0], [1.0, 3.0, 0.0]])
@@ -74,41 +74,6 @@ def test_an_axis_of_length_one_is_kept_to_the_last_digit():
         once = Rotation([0, 0, 0], axis, 1.0).axis
         np.testing.assert_allclose(once @ once, 1, rtol=1e-15)
         np.testing.assert_array_equal(Rotation([0, 0, 0], once, 1.0).axis, once)
-
-
-def test_a_drag_tells_the_least_rotation():
-    found = rotation_from_drag([1, 1, 0], [3, 1, 0], [1, 6, 0])  # 2 long before, 5 after
-    np.testing.assert_array_equal(found.axis, [0, 0, 1])
-    assert found.angle == pytest.approx(QUARTER, abs=1e-15)
-    np.testing.assert_allclose(moved(found, [[3, 1, 0]]), [[1, 3, 0]], atol=1e-15)
-
-
-@pytest.mark.parametrize("degrees", [1e-4, 60, 120, 179.99])
-def test_a_drag_takes_its_start_towards_its_end(degrees):
-    angle = np.radians(degrees)
-    end = [np.cos(angle), np.sin(angle) * 0.6, np.sin(angle) * 0.8]
-    found = rotation_from_drag([0, 0, 0], [1, 0, 0], np.multiply(end, 1e-80))
-    assert found.angle == pytest.approx(angle, rel=1e-9)
-    np.testing.assert_allclose(moved(found, [[1, 0, 0]]), [end], atol=1e-14)
-
-
-def test_a_drag_straight_away_turns_nothing():
-    assert rotation_from_drag([0, 0, 0], [1, 2, 3], [2, 4, 6]).angle == 0
-
-
-def test_drags_that_tell_no_axis_are_refused():
-    with pytest.raises(
-        InvalidParameterError, match="start and end must not be opposite about the pivot"
-    ):
-        rotation_from_drag([1, 0, 0], [2, 0, 0], [-4, 0, 0])
-    with pytest.raises(
-        InvalidParameterError, match="start must be another point than the pivot; both are"
-    ):
-        rotation_from_drag([1, 0, 0], [1, 0, 0], [2, 0, 0])
-    with pytest.raises(
-        InvalidParameterError, match="end must be another point than the pivot; both are"
-    ):
-        rotation_from_drag([1, 0, 0], [2, 0, 0], [1, 0, 0])
 
 
 def test_bad_numbers_are_refused_by_name():

@@ -15,7 +15,10 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2] / "experiments" / "ch5_r
 import light_fields as lf  # noqa: E402
 
 few = settings(deadline=None, max_examples=8)
-HAND, ANT = es.make_creature("hand", n_vertices=800), es.make_creature("quadruped", n_vertices=800)
+
+
+def creature(kind):
+    return es.make_creature(kind, n_vertices=800)
 
 
 def disc(size=201):
@@ -114,8 +117,11 @@ def test_turns_spread_views():
 
 def test_a_turn_of_the_dodecahedron_is_no_difference():
     turn = Rotation.from_rotvec(2 * np.pi / 3 * lf._axes()[4]).as_matrix()
-    turned = es.TriangleMesh(HAND.vertices @ turn.T, HAND.faces)
-    one, two, other = (lf.light_field(mesh, n_fields=1) for mesh in (HAND, turned, ANT))
+    hand = creature("hand")
+    turned = es.TriangleMesh(hand.vertices @ turn.T, hand.faces)
+    one, two, other = (
+        lf.light_field(mesh, n_fields=1) for mesh in (hand, turned, creature("quadruped"))
+    )
     assert lf.light_field_distance(one, one) == 0
     assert lf.light_field_distance(one, two) < 0.05 * lf.light_field_distance(one, other)
     assert lf.light_field_distance(one, other) == pytest.approx(
@@ -127,8 +133,11 @@ def test_a_turn_of_the_dodecahedron_is_no_difference():
 @given(st.integers(0, 2**32 - 1))
 def test_any_turn_is_less_than_another_shape(seed):
     turn = Rotation.random(random_state=seed).as_matrix()
-    turned = es.TriangleMesh(HAND.vertices @ turn.T, HAND.faces)
-    one, two, other = (lf.light_field(mesh, n_fields=4, size=96) for mesh in (HAND, turned, ANT))
+    hand = creature("hand")
+    turned = es.TriangleMesh(hand.vertices @ turn.T, hand.faces)
+    one, two, other = (
+        lf.light_field(mesh, n_fields=4, size=96) for mesh in (hand, turned, creature("quadruped"))
+    )
     assert lf.light_field_distance(one, two) < 0.5 * lf.light_field_distance(one, other)
 
 
@@ -136,8 +145,9 @@ def test_any_turn_is_less_than_another_shape(seed):
 @given(st.floats(-30, 30), st.integers(0, 2**32 - 1))
 def test_size_and_place_drop_out(power, seed):
     place = np.random.default_rng(seed).standard_normal(3)
-    moved = es.TriangleMesh(10.0**power * (HAND.vertices + place), HAND.faces)
-    one, two = (lf.light_field(mesh, n_fields=1, size=96) for mesh in (HAND, moved))
+    hand = creature("hand")
+    moved = es.TriangleMesh(10.0**power * (hand.vertices + place), hand.faces)
+    one, two = (lf.light_field(mesh, n_fields=1, size=96) for mesh in (hand, moved))
     # A pixel at the very edge may fall to the other side by rounding.
     np.testing.assert_allclose(two, one, atol=0.01)
 

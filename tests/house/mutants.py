@@ -26,7 +26,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-ROOMS = ("operators", "spectral", "features", "matching", "retrieval", "calculus", "deformation")
+ROOMS = (
+    "certeig/src/certeig",
+    "src/eigenshape/calculus",
+    "src/eigenshape/deformation",
+    "src/eigenshape/features",
+    "src/eigenshape/matching",
+    "src/eigenshape/operators",
+    "src/eigenshape/retrieval",
+    "src/eigenshape/spectral",
+)
+PACKAGES = ("certeig/src/certeig", "src/eigenshape")
 NOT_COPIED = (".git", "studio", ".mypy_cache", ".ruff_cache", ".pytest_cache", ".hypothesis")
 FIRST_FILES = 4  # that are asked first
 LONGEST = (
@@ -58,7 +68,7 @@ SIGNS: dict[type[ast.AST], str] = {ast.USub: "-", ast.Not: "not ", ast.Invert: "
 class Mutant:
     """A place of a module, from one byte to another, and what stands there instead."""
 
-    module: str  # its path below src/eigenshape
+    module: str  # its path in the repository
     function: str
     line: int
     start: int
@@ -81,7 +91,12 @@ class Mutant:
 
 def source(module: str) -> bytes:
     """Return the text of a module."""
-    return (ROOT / "src" / "eigenshape" / module).read_bytes()
+    return (ROOT / module).read_bytes()
+
+
+def import_name(module: str) -> str:
+    """Return the name by which a module is imported."""
+    return module.partition("src/")[2].removesuffix(".py").replace("/", ".")
 
 
 def mutants_of(module: str) -> Iterator[Mutant]:
@@ -152,9 +167,8 @@ def mutants_of(module: str) -> Iterator[Mutant]:
 
 def sample(seed: int, count: int) -> list[Mutant]:
     """Draw mutants, no two of one function; each room gives its share."""
-    package = ROOT / "src" / "eigenshape"
     modules = sorted(
-        str(path.relative_to(package)) for room in ROOMS for path in (package / room).rglob("*.py")
+        path.relative_to(ROOT).as_posix() for room in ROOMS for path in (ROOT / room).rglob("*.py")
     )
     found = [mutant for module in modules for mutant in mutants_of(module)]
     random.Random(seed).shuffle(found)
@@ -167,7 +181,7 @@ def sample(seed: int, count: int) -> list[Mutant]:
 def run_tests(tree: Path, options: list[str], **variables: str) -> int | None:
     """Run tests in a copy of the tree; return the exit code, or None if they do not end."""
     environment = os.environ | {
-        "PYTHONPATH": str(tree / "src"),
+        "PYTHONPATH": os.pathsep.join([str(tree / "certeig" / "src"), str(tree / "src")]),
         "EIGENSHAPE_DATA": os.environ.get("EIGENSHAPE_DATA", str(ROOT.parent / "shared" / "data")),
         **variables,
     }
@@ -199,15 +213,16 @@ def record_calls(tree: Path, chosen: list[str]) -> dict[str, Counter[str]]:
 
 def files_for(mutant: Mutant, calls: dict[str, Counter[str]]) -> list[str]:
     """Return the test files that import the mutant's module or call its function, those of its own name first."""
-    module = "eigenshape." + mutant.module.removesuffix(".py").replace("/", ".")
+    module = import_name(mutant.module)
     found = calls.get(f"{module}:{mutant.function}", Counter())
     if (
         not found
     ):  # a compiled loop, a constant or a class: the files of its module, or of what imports it
         name = module.rsplit(".", 1)[1]
         users = {
-            "eigenshape." + str(path.relative_to(ROOT / "src/eigenshape"))[:-3].replace("/", ".")
-            for path in (ROOT / "src/eigenshape").rglob("*.py")
+            import_name(path.relative_to(ROOT).as_posix())
+            for package in PACKAGES
+            for path in (ROOT / package).rglob("*.py")
             if name in path.read_text()
         }
         for function, files in calls.items():
@@ -257,7 +272,7 @@ def main() -> None:
             if options.calls:
                 options.calls.write_text(json.dumps(calls))
         for number, mutant in enumerate(mutants):
-            path = tree / "src" / "eigenshape" / mutant.module
+            path = tree / mutant.module
             path.write_bytes(mutant.applied())
             files = files_for(mutant, calls)
             # To collect all files takes longer than the first few take to fail.
@@ -265,7 +280,7 @@ def main() -> None:
             for part in (files[:FIRST_FILES], files[FIRST_FILES:]):
                 if part and code in (0, 5):  # all passed, or there was none
                     code = run_tests(tree, ["-x", *chosen, *part])
-            shutil.copy2(ROOT / "src" / "eigenshape" / mutant.module, path)
+            shutil.copy2(ROOT / mutant.module, path)
             survives = code in (0, 5)
             survivors += survives
             verdict = "SURVIVES" if survives else "killed" if code else "killed (no end)"

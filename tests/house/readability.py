@@ -22,8 +22,9 @@ def print_counts() -> None:
     texts = {path: path.read_text() for path in source_files()}
     n_tokens = n_lines = n_comments = 0
     for text in texts.values():
-        tokens, lines = code_tokens(text)
-        n_tokens, n_lines = n_tokens + tokens, n_lines + lines
+        tokens = code_tokens(text)
+        n_tokens += len(tokens)
+        n_lines += len({token.start[0] for token in tokens})
         n_comments += comments_in_functions(text)
     private = callers_of_private_functions(texts)
     once = sum(count == 1 for count in private.values())
@@ -36,24 +37,22 @@ def print_counts() -> None:
     print(f"modules in the largest folder, {folder.relative_to(ROOT)}: {n_modules}")
 
 
-def code_tokens(text: str) -> tuple[int, int]:
-    """Return the number of tokens of code, and of the lines that hold them; docstrings count as neither."""
+def code_tokens(text: str) -> list[tokenize.TokenInfo]:
+    """Return the tokens of code, without those of docstrings."""
     docstrings = docstring_lines(ast.parse(text))
-    tokens = [
+    return [
         token
         for token in tokenize.generate_tokens(io.StringIO(text).readline)
         if token.type not in NO_CODE and token.string and token.start[0] not in docstrings
     ]
-    return len(tokens), len({token.start[0] for token in tokens})
 
 
 def docstring_lines(tree: ast.Module) -> set[int]:
     """Return the lines that docstrings stand on."""
     lines: set[int] = set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(
-            node
-        ):
+        documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+        if isinstance(node, documented) and ast.get_docstring(node):
             first = node.body[0]
             lines |= set(range(first.lineno, (first.end_lineno or first.lineno) + 1))
     return lines

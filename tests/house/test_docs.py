@@ -80,6 +80,7 @@ def test_every_public_name_is_mentioned_beside_the_api_pages():
     assert not sorted(public_things().keys() - words)
 
 
+@pytest.mark.long
 def test_the_page_of_modes_runs():
     """Its blocks follow one another, and need no file."""
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "modes.md").read_text(), re.DOTALL)

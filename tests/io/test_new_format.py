@@ -147,13 +147,12 @@ def test_every_module_of_a_format_has_what_its_traits_promise():
         if "parcels" in known.traits:
             assert callable(module.parse_parcels)
             assert callable(module.format_parcels)
-        more = known.load("_attributes") if "attributes" in known.traits else module
-        if "attributes" in known.traits:
-            assert callable(more.read_attributes)
-            assert callable(more.write)
-        elif "fields" in known.traits:
+        if "fields" in known.traits:
             assert callable(module.parse_fields)
             assert callable(module.format_fields)
+        if beside := known.load_attributes():
+            assert callable(beside.read_attributes)
+            assert callable(beside.write)
         else:
             for form in {"text", "binary"} & set(known.traits):
                 assert callable(getattr(module, f"format_{form}"))

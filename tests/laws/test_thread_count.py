@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import eigenshape as es
-from certeig.kit.threads import VARIABLE, map_in_threads, thread_count, usable_cores
+from certeig.kit.threads import VARIABLES, map_in_threads, thread_count, usable_cores
 from eigenshape.retrieval.heat.features import describe_views
 
 SHAPE = es.make_creature("fish", n_vertices=800)
@@ -70,15 +70,28 @@ def test_threads_of_the_user_compute_side_by_side():
     assert len(set(found)) == 1
 
 
-def test_the_environment_variable_counts_until_a_number_is_set(monkeypatch):
-    monkeypatch.setenv(VARIABLE, "3")
+@pytest.mark.parametrize("variable", VARIABLES)
+def test_the_environment_variable_counts_until_a_number_is_set(monkeypatch, variable):
+    for each in VARIABLES:
+        monkeypatch.delenv(each, raising=False)
+    monkeypatch.setenv(variable, "3")
     assert thread_count() == 3
     assert es.set_threads(2) == 2
     assert es.set_threads(None) == 3
-    monkeypatch.setenv(VARIABLE, "many")
-    with pytest.raises(es.InvalidParameterError, match="must be a whole number of at least 1; it"):
+    monkeypatch.setenv(variable, "many")
+    with pytest.raises(
+        es.InvalidParameterError, match=f"{variable} must be a whole number of at least 1; it"
+    ):
         thread_count()
-    monkeypatch.setenv(VARIABLE, "")
+    monkeypatch.setenv(variable, "")
     assert es.set_threads(None) == usable_cores() >= 1
     with pytest.raises(es.InvalidParameterError, match="n must be at least 1; it is 0"):
         es.set_threads(0)
+
+
+def test_the_first_variable_that_is_set_counts(monkeypatch):
+    for number, variable in enumerate(VARIABLES, 2):
+        monkeypatch.setenv(variable, str(number))
+    assert es.set_threads(None) == 2
+    monkeypatch.setenv(VARIABLES[0], " ")
+    assert es.set_threads(None) == 3

@@ -70,7 +70,6 @@ LAWS: dict[str, tuple[int, Callable[[Shapes], Any]]] = {
         lambda s: geometry.average_geodesic_distance(s.mesh, n_bases=162),
     ),
     "average_onto_points": (-1, lambda s: calculus.average_onto_points(s.mesh, s.slopes)),
-    "average_onto_simplices": (0, lambda s: calculus.average_onto_simplices(s.mesh, s.f)),
     "boundary_load": (1, lambda s: calculus.boundary_load(s.sheet, s.on_sheet)),
     "bracket_eigenvalues": (-2, lambda s: es.bracket_eigenvalues(s.mesh, 5).lower),
     "closest_points": (1, lambda s: geometry.closest_points(s.mesh, s.other.vertices).points),

@@ -64,7 +64,6 @@ class Shared:
         self.tree = es.merge_tree(self.animal, self.heat[:, -1])
         self.parts = es.segment(self.tree, n_regions=5)
         self.diagram = es.features.persistence_diagram(self.animal, self.heat[:, -1])
-        self.diagram2 = es.features.persistence_diagram(self.pose, self.heat[:, -1])
         self._make_bends()
         self._make_maps()
         self._make_descriptors()
@@ -72,7 +71,7 @@ class Shared:
         # Dot products of more than 10,000 numbers are where BLAS begins to cut sums among its threads.
         self.many = es.shapes.fibonacci_sphere(10_500)
         self.many_laplacian = es.cotangent_laplacian(self.many)
-        self.many_spectrum = es.solve_spectrum(self.many_laplacian, 9, method="approximate")
+        self.many_spectrum = es.solve_spectrum(self.many_laplacian, 9)
         self.many_map = es.functional_map(
             self.many_spectrum, self.many_spectrum, [[0, 0], [99, 99]], n_modes=4
         )
@@ -382,7 +381,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         v.animal, n_bases=40
     ),
     "average_onto_points": lambda v: es.calculus.average_onto_points(v.many, v.field),
-    "average_onto_simplices": lambda v: es.calculus.average_onto_simplices(v.many, v.many.vertices),
     "ball": lambda v: es.shapes.ball(3),
     "ball_eigenvalues": lambda v: es.shapes.ball_eigenvalues(9),
     "bend": lambda v: [
@@ -391,7 +389,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ],
     "betti_numbers": lambda v: [es.geometry.betti_numbers(mesh) for mesh in (v.torus, v.solid)],
     "bind": lambda v: es.deformation.bind(v.rig, [v.region], fixed=v.fixed).shares,
-    "bottleneck_distance": lambda v: es.features.bottleneck_distance(v.diagram, v.diagram2),
     "bottleneck_matching": lambda v: es.stability.bottleneck_matching(
         v.on_one.points, v.on_two.points
     ),
@@ -728,9 +725,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     ),
     "replay": lambda v: es.deformation.replay(v.rig, [v.edit]).mesh,
     "rig_shape": lambda v: es.rig_shape(v.many, v.many_spectrum).factor,
-    "rotation_from_drag": lambda v: es.deformation.rotation_from_drag(
-        [0, 0, 0], [1, 0, 0], [0, 1, 0]
-    ),
     "sample_surface": lambda v: es.geometry.sample_surface(v.animal, 50, rng=rng()),
     "save_figure": lambda v: [
         saved(v, ".png"),
@@ -767,7 +761,6 @@ CALLS: dict[str, Callable[[Shared], object]] = {
         es.solve_spectrum(v.laplacian, 40),
         es.solve_spectrum(v.laplacian, 5, fixed=np.array([0, 5])),
         es.solve_spectrum(v.many_laplacian, 3),
-        es.solve_spectrum(v.many_laplacian, 4, method="approximate"),
         cached(v),
     ],
     "spectral_clusters": lambda v: [

@@ -121,12 +121,6 @@ def test_level_sets_have_the_length_of_libigl():
     assert calculus.level_set(TORUS, values, 0.117).size == pytest.approx(theirs, rel=1e-12)
 
 
-def test_averages_over_faces_are_those_of_libigl():
-    values = np.random.default_rng(5).standard_normal(BIPED.n_vertices)
-    theirs = igl.average_onto_faces(BIPED.faces, values)
-    np.testing.assert_allclose(calculus.average_onto_simplices(BIPED, values), theirs)
-
-
 def test_the_conformal_map_has_less_energy_than_pinned_ones():
     upper = BIPED.faces[(BIPED.vertices[BIPED.faces, 2] > np.median(BIPED.vertices[:, 2])).all(1)]
     repaired = es.repair(es.TriangleMesh(BIPED.vertices, upper), ["drop_unreferenced"]).mesh

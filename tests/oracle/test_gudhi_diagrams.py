@@ -1,12 +1,10 @@
-"""Diagrams beside GUDHI's extended persistence, and their distance beside Hera's, which GUDHI ships."""
+"""Diagrams beside GUDHI's extended persistence."""
 
 import gudhi
 import numpy as np
 import pytest
-from gudhi.hera import bottleneck_distance as hera
 
 import eigenshape as es
-from eigenshape.features.diagram import ordinary_distance
 from eigenshape.geometry.topology import submesh
 
 
@@ -123,19 +121,3 @@ def test_real_surfaces(data, path):
         theirs, pairs = expected[kind], ours(getattr(found, kind))
         lasting = [some[np.abs(some[:, 0] - some[:, 1]) > 1e-6 * size] for some in (pairs, theirs)]
         np.testing.assert_allclose(*lasting, atol=1e-9 * size, err_msg=kind)
-
-
-@pytest.mark.parametrize("seed", range(60))
-def test_the_distance_of_two_diagrams_is_heras(seed):
-    # gudhi.bottleneck_distance itself is not symmetric in 3.13 (repaired in its pull request 1367).
-    rng = np.random.default_rng(seed)
-    one, two = (np.sort(rng.random((rng.integers(0, 40), 2)), axis=1) for _ in range(2))
-    if seed % 3 == 0:
-        two = np.sort(one + rng.normal(0, 0.02, one.shape), axis=1)
-    found = ordinary_distance(one, two)
-    assert found == pytest.approx(hera(one, two, 0.0), abs=1e-15)
-    assert (
-        found
-        <= min(gudhi.bottleneck_distance(one, two, 0.0), gudhi.bottleneck_distance(two, one, 0.0))
-        + 1e-15
-    )

@@ -211,7 +211,7 @@ def test_what_cannot_be_stored(index):
             keep(index, name, [descriptor(1)])
     with pytest.raises(
         InvalidParameterError,
-        match="must have as many numbers; those of recipe 'test' have 3, and these have 5",
+        match="must have as many numbers; the features of recipe 'test' have 3, and these have 5",
     ):
         keep(index, "x", [descriptor(1), HeatDescriptor(np.ones((2, 5)), np.arange(2), RECIPE)])
     assert len(index) == 0

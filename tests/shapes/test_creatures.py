@@ -132,10 +132,15 @@ def test_the_rest_pose_of_the_plan_is_as_wide_to_the_left_as_to_the_right(kind):
         assert points[:, 0].max() == pytest.approx(-points[:, 0].min(), abs=0.05)
 
 
+def forget_creatures():
+    for function in (creatures._rest_pose, creatures._fine_skin):
+        function.cache_clear()
+
+
 @pytest.mark.long
 def test_the_same_seed_gives_the_same_bits():
     first = make_creature("fish", 5, n_vertices=800, individual=2)
-    creatures._rest_pose.cache_clear()
+    forget_creatures()
     again = make_creature("fish", 5, n_vertices=800, individual=2)
     np.testing.assert_array_equal(again.vertices, first.vertices)
     np.testing.assert_array_equal(again.faces, first.faces)
@@ -145,7 +150,7 @@ def test_the_same_seed_gives_the_same_bits():
 def test_the_number_of_threads_changes_no_bit():
     made = []
     for n_threads in (1, 4):
-        creatures._rest_pose.cache_clear()
+        forget_creatures()
         with threadpool_limits(n_threads, user_api="blas"):
             made.append(creatures._rest_pose("biped", 2500, 1))
     (mesh, joints), (again, joints_again) = made

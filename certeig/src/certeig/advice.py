@@ -1,16 +1,20 @@
-"""What messages of the solver say beyond the rule and the fact: units and remedies."""
+"""What messages of the solver say beyond the rule and the fact: names, units and remedies."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Advice:
-    """The unit of eigenvalues and the remedies of messages, as sentences.
+    """The names of matrices and rows, the unit of eigenvalues, and the remedies of messages, as sentences.
 
     A package that knows where matrices come from gives its own.
 
     Attributes
     ----------
+    stiffness, mass : str
+        Names of W and B.
+    row : str
+        What a row of both stands for.
     unit : str
         Unit of the eigenvalues; empty if they have none.
     scales : str
@@ -25,8 +29,13 @@ class Advice:
         If rounding of a factor is too large.
     inaccurate : str
         If pairs do not satisfy the equation well.
+    slow : str
+        If the iteration does not converge.
     """
 
+    stiffness: str = "W"
+    mass: str = "B"
+    row: str = "row"
     unit: str = ""
     scales: str = (
         "Scale the unknowns so that the ratios W_ii/B_ii are closer, or fix those at fault."
@@ -42,6 +51,7 @@ class Advice:
     memory: str = "Request fewer pairs."
     rounding: str = "Rows whose W_ii/B_ii is far above that of others do this."
     inaccurate: str = "Rows whose W_ii/B_ii is far above that of others do this."
+    slow: str = "Request fewer pairs."
 
     @property
     def units(self) -> str:

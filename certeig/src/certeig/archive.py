@@ -111,9 +111,11 @@ def write_spectrum(
 
 
 def read_spectrum(
-    path: str | Path, key: str | None, kind: type[Certificate], maker: str
+    path: str | Path, key: str | None, kind: type[Certificate], maker: str, least: float
 ) -> dict[str, Any]:
     """Return what a spectrum is made from; its certificate is of a class that is given.
+
+    `least` is the smallest eigenvalue that it may hold.
 
     Raise FileFormatError if the file is no spectrum, is cut off, its parts do not fit one another
     or hold what no spectrum holds, or it has another key than the given one.
@@ -139,9 +141,9 @@ def read_spectrum(
         raise FileFormatError(
             f"{path} must hold ascending eigenvalues; number {at} is {values[at]} after {values[at - 1]}."
         )
-    if k and values[0] < -max(certificate.resolution, ARCHIVE_ROUNDING * values[-1]):
+    if k and values[0] < least - max(certificate.resolution, ARCHIVE_ROUNDING * values[-1]):
         raise FileFormatError(
-            f"{path} must hold eigenvalues of at least 0; number 0 is {values[0]}."
+            f"{path} must hold eigenvalues of at least {least:g}; number 0 is {values[0]}."
         )
     negative = np.flatnonzero(residuals < 0)
     if negative.size:

@@ -18,7 +18,7 @@ class Certificate(Shown):
     the k-th eigenvalue are the rest of the k. For an interval far up in the spectrum a second
     factor counts below its lower end, and the difference of the counts must have been found.
 
-    An operator with many entries a row is bounded from below by a sparser one, whose eigenvalues
+    A matrix with many entries a row is bounded from below by a sparser one, whose eigenvalues
     are counted outside the space of the eigenvectors that were found.
 
     Attributes
@@ -40,8 +40,9 @@ class Certificate(Shown):
         An interval around σ, without eigenvalues: its upper part by the count, its
         lower part by the error intervals of the eigenvalues.
     resolution : float
-        Eigenvalues closer than this, count as equal: the rounding of the factor and
-        of the eigenvectors, and at least 1e-6 of the largest eigenvalue.
+        Eigenvalues closer than this count as equal: the rounding of the factor and of the
+        eigenvectors, and at least 1e-6 of the largest eigenvalue. If eigenvalues begin below zero
+        or far above it, the largest is measured from where they begin.
     orthonormality : float
         Largest entry of |ΦᵀBΦ - I|, or a bound of it: entries of pairs that are more than 512 apart
         are not computed where residuals prove that they are below 1e-10.
@@ -54,7 +55,7 @@ class Certificate(Shown):
         Sizes of the clusters of eigenvalues, in ascending order of eigenvalues. Within a cluster
         neighbors are equal to 1e-6 of the largest eigenvalue, or to the rounding of the vectors.
     n_deflated : int
-        0 if a factor of the operator itself was counted. Otherwise a factor of a sparser operator
+        0 if a factor of the pencil itself was counted. Otherwise a factor of a sparser one
         below it was, outside the space of this many eigenvectors.
     fallbacks : tuple of str
         Methods that were tried first and failed, each with its error; empty as a rule.
@@ -75,9 +76,9 @@ class Certificate(Shown):
     The last of the four eigenvalues belongs to a cluster of two, of which one was left out.
     """
 
-    unit = (
-        ""  # of the eigenvalues, for people; packages that know it set it in a class of their own
-    )
+    # Packages that know where pencils come from set these in a class of their own.
+    unit = ""  # of the eigenvalues, for people
+    subject = "the pencil"
 
     n_pairs: int
     shift: float
@@ -120,7 +121,7 @@ class Certificate(Shown):
                 f"This set of {self.n_pairs} eigenvalues is not proved: {self.count} lie below "
                 f"{self.shift:.6g}{self.units}, and {self.n_found} were found there."
             )
-        what = f"{self._these()} of the operator: none is missing and none is extra."
+        what = f"{self._these()} of {self.subject}: none is missing and none is extra."
         return " ".join([what, self._how(), self._split()]).strip()
 
     def _these(self) -> str:
@@ -147,7 +148,7 @@ class Certificate(Shown):
             )
         if self.n_deflated:
             return (
-                f"Outside the space of {self.n_deflated} eigenvectors the operator is not below a sparser one, whose "
+                f"Outside the space of {self.n_deflated} eigenvectors {self.subject} is not below a sparser one, whose "
                 f"factor has no eigenvalue there up to σ = {self.shift:.6g}{self.units}. So {self.count} eigenvalues "
                 f"lie below σ, and {self.n_found} were found there. {quality}{self._clusters()}"
             )

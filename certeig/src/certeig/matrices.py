@@ -38,6 +38,11 @@ def require_square(matrix: Any, name: str, wanted: str = "a square sparse matrix
 def as_symmetric(name: str, value: Any) -> sp.csr_array:
     """Return a read-only copy of a matrix, or raise an error if it is not finite and symmetric."""
     require_square(value, name)
+    if value.dtype.kind not in "biuf":
+        raise InvalidParameterError(
+            f"{name} must be real; the type of its entries is {value.dtype}. Pass its real part, or the real matrix "
+            f"[[Re, -Im], [Im, Re]] of a Hermitian one, which has each eigenvalue twice."
+        )
     matrix = freeze_sparse(sp.csr_array(value, dtype=np.float64))
     bad = np.flatnonzero(~np.isfinite(matrix.data))
     if bad.size:
@@ -57,21 +62,21 @@ def as_symmetric(name: str, value: Any) -> sp.csr_array:
     return matrix
 
 
-def require_points(fixed: ArrayLike, n_points: int) -> Int[np.ndarray, " c"]:
-    """Return `fixed` as an array of points, in its order and with its duplicates.
+def require_points(fixed: ArrayLike, n_points: int, noun: str = "point") -> Int[np.ndarray, " c"]:
+    """Return `fixed` as an array of points, in its order and with its duplicates; `noun` is what messages call one.
 
-    Raise InvalidParameterError if an entry is no point number, or out of range.
+    Raise InvalidParameterError if an entry is no such number, or out of range.
     """
     points = np.atleast_1d(as_array(fixed, "fixed"))
     if points.size and points.dtype.kind not in "iu":
         raise InvalidParameterError(
-            f"fixed must be a list of point numbers; the type of its entries is {points.dtype}. "
+            f"fixed must be a list of {noun} numbers; the type of its entries is {points.dtype}. "
             f"Pass np.flatnonzero(mask) for a mask."
         )
     bad = np.flatnonzero((points < 0) | (points >= n_points))
     if bad.size:
         raise InvalidParameterError(
-            f"fixed must hold points 0..{n_points - 1}; entry {bad[0]} is {points[bad[0]]}."
+            f"fixed must hold {noun}s 0..{n_points - 1}; entry {bad[0]} is {points[bad[0]]}."
         )
     return points.astype(np.int64)
 

@@ -1,11 +1,10 @@
 """The eigenpairs of W φ = λ B φ: the lowest ones or those of an interval, with their proof."""
 
-from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from certeig.certificate import Certificate
 from certeig.kit.arrays import finite_number, freeze, whole_number
@@ -16,22 +15,11 @@ from certeig.kit.typing import ArrayLike, Integer
 from certeig.matrices import as_symmetric, require_points
 from certeig.solver.certified import certified_pairs
 from certeig.solver.certify import certify_pairs, in_user_units
-from certeig.solver.eigenpairs import Pairs
-from certeig.solver.factor import factorize as factorize_at
-from certeig.solver.factor import rounding
-from certeig.solver.pencil import Pencil, normalize, to_user_vectors
+from certeig.solver.inertia import count_below_shift
+from certeig.solver.origin import pencil_from_zero
+from certeig.solver.pencil import normalize, to_user_vectors
 from certeig.sparse.symmetric_factor import SymmetricFactor, factor_matrix
 from certeig.spectrum import Spectrum
-
-# Eigenvalues down to minus this share of trace W / trace B may be rounding of 0.
-NEGATIVE_ROUNDING = 1e-9
-# The lower bound of all eigenvalues is searched at these many steps, each four times as far from 0.
-STEP_DOWN, MOST_STEPS_DOWN = 4.0, 200
-# The rounding of a factor is moved aside by this multiple of what it was without.
-SLACK = 2.0
-# Where no factor serves at a value, or rounding is too large there, eigenvalues are counted this far on
-# both sides of it, in shares of trace W / trace B: the same count proves that none is between.
-COUNT_STEPS = (0.0, 1e-9, 1e-6, 1e-4)
 
 
 def eigenpairs(  # noqa: PLR0913 - one keyword for each choice of pairs
@@ -48,9 +36,13 @@ def eigenpairs(  # noqa: PLR0913 - one keyword for each choice of pairs
 
     Block Lanczos runs on (W - σB)⁻¹B with σ among the wanted eigenvalues. The eigenvalues below a
     gap are counted by Sylvester's law of inertia (Parlett 1998, section 3.3), and what is missing is
-    searched for until both counts agree. Small matrices are solved densely. Matrices with a hundred
-    entries a row or more are not factored: Lanczos runs on a Chebyshev polynomial (Zhou, Saad, Tiago
-    and Chelikowsky 2006), and eigenvalues are counted in a sparser matrix below the given one.
+    searched for until both counts agree. Small matrices are solved densely. Diagonally dominant
+    matrices with a hundred entries a row or more are not factored: Lanczos runs on a Chebyshev
+    polynomial (Zhou, Saad, Tiago and Chelikowsky 2006), and eigenvalues are counted in a sparser
+    matrix below the given one.
+
+    If eigenvalues are negative, or all are far above zero, W - σB with σ near the lowest eigenvalue
+    is solved, which moves all of them to where shifts tell them apart.
 
     Results do not depend on the scale of the matrices.
 
@@ -66,7 +58,7 @@ def eigenpairs(  # noqa: PLR0913 - one keyword for each choice of pairs
         Compute all pairs with λ < below.
     above : float, optional
         With `below`: compute all pairs with above ≤ λ < below. `certificate.first` is the number of
-        eigenvalues below `above`.
+        eigenvalues below `above`. An eigenvalue at an end, up to rounding, may be on either side.
     fixed : (c,) int, optional
         Unknowns that are held at 0: their rows and columns are left out, and their entries in the
         eigenvectors are 0.
@@ -85,7 +77,7 @@ def eigenpairs(  # noqa: PLR0913 - one keyword for each choice of pairs
         If a matrix is not sparse, square, real, finite and symmetric, or B is not positive definite;
         not exactly one of `k` and `below` is given; `k` is not in 1..n; no eigenvalue is in the
         interval; an unknown is out of range, or none is free; the entries span too many orders of
-        magnitude; or the memory is too small.
+        magnitude, or eigenvalues are beyond the range of floats; or the memory is too small.
     ConvergenceError
         If the proof cannot be completed. Incomplete spectra are never returned as complete.
 
@@ -103,14 +95,14 @@ def eigenpairs(  # noqa: PLR0913 - one keyword for each choice of pairs
     >>> string = diags_array([2.0, -1.0, -1.0], offsets=[0, 1, -1], shape=(50, 50))
     >>> spectrum = certeig.eigenpairs(string, k=3)
     >>> spectrum.eigenvalues.round(6).tolist()
-    [0.003793, 0.015158, 0.034052]
+    [0.003793, 0.015159, 0.034054]
     >>> print(spectrum.certificate.explain()[:74])
-    These are the 3 lowest eigenvalues of the operator: none is missing and no
+    These are the 3 lowest eigenvalues of the pencil: none is missing and none
 
     All eigenvalues in an interval:
 
-    >>> len(certeig.eigenpairs(string, above=1.0, below=2.0).eigenvalues)
-    9
+    >>> len(certeig.eigenpairs(string, above=1.1, below=2.0).eigenvalues)
+    8
     """
     stiffness, whole = _matrices(W, B)
     mass = whole
@@ -122,13 +114,25 @@ def eigenpairs(  # noqa: PLR0913 - one keyword for each choice of pairs
     report = progress or silent
     with one_blas_thread():
         report(0.0, "scaling the matrices")
-        moved = _above_zero(stiffness, mass)
-        if k is None:
-            _require_any(moved, *interval)
-        limits = np.array(interval) - moved.origin
-        pairs, certificate = certified_pairs(moved.pencil, wanted, limits, report)
+        pencil = pencil_from_zero(stiffness, mass)
+        pairs, certificate = certified_pairs(pencil, wanted, interval, report)
+        vectors = to_user_vectors(pencil, pairs.vectors)
+        # A shift beyond the range of floats is as good as infinite.
+        with np.errstate(over="ignore"):
+            proof, values = in_user_units(pencil, certificate), pencil.places_out(pairs.values)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise InvalidParameterError(
+            f"Eigenvalues must lie within the range of floats; number {bad[0]} does not. Multiply W or B by a number."
+        )
     report(1.0, "proved complete")
-    return _spectrum(moved, pairs, certificate, whole, free)
+    return Spectrum(
+        eigenvalues=freeze(values),
+        eigenvectors=vectors if free is None else _on_all_unknowns(vectors, free, whole.shape[0]),
+        mass=whole,
+        residuals=freeze(pencil.values_out(pairs.residuals)),
+        certificate=proof,
+    )
 
 
 def count_below(W: Any, B: Any = None, value: float = 0.0) -> int:
@@ -163,9 +167,13 @@ def count_below(W: Any, B: Any = None, value: float = 0.0) -> int:
     >>> certeig.count_below(string, value=2.0)
     25
     """
+    matrices, sigma = _matrices(W, B), finite_number(value, "value")
     with one_blas_thread():
-        pencil = normalize(*_matrices(W, B))
-        return _count(pencil, finite_number(value, "value"))
+        pencil = normalize(*matrices)
+        # A value beyond the range of floats in the pencil's units is as good as infinite.
+        with np.errstate(over="ignore"):
+            shift = float(pencil.places_in(np.array([sigma]))[0])
+        return count_below_shift(pencil, shift)
 
 
 def certify(W: Any, B: Any, eigenvalues: ArrayLike, eigenvectors: ArrayLike) -> Certificate:
@@ -174,7 +182,7 @@ def certify(W: Any, B: Any, eigenvalues: ArrayLike, eigenvectors: ArrayLike) -> 
     Parameters
     ----------
     W, B : (n, n) sparse
-        As for `eigenpairs`; W without negative eigenvalues. B may be None, the identity.
+        As for `eigenpairs`. B may be None, the identity.
     eigenvalues : (k,) float
         Ascending.
     eigenvectors : (n, k) float
@@ -201,8 +209,9 @@ def certify(W: Any, B: Any, eigenvalues: ArrayLike, eigenvectors: ArrayLike) -> 
     >>> certeig.certify(string, None, values[:4], vectors[:, :4]).complete
     True
     """
+    matrices = _matrices(W, B)
     with one_blas_thread():
-        certificate, _ = certify_pairs(normalize(*_matrices(W, B)), eigenvalues, eigenvectors)
+        certificate, _ = certify_pairs(pencil_from_zero(*matrices), eigenvalues, eigenvectors)
     if not certificate.complete:
         raise ConvergenceError(certificate.explain())
     return certificate
@@ -211,7 +220,8 @@ def certify(W: Any, B: Any, eigenvalues: ArrayLike, eigenvectors: ArrayLike) -> 
 def factorize(matrix: Any) -> SymmetricFactor:
     """Factor a symmetric sparse matrix, A = L D Lᵀ in an order of elimination by nested dissection.
 
-    Pivots are on the diagonal, as they are.
+    Pivots are taken from the diagonal, one after the other, so that an indefinite matrix may have
+    no factor, or an inaccurate one: `rounding()` tells.
 
     Parameters
     ----------
@@ -239,7 +249,7 @@ def factorize(matrix: Any) -> SymmetricFactor:
     >>> factor.n_negative
     0
     """
-    factor = factor_matrix(as_symmetric("matrix", matrix))
+    factor = factor_matrix(_as_sparse("matrix", matrix))
     if factor is None:
         raise InvalidParameterError(
             "matrix must have a factor with its pivots on the diagonal; a pivot is zero or overflows. "
@@ -249,8 +259,8 @@ def factorize(matrix: Any) -> SymmetricFactor:
 
 
 def _matrices(W: Any, B: Any) -> tuple[sp.csr_array, sp.csr_array]:
-    stiffness = as_symmetric("W", W)
-    mass = sp.eye_array(stiffness.shape[0], format="csr") if B is None else as_symmetric("B", B)
+    stiffness = _as_sparse("W", W)
+    mass = sp.eye_array(stiffness.shape[0], format="csr") if B is None else _as_sparse("B", B)
     if stiffness.shape != mass.shape:
         raise InvalidParameterError(
             f"W and B must have the same shape; the shapes are {stiffness.shape} and {mass.shape}."
@@ -264,16 +274,29 @@ def _matrices(W: Any, B: Any) -> tuple[sp.csr_array, sp.csr_array]:
     return stiffness, mass
 
 
+def _as_sparse(name: str, value: Any) -> sp.csr_array:
+    if isinstance(value, np.ndarray | list | tuple):
+        raise InvalidParameterError(
+            f"{name} must be a square sparse matrix; it is a {type(value).__name__} of shape {np.shape(value)}. "
+            f"Pass scipy.sparse.csr_array({name})."
+        )
+    if np.shape(value) == (0, 0):
+        raise InvalidParameterError(f"{name} must have at least one row; its shape is (0, 0).")
+    return as_symmetric(name, value)
+
+
 def _free_unknowns(fixed: ArrayLike | None, n: int) -> Int[np.ndarray, " f"] | None:
     if fixed is None or not np.size(fixed):
         return None
-    free = np.setdiff1d(np.arange(n), require_points(fixed, n))
+    free = np.setdiff1d(np.arange(n), require_points(fixed, n, "row"))
     if not free.size:
         raise InvalidParameterError(f"At least one unknown must be free; all {n} are fixed.")
     return free
 
 
-def _interval(k: Integer | None, above: float | None, below: float | None) -> tuple[float, float]:
+def _interval(
+    k: Integer | None, above: float | None, below: float | None
+) -> Float[np.ndarray, " 2"]:
     if (k is None) == (below is None):
         raise InvalidParameterError(
             f"Exactly one of k and below must be given; k is {k} and below is {below}."
@@ -283,114 +306,20 @@ def _interval(k: Integer | None, above: float | None, below: float | None) -> tu
             raise InvalidParameterError(
                 f"above needs below, the other end of an interval; above is {above}."
             )
-        return 0.0, 0.0
+        return np.zeros(2)
     high = finite_number(below, "below")
     low = -np.inf if above is None else finite_number(above, "above")
     if low >= high:
         raise InvalidParameterError(
             f"above must be less than below; above is {above} and below is {below}."
         )
-    return low, high
+    return np.array([low, high])
 
 
-class _Moved(NamedTuple):
-    """The pencil of W - origin·B, which has no negative eigenvalue but by rounding."""
-
-    pencil: Pencil
-    origin: float
-
-
-def _above_zero(stiffness: sp.csr_array, mass: sp.csr_array) -> _Moved:
-    """Move all eigenvalues above zero if some are negative, since the solver works from zero upward."""
-    pencil = normalize(stiffness, mass)
-    off_diagonal = abs(stiffness).sum(axis=1) - np.abs(stiffness.diagonal())
-    dominant = stiffness.diagonal() >= off_diagonal * (1 - 1e-12)
-    level = pencil.level
-    if dominant.all() or _is_floor(pencil, -NEGATIVE_ROUNDING * level):
-        return _Moved(pencil, 0.0)
-    # The first of ever lower values that no eigenvalue is below, in the pencil's units
-    floor = -1e-3 * level
-    for _ in range(MOST_STEPS_DOWN):
-        if _is_floor(pencil, floor):
-            origin = float(np.ldexp(floor, pencil.value_exponent))
-            return _Moved(normalize(stiffness - origin * mass, mass), origin)
-        floor *= STEP_DOWN
-    raise ConvergenceError(
-        "W must have a lowest eigenvalue within the range of floats; none was found."
-    )
-
-
-def _is_floor(pencil: Pencil, shift: float) -> bool:
-    """Whether a factor proves that no eigenvalue lies below a shift in the pencil's units."""
-    return _bound_count(pencil, shift, 1.0) == 0
-
-
-def _count(pencil: Pencil, value: float) -> int:
-    """Count the eigenvalues below a value in the user's units."""
-    shift = float(np.ldexp(value, -pencil.value_exponent))
-    for step in COUNT_STEPS:
-        below, above = shift - step * pencil.level, shift + step * pencil.level
-        least, most = _bound_count(pencil, below, -1.0), _bound_count(pencil, above, 1.0)
-        if least is not None and least == most:
-            return least
-    raise ConvergenceError(
-        f"To count eigenvalues below a value none may be at it, up to rounding; {value:.6g} is too near to one. "
-        "Choose a value a little higher or lower."
-    )
-
-
-def _bound_count(pencil: Pencil, shift: float, side: float) -> int | None:
-    """Bound the number of eigenvalues below a shift, from above or (side -1) below; None if rounding forbids it."""
-    plain = factorize_at(pencil, shift)
-    if plain is None or not np.isfinite(loss := rounding(plain)).all():
-        return None
-    # W - σB - S with S above the rounding is nowhere above W - σB, and has at least as many negative
-    # eigenvalues; with -S it has at most as many.
-    slack = SLACK * loss
-    moved = factorize_at(pencil, shift, side * slack)
-    return moved.count if moved and (rounding(moved) <= slack).all() else None
-
-
-def _require_any(moved: _Moved, low: float, high: float) -> None:
-    """Raise an error if no eigenvalue is in an interval, with values as the user has them."""
-    if not moved.origin:
-        return  # the solver's own message has them
-    try:
-        first = 0 if np.isinf(low) else _count(moved.pencil, low - moved.origin)
-        n_below = _count(moved.pencil, high - moved.origin)
-    except ConvergenceError:
-        return  # an eigenvalue is at an end
-    if first == n_below:
-        raise InvalidParameterError(
-            f"There must be eigenvalues in the interval; {first} lie below {low:.6g} and none from there "
-            f"to {high:.6g}."
-        )
-
-
-def _spectrum(
-    moved: _Moved,
-    pairs: Pairs,
-    certificate: Certificate,
-    mass: sp.csr_array,
-    free: Int[np.ndarray, " f"] | None,
-) -> Spectrum:
-    """Convert pairs of a pencil to a spectrum in the user's units, on all unknowns."""
-    pencil, origin = moved
-    proof = in_user_units(pencil, certificate)
-    vectors = to_user_vectors(pencil, pairs.vectors)
-    if free is not None:
-        every = np.zeros((mass.shape[0], vectors.shape[1]))
-        every[free] = vectors
-        vectors = freeze(every)
-    return Spectrum(
-        eigenvalues=freeze(pencil.values_out(pairs.values) + origin),
-        eigenvectors=vectors,
-        mass=mass,
-        residuals=freeze(pencil.values_out(pairs.residuals)),
-        certificate=replace(
-            proof,
-            shift=proof.shift + origin,
-            floor=proof.floor + origin,
-            gap=(proof.gap[0] + origin, proof.gap[1] + origin),
-        ),
-    )
+def _on_all_unknowns(
+    vectors: Float[np.ndarray, "f k"], free: Int[np.ndarray, " f"], n: int
+) -> Float[np.ndarray, "n k"]:
+    """Extend eigenvectors by zeros at the fixed unknowns."""
+    every = np.zeros((n, vectors.shape[1]))
+    every[free] = vectors
+    return freeze(every)

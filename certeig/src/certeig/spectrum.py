@@ -51,8 +51,8 @@ class Spectrum(ReadOnly):
     >>> spectrum = certeig.eigenpairs(chain, k=2)
     >>> spectrum.eigenvectors.shape
     (9, 2)
-    >>> print(spectrum.certificate.explain()[:56])
-    These are the 2 lowest eigenvalues of the operator: none
+    >>> print(spectrum.certificate.explain()[:57])
+    These are the 2 lowest eigenvalues of the pencil: none is
     """
 
     eigenvalues: Float[np.ndarray, " k"]
@@ -63,6 +63,7 @@ class Spectrum(ReadOnly):
 
     certificate_class = Certificate  # of `load`
     maker = "certeig"  # what files say
+    least = -np.inf  # what files may hold
 
     def save(self, path: str | Path, *, key: str | None = None) -> None:
         """Write the spectrum to a .npz file; `load` reads it back bit for bit.
@@ -98,9 +99,9 @@ class Spectrum(ReadOnly):
             If the file cannot be read.
         FileFormatError
             If the file is not a spectrum, is truncated, its parts do not fit together, its numbers
-            are not finite, its eigenvalues are negative or not ascending, or its key differs.
+            are not finite, its eigenvalues are not ascending, or its key differs.
         """
-        return cls(**read_spectrum(path, key, cls.certificate_class, cls.maker))
+        return cls(**read_spectrum(path, key, cls.certificate_class, cls.maker, cls.least))
 
     def _portrait(self) -> str:
         """Return a plot of the eigenvalues, and what is proved of them, as HTML."""
@@ -109,7 +110,9 @@ class Spectrum(ReadOnly):
         shown = np.unique(np.linspace(0, len(values) - 1, MOST_DOTS).round().astype(np.int64))
         # In a box of 300 x 100 pixels, with a margin of 10: number to the right, eigenvalue up
         right = 10 + 300 * shown / max(len(values) - 1, 1)
-        height = 110 - 100 * (values[shown] / (values[-1] or 1.0))
+        low = min(values[0], 0.0)
+        span = max(values[-1], 0.0) - low
+        height = 110 - 100 * ((values[shown] - low) / (span or 1.0))
         dots = "".join(
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2"/>' for x, y in zip(right, height, strict=True)
         )

@@ -2,7 +2,6 @@ from .conformal import angle_distortion as angle_distortion
 from .conformal import flatten_conformally as flatten_conformally
 from .conformal import map_to_sphere as map_to_sphere
 from .derivatives import average_onto_points as average_onto_points
-from .derivatives import average_onto_simplices as average_onto_simplices
 from .derivatives import curl as curl
 from .derivatives import divergence as divergence
 from .derivatives import gradient as gradient

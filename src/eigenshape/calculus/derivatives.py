@@ -274,43 +274,6 @@ def sum_at_nodes(
     return np.stack(sums, axis=1).reshape(n, *shares.shape[2:])
 
 
-def average_onto_simplices(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, "s ..."]:
-    """Average values at points over the corners of each simplex.
-
-    The mean over the corners is the value at the middle of a piecewise linear function, and its
-    mean over the simplex.
-
-    Parameters
-    ----------
-    mesh : MeshLike
-        Of any dimension.
-    values : (n, ...) float
-        Numbers, vectors or tensors at the points.
-
-    Returns
-    -------
-    (s, ...) float
-
-    Raises
-    ------
-    InvalidParameterError
-        If `values` does not have one row per point, or a number is not finite.
-
-    See Also
-    --------
-    es.calculus.average_onto_points : The other way.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> es.calculus.average_onto_simplices(es.shapes.grid(1, 1), [0, 3, 6, 9]).tolist()
-    [5.0, 4.0]
-    """
-    mesh = as_simplicial(mesh)
-    rows = _rows(values, mesh.n_points, "point")
-    return rows[mesh.simplices].mean(axis=1)
-
-
 def average_onto_points(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, "n ..."]:
     """Average values on simplices over the simplices at each point, weighted by volume.
 
@@ -335,9 +298,10 @@ def average_onto_points(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, 
     InvalidShapeError
         If a simplex has no volume or the same corners as another, or a point belongs to no simplex.
 
-    See Also
-    --------
-    es.calculus.average_onto_simplices : The other way.
+    Notes
+    -----
+    The other way, ``values[mesh.simplices].mean(axis=1)`` is the mean of a piecewise linear function
+    over each simplex.
 
     Examples
     --------
@@ -346,7 +310,13 @@ def average_onto_points(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, 
     [3.0, 4.0, 2.0, 3.0]
     """
     mesh = as_simplicial(mesh)
-    rows = _rows(values, len(mesh.simplices), "simplex")
+    rows = real_numbers(values, "values").astype(np.float64)
+    if rows.ndim == 0 or len(rows) != len(mesh.simplices):
+        raise InvalidParameterError(
+            f"values must have one row per simplex, {len(mesh.simplices)} rows; the shape is "
+            f"{rows.shape}."
+        )
+    require_finite_rows(rows, "values", "simplex")
     require_sound(mesh)
     volumes = simplex_volumes(mesh)
     at = np.repeat(np.arange(len(volumes)), mesh.simplices.shape[1])
@@ -355,13 +325,3 @@ def average_onto_points(mesh: MeshLike, values: ArrayLike) -> Float[np.ndarray, 
     )
     sums = weights @ rows.reshape(len(rows), -1)
     return (sums / weights.sum(axis=1)[:, None]).reshape(mesh.n_points, *rows.shape[1:])
-
-
-def _rows(values: ArrayLike, count: int, noun: str) -> Float[np.ndarray, "r ..."]:
-    rows = real_numbers(values, "values").astype(np.float64)
-    if rows.ndim == 0 or len(rows) != count:
-        raise InvalidParameterError(
-            f"values must have one row per {noun}, {count} rows; the shape is {rows.shape}."
-        )
-    require_finite_rows(rows, "values", noun)
-    return rows

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -15,10 +14,12 @@ from eigenshape.cli.console import (
     err,
     escape_text,
     out,
+    print_failures,
     print_json,
     print_written,
     progress_bar,
 )
+from eigenshape.cli.inputs import Memory, Timeout, Workers
 
 MOST_NAMED = 5  # doubtful landmarks that a line names; the report has all
 
@@ -31,9 +32,9 @@ def collection(
     unit: str = "mm",
     template: str | None = None,
     unmirrored: bool = False,
-    workers: Annotated[int | None, typer.Option(min=1)] = None,
-    timeout: Annotated[float, typer.Option(min=1)] = 300.0,
-    memory: Annotated[float | None, typer.Option(min=0.1)] = None,
+    workers: Workers = None,
+    timeout: Timeout = 300.0,
+    memory: Memory = None,
     scheduler: str | None = None,
     as_json: bool = False,
 ) -> None:
@@ -96,7 +97,7 @@ def collection(
     written = ["mean.ply", "specimens.csv", "report.html"]
     carried = None
     warnings = [
-        f"landmarks: those of {name} are not used: it failed"
+        f"landmarks: the landmarks of {name} are not used, because it failed"
         for name in labelled
         if name not in known
     ]
@@ -133,9 +134,7 @@ def collection(
         for name, rows in doubtful.items():
             first = ", ".join(rows[:MOST_NAMED]) + (", ..." if len(rows) > MOST_NAMED else "")
             out.print(f"  {escape_text(name)}: doubtful landmarks: {escape_text(first)}")
-        # On a terminal each specimen was named when it failed.
-        for name, reason in () if out.is_terminal and err.is_terminal else built.failures.items():
-            out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
+        print_failures(built.failures.items())
         rest = "; no landmarks were given."
         if carried is not None:
             rest = f", {len(known)} labelled; all have {len(carried.names)} landmarks now."

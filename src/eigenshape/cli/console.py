@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from functools import cached_property
@@ -162,6 +162,13 @@ def batch_reporter(
             err.print(f"[yellow]{failed}:[/] {escape_text(name)}: {escape_text(error)}")
 
     return report
+
+
+def print_failures(failures: Iterable[tuple[str, str]]) -> None:
+    """Name what failed, and why; on a terminal `batch_reporter` has done so already."""
+    if not (out.is_terminal and err.is_terminal):
+        for name, reason in failures:
+            out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
 
 
 def print_address(what: str, url: str) -> None:

@@ -10,7 +10,8 @@ import typer
 import eigenshape as es
 from certeig.kit.errors import InvalidParameterError
 from eigenshape.cli.console import escape_text, out, progress_bar
-from eigenshape.cli.index import Workers, add
+from eigenshape.cli.index import add
+from eigenshape.cli.inputs import Workers
 from eigenshape.cli.query import query
 from eigenshape.shapes.creature_plans import CREATURES
 

@@ -18,12 +18,22 @@ from eigenshape.cli.console import (
     err,
     escape_text,
     out,
+    print_failures,
     print_json,
     print_table,
     print_written,
     progress_bar,
 )
-from eigenshape.cli.inputs import SEAMS, HeatMethod, numbers_of, repair_names, require_one_rule
+from eigenshape.cli.inputs import (
+    SEAMS,
+    HeatMethod,
+    Memory,
+    Timeout,
+    Workers,
+    numbers_of,
+    repair_names,
+    require_one_rule,
+)
 from eigenshape.retrieval.heat.recipe import PRESETS
 
 COLUMNS = {
@@ -128,9 +138,9 @@ def condense(
     n_modes: Annotated[int, typer.Option(min=1)] = 200,
     tolerance: float = 0.05,
     repair: str = "auto",
-    workers: Annotated[int | None, typer.Option(min=1)] = None,
-    timeout: Annotated[float, typer.Option(min=1)] = 300.0,
-    memory: Annotated[float | None, typer.Option(min=0.1)] = None,
+    workers: Workers = None,
+    timeout: Timeout = 300.0,
+    memory: Memory = None,
     scheduler: str | None = None,
     as_json: bool = False,
 ) -> None:
@@ -199,8 +209,7 @@ def condense(
             for name, table in shapes
         ]
         print_table("Condensed", ["shape", "regions", "variance lost", "error of heat"], rows)
-        for name, reason in () if out.is_terminal and err.is_terminal else failed.items():
-            out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
+        print_failures(failed.items())
         if shapes:
             print_written(output)
     if failed:

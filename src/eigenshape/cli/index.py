@@ -17,18 +17,15 @@ from eigenshape.cli.console import (
     err,
     escape_text,
     out,
+    print_failures,
     print_json,
     print_table,
     print_written,
     progress_bar,
     result_facts,
 )
-from eigenshape.cli.inputs import Method, repair_names
+from eigenshape.cli.inputs import Memory, Method, Timeout, Workers, repair_names
 
-# Of the verbs that describe shapes in processes
-Workers = Annotated[int | None, typer.Option(min=1)]
-Timeout = Annotated[float, typer.Option(min=1)]
-Memory = Annotated[float | None, typer.Option(min=0.1)]
 Sides = Annotated[int | None, typer.Option(min=0, max=50)]
 
 KILOBYTE = 1000  # bytes
@@ -89,32 +86,31 @@ def add(
     """
     repairs = repair_names(repair)
     items = es.io.find_items(sources, labels=labels, part=steps.parse_part(part))
-    shelf = es.ShapeIndex.open_or_create(index)
-    recipe = steps.index_recipe(shelf, method, codebook, in_parts=part is not None, n_frames=frames)
+    opened = es.ShapeIndex.open_or_create(index)
+    recipe = steps.index_recipe(
+        opened, method, codebook, in_parts=part is not None, n_frames=frames
+    )
     with steps.worker_processes(workers, timeout, memory, scheduler) as processes:
         if recipe is None and frames:
-            learned = steps.learn_codebook(items, processes, repairs, shelf)
+            learned = steps.learn_codebook(items, processes, repairs, opened)
             recipe = es.retrieval.PatchRecipe(learned, n_frames=frames)
-        report = steps.describe_all(shelf, items, recipe, processes, repairs=repairs, n_views=views)
-    pruned = steps.prune(shelf, sources) if prune else []
-    doubles = steps.find_doubles(shelf, report.added)
+        report = steps.describe_all(
+            opened, items, recipe, processes, repairs=repairs, n_views=views
+        )
+    pruned = steps.prune(opened, sources) if prune else []
     if as_json:
-        facts = {"index": index, "shapes": len(shelf), **result_facts(report)}
-        print_json(facts | {"pruned": pruned, "doubles": doubles})
+        facts = {"index": index, "shapes": len(opened), **result_facts(report)}
+        print_json(facts | {"pruned": pruned})
     else:
         for name, done in report.repaired:
             err.print(f"[yellow]repaired:[/] {escape_text(name)}: {escape_text('; '.join(done))}")
         counts = f"{len(report.added)} described, {len(report.skipped)} indexed already"
         if pruned:
             counts += f", {len(pruned)} removed"
-        out.print(f"{counts}, {len(report.failed)} failed; the index holds {len(shelf)} shapes.")
-        # On a terminal each file was named when it failed.
-        for name, reason in () if out.is_terminal and err.is_terminal else report.failed:
-            out.print(f"  [yellow]{escape_text(name)}[/]: {escape_text(reason)}")
-        for one, two in doubles:
-            out.print(
-                f"  [yellow]{escape_text(two)}[/]: the same file content as {escape_text(one)}"
-            )
+        out.print(
+            f"{counts}, {len(report.failed)} failed; the index holds {count_shapes(len(opened))}."
+        )
+        print_failures(report.failed)
     if report.failed:
         raise typer.Exit(SOME_FAILED)
 
@@ -154,25 +150,25 @@ def rm(
     shapes
         Names of shapes.
     """
-    shelf = es.ShapeIndex.open(index)
+    opened = es.ShapeIndex.open(index)
     filters = steps.parse_filters(where)
     if bool(shapes) == bool(filters):
         raise InvalidParameterError(
             "Shapes are removed by their names or by --filter; give one of the two. "
             "`eigenshape index ls` lists the names."
         )
-    chosen = shapes or [record.name for record in shelf.records(where=filters)]
-    shelf.remove(*chosen)
+    chosen = shapes or [record.name for record in opened.records(where=filters)]
+    opened.remove(*chosen)
     if as_json:
-        print_json({"index": index, "removed": chosen, "shapes": len(shelf)})
+        print_json({"index": index, "removed": chosen, "shapes": len(opened)})
     else:
-        out.print(f"{count_shapes(len(chosen))} removed; the index holds {len(shelf)}.")
+        out.print(f"{count_shapes(len(chosen))} removed; the index holds {len(opened)}.")
 
 
 def stats(index: Path, *, as_json: bool = False) -> None:
     """Show how many shapes an index holds, how they are described, and the space they take."""
-    shelf = es.ShapeIndex.open(index)
-    records = shelf.records()
+    opened = es.ShapeIndex.open(index)
+    records = opened.records()
     labels = Counter(record.label for record in records)
     recipes = Counter(str(recipe.name) for record in records for recipe in record.recipes)
     n_bytes = sum(path.stat().st_size for path in index.rglob("*") if path.is_file())
@@ -190,7 +186,7 @@ def stats(index: Path, *, as_json: bool = False) -> None:
         )
         return
     each = n_bytes / max(len(records), 1) / KILOBYTE
-    out.print(f"{len(records)} shapes, {n_bytes / KILOBYTE:,.0f} KB, {each:.1f} KB a shape")
+    out.print(f"{count_shapes(len(records))}, {n_bytes / KILOBYTE:,.0f} KB, {each:.1f} KB a shape")
     if stage is not None:
         out.print(f"{escape_text(stage)}; shapes are added after that")
     rows = [[name, str(count)] for name, count in recipes.most_common()]
@@ -249,10 +245,10 @@ def export(
     output
         Write to this folder, a new or an empty one.
     """
-    shelf = es.ShapeIndex.open(index)
+    opened = es.ShapeIndex.open(index)
     filters = steps.parse_filters(where)
-    names = None if not filters else [record.name for record in shelf.records(where=filters)]
-    shelf.export(output, names)
+    names = None if not filters else [record.name for record in opened.records(where=filters)]
+    opened.export(output, names)
     print_written(output)
 
 
@@ -278,15 +274,15 @@ def merge(
         Let a shape replace one of the same name.
     """
     parts = [es.ShapeIndex.open(other) for other in others]
-    shelf = es.ShapeIndex.open_or_create(index)
-    n_added = shelf.merge(parts, replace=replace)
-    recipe = shelf.default_recipe()
-    apart = [record.name for record in shelf.records() if recipe not in record.recipes]
+    opened = es.ShapeIndex.open_or_create(index)
+    n_added = opened.merge(parts, replace=replace)
+    recipe = opened.default_recipe()
+    apart = [record.name for record in opened.records() if recipe not in record.recipes]
     if as_json:
-        facts = {"index": index, "added": n_added, "shapes": len(shelf)}
+        facts = {"index": index, "added": n_added, "shapes": len(opened)}
         print_json(facts | {"not_compared": apart})
     else:
-        out.print(f"{count_shapes(n_added)} added; the index holds {len(shelf)}.")
+        out.print(f"{count_shapes(n_added)} added; the index holds {len(opened)}.")
     if apart:
         err.print(
             f"[yellow]not found by queries:[/] {count_shapes(len(apart))}, which "
@@ -310,17 +306,17 @@ def duplicates(
         Largest score of two shapes that count as nearly the same. Copies have a score near 0,
         also if they are moved or scaled, and other poses often less than 0.1.
     """
-    shelf = es.ShapeIndex.open(index)
+    opened = es.ShapeIndex.open(index)
     with progress_bar("duplicates") as progress:
-        pairs = es.retrieval.find_duplicates(shelf, most_score=score, progress=progress)
+        pairs = es.retrieval.find_duplicates(opened, most_score=score, progress=progress)
     if as_json:
         rows = [{"shape": one, "other": two, "score": number} for one, two, number in pairs]
-        print_json({"index": index, "shapes": len(shelf), "pairs": rows})
+        print_json({"index": index, "shapes": len(opened), "pairs": rows})
     elif pairs:
         texts = [[one, two, f"{number:.3f}"] for one, two, number in pairs]
         print_table("Nearly the same", ["shape", "other", "score"], texts)
     else:
-        out.print(f"none of {len(shelf)} shapes is nearly the same as another")
+        out.print(f"none of {count_shapes(len(opened))} is nearly the same as another")
 
 
 def learn(

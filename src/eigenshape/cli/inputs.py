@@ -1,7 +1,9 @@
 """What the options of several verbs say and take. Nothing heavy is imported here, so that `--help` is quick."""
 
 import re
-from typing import Literal
+from typing import Annotated, Literal
+
+import typer
 
 from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.repairs.repair_names import CLOUD_REPAIRS, MESH_REPAIRS, require_repairs
@@ -63,6 +65,11 @@ host
 """
 # How a parameter is written whose name is not that of its option.
 OPTION_NAMES = {"as_json": "json", "where": "filter", "settings": "set", "map_file": "map"}
+
+# Of the verbs that describe shapes in processes
+Workers = Annotated[int | None, typer.Option(min=1)]
+Timeout = Annotated[float, typer.Option(min=1)]
+Memory = Annotated[float | None, typer.Option(min=0.1)]
 
 # Names in PRESETS of the heat recipes; a test compares the two.
 HeatMethod = Literal["scale-free", "thesis"]

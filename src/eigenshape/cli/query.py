@@ -19,6 +19,7 @@ from eigenshape._errors import StoreError
 from eigenshape.cli import steps
 from eigenshape.cli.console import (
     SOME_FAILED,
+    count_shapes,
     err,
     escape_text,
     out,
@@ -101,8 +102,8 @@ def query(
     side = steps.picture_side(view, up, picture, explain)
     steps.require_output(output, (".csv",), "A table")
     repairs, filters = repair_names(repair), steps.parse_filters(where)
-    shelf = es.ShapeIndex.open(index)
-    recipe = steps.query_recipe(shelf, method)
+    opened = es.ShapeIndex.open(index)
+    recipe = steps.query_recipe(opened, method)
     # Unlike the methods of Path, these say no to a text that cannot be a path, too.
     is_file, is_folder = isfile(scan), isdir(scan)  # noqa: PTH112, PTH113
     is_drawn = picture is not None or explain is not None
@@ -112,7 +113,7 @@ def query(
         )
 
     answers, failed = [], []
-    with shelf.reader() as reader:
+    with opened.reader() as reader:
         # Before scans are described, which takes seconds
         steps.choose_shapes(reader.state, filters)
         n_shown = max(n_matches, N_VOTES) if classify else n_matches
@@ -254,7 +255,7 @@ def _print(answers: Sequence[_Answer], *, classify: bool) -> None:
     seconds = sum(sum(answer.seconds.values()) for answer in answers)
     n_compared = sum(answer.matches.n_compared for answer in answers)
     out.print(
-        f"described, and compared with {n_compared} shapes, in {seconds:.1f} s "
+        f"described, and compared with {count_shapes(n_compared)}, in {seconds:.1f} s "
         f"({answers[0].matches.method})"
     )
 

@@ -23,8 +23,6 @@ from eigenshape.io.formats.registry import CellKind
 from eigenshape.operators.choices import Condition
 
 USUAL = 20  # pairs
-# Points up to which approximate pairs took 1.06 to 1.5 times the time of certified ones.
-LARGE = 100_000
 ORDERS = {"p2": 2, "p3": 3}
 N_PICTURED = 8  # eigenfunctions in a picture: two rows of four
 SHAPES = {
@@ -111,7 +109,6 @@ def spectrum(
         raise InvalidParameterError("--brackets is for meshes; the shape is a point cloud.")
     name = operator or ("point-cloud" if is_cloud else "cotangent")
     options = _read_settings(name, settings or [])
-    accuracy = _useful_accuracy(accuracy, found.n_points)
     if accuracy is not None and name == "cotangent":
         options.setdefault("mass", "lumped")  # approximate eigenpairs need a diagonal
     fixed = _boundary_points(found, ORDERS.get(name, 1)) if boundary == "dirichlet" else None
@@ -173,17 +170,6 @@ def spectrum(
     if output:
         solved.save(output)
         print_written(output)
-
-
-def _useful_accuracy(accuracy: float | None, n_points: int) -> float | None:
-    """Return the accuracy of approximate pairs, or None where certified ones are as fast."""
-    if accuracy is None or n_points > LARGE:
-        return accuracy
-    err.print(
-        f"[yellow]note:[/] up to {LARGE:,} points the certified method is as fast, and is taken "
-        "instead of --accuracy"
-    )
-    return None
 
 
 def _boundary_points(shape: Any, order: int) -> Any:
@@ -269,7 +255,7 @@ def _read_settings(operator: str, settings: list[str]) -> dict[str, Any]:
             raise InvalidParameterError(
                 f"--set takes NAME=VALUE; the {operator} operator has the options "
                 f"{', '.join(known) or 'none'}, and it is {setting!r}. `eigenshape operators` lists "
-                "those of each operator."
+                "the options of each operator."
             )
         kinds = known[name]
         if text in kinds:
@@ -281,7 +267,7 @@ def _read_settings(operator: str, settings: list[str]) -> dict[str, Any]:
                 options[name] = float(text) if float in kinds else int(text)
             except ValueError as error:
                 raise InvalidParameterError(
-                    "--set gives an option one of its values; those of "
+                    "--set gives an option one of its values; the values of "
                     f"{name} are {', '.join(_values(kinds))}, and it is {text!r}."
                 ) from error
     return options

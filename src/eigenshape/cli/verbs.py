@@ -27,7 +27,7 @@ VERBS = (
     "info", "repair", "decimate", "tetrahedralize",
     "spectrum", "operators",
     "features", "condense", "segment", "label",
-    "match", "collection", "deform", "pose", "stability",
+    "match", "transfer", "collection", "deform", "pose", "stability",
     "index", "query",
     "fuse", "compress", "decompress",
     "studio", "serve", "report", "demo",

@@ -8,7 +8,6 @@ from .edits import Edit as Edit
 from .edits import Move as Move
 from .handles import Rotation as Rotation
 from .handles import Translation as Translation
-from .handles import rotation_from_drag as rotation_from_drag
 from .pose_transfer import transfer_deformation as transfer_deformation
 from .region import BoxRegion as BoxRegion
 from .region import BrushRegion as BrushRegion

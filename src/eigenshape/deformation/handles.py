@@ -11,10 +11,6 @@ from certeig.kit.arrays import ReadOnly, finite_number, finite_values, freeze, r
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 
-# Sine over cosine of two directions, below which they are parallel or opposite: far above the
-# rounding of a cross product, and far below any angle that a hand can drag.
-PARALLEL = 1e-12
-
 
 @record
 class Rotation(ReadOnly):
@@ -170,50 +166,6 @@ def affine_offset(handle: Handle) -> Float[np.ndarray, "3 4"]:
     # The linear part, from a rotation about the origin: a distant pivot would cost digits.
     about_origin = Rotation(np.zeros(3), handle.axis, handle.angle)
     return np.column_stack([about_origin.carry(np.eye(3), np.ones(3)).T, shift])
-
-
-def rotation_from_drag(pivot: ArrayLike, start: ArrayLike, end: ArrayLike) -> Rotation:
-    """Return the smallest rotation that turns one point towards another (thesis 6.2.1).
-
-    Parameters
-    ----------
-    pivot, start, end : (3,) float
-        In length; the distances to the pivot may differ.
-
-    Returns
-    -------
-    Rotation
-
-    Raises
-    ------
-    InvalidParameterError
-        If `start` or `end` is the pivot, or the two lie in opposite directions from it, so that
-        many axes are possible.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> es.deformation.rotation_from_drag([0, 0, 0], [1, 0, 0], [0, 2, 0]).axis
-    array([0., 0., 1.])
-    """
-    center = as_vector(pivot, "pivot")
-    before, after = as_vector(start, "start") - center, as_vector(end, "end") - center
-    for arm, name in ((before, "start"), (after, "end")):
-        if not arm.any():
-            raise InvalidParameterError(
-                f"{name} must be another point than the pivot; both are {center.tolist()}."
-            )
-    before, after = (arm / np.abs(arm).max() for arm in (before, after))
-    axis, along = np.cross(before, after), float(before @ after)
-    across = float(np.linalg.norm(axis))
-    if across <= PARALLEL * abs(along):
-        if along < 0:
-            raise InvalidParameterError(
-                "start and end must not be opposite about the pivot: every axis across would do. "
-                "Drag in two steps, or give a Rotation."
-            )
-        return Rotation(center, [0, 0, 1], 0.0)
-    return Rotation(center, axis, float(np.arctan2(across, along)))
 
 
 def as_vector(value: ArrayLike, name: str) -> Float[np.ndarray, " 3"]:

@@ -4,7 +4,6 @@ from .condensed import condense as condense
 from .contrast import PART_CONTRAST as PART_CONTRAST
 from .diagram import PersistenceDiagram as PersistenceDiagram
 from .diagram import PersistencePairs as PersistencePairs
-from .diagram import bottleneck_distance as bottleneck_distance
 from .diagram import persistence_diagram as persistence_diagram
 from .merge_tree import merge_tree as merge_tree
 from .parcellation import Parcellation as Parcellation

@@ -1,7 +1,7 @@
 """The facets of a mesh, and the components that are connected through facets."""
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
@@ -105,10 +105,13 @@ def facet_components(table: FacetTable) -> tuple[int, Int[np.ndarray, " s"]]:
     return label_components(n, one // corners, two // corners)
 
 
-def corner_fans(mesh: Mesh) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " c"]]:
+def corner_fans(
+    mesh: Mesh, joining: Bool[np.ndarray, " p"] | None = None
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " c"]]:
     """Group the corners of simplices into fans; return the point of each fan, and each corner's fan.
 
     A fan consists of simplices at one point that are connected through facets at that point.
+    `joining` says which pairs of `shared_facets` connect; all do if it is None.
     """
     # For each corner of each simplex the other corners, sorted by their points
     corners = np.arange(mesh.dim + 1)
@@ -119,6 +122,8 @@ def corner_fans(mesh: Mesh) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " c"
     ids = (np.arange(n)[:, None, None] * n_corners + facets).reshape(-1, mesh.dim)
     # So the corners of a facet stand in one order on both of its sides.
     one, two = shared_facets(facet_table(mesh).simplex_facets)
+    if joining is not None:
+        one, two = one[joining], two[joining]
     count, fans = label_components(n * n_corners, ids[one].ravel(), ids[two].ravel())
     points = np.empty(count, dtype=np.int64)
     points[fans] = mesh.simplices.ravel()

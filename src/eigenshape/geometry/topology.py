@@ -202,6 +202,13 @@ def number_places(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
     return place.ravel().astype(np.int64)
 
 
+def join_places(mesh: TriangleMesh) -> tuple[TriangleMesh, Int[np.ndarray, " n"]]:
+    """Return a mesh with one vertex at each place and the same faces, and the new number of each vertex."""
+    numbers = number_places(mesh.vertices)
+    firsts = np.unique(numbers, return_index=True)[1]
+    return TriangleMesh(mesh.vertices[firsts], numbers[mesh.faces]), numbers
+
+
 def boundary_vertices(mesh: MeshLike) -> Int[np.ndarray, " k"]:
     """Return the points on the boundary of a mesh.
 

@@ -80,6 +80,9 @@ class MeshAttributes(ReadOnly):
         Names of further content, which only a file of the same format keeps.
     source : SourceFile, optional
         The file.
+    places : (n, 3) float, optional
+        Where each vertex of `mesh` lies on the mesh of the file, if the two are shapes of their own
+        (`es.matching.transfer`). What moves a shape is then fitted to the other one when it is written.
 
     Examples
     --------
@@ -105,6 +108,7 @@ class MeshAttributes(ReadOnly):
     groups: tuple[str, ...] = ()
     others: tuple[str, ...] = ()
     source: SourceFile | None = None
+    places: Float[np.ndarray, "n 3"] | None = None
 
     @property
     def from_file(self) -> Bool[np.ndarray, " f"]:

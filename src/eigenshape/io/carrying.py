@@ -10,11 +10,11 @@ from scipy.sparse import csr_array
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.distances.closest_loops import nearest_around
-from eigenshape.geometry.measure import area_vectors, unit_vectors
+from eigenshape.geometry.measure import area_vectors, mean_normals, unit_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import size_one
-from eigenshape.geometry.topology import disjoint_union, number_places, sorted_rows
-from eigenshape.io.attributes import MeshAttributes
+from eigenshape.geometry.topology import disjoint_union, join_places, number_places, sorted_rows
+from eigenshape.io.attributes import MeshAttributes, plain_attributes
 
 # Faces are searched this many times as far from the middle of a new face as its corners are.
 REACH = 1.5
@@ -76,11 +76,68 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
         new_corners = mesh.vertices[mesh.faces[left]]
         neighbors = _neighbors(attributes, places[: old.n_faces])
         faces[left], weights[left] = _corner_places(old, new_corners, starts[left], neighbors)
+    return _gather(attributes, mesh, _corner_matrix(faces, weights, old), starts)
+
+
+def wear_attributes(
+    attributes: MeshAttributes,
+    mesh: TriangleMesh,
+    places: Float[np.ndarray, "n 3"],
+    faces: Int[np.ndarray, " n"],
+) -> MeshAttributes:
+    """Carry attributes to a mesh of another shape, each vertex of which has a place on a face of the old mesh.
+
+    As in `carry_attributes` each face looks into one chart of the texture: that at its middle, which
+    is on the side of a seam where most of it lies.
+    """
+    old = attributes.mesh
+    numbers = number_places(old.vertices)[old.faces]
+    wanted = places[mesh.faces]
+    middles = wanted.mean(axis=1, keepdims=True)
+    # From the nearest corner the search for the middle follows the surface, so that it does not
+    # jump to another limb, and it crosses seams.
+    nearest = np.linalg.norm(wanted - middles, axis=2).argmin(axis=1)
+    starts = faces[mesh.faces][np.arange(mesh.n_faces), nearest]
+    across = _neighbors(plain_attributes(old), numbers)
+    starts = _corner_places(old, np.repeat(middles, 3, axis=1), starts, across)[0][:, 0].copy()
+    found = _corner_places(old, wanted, starts, _neighbors(attributes, numbers))
+    matrix = _corner_matrix(*found, old)
+    # Rounding must not split vertices: corners that look alike get what the first of them has.
+    keys = [mesh.faces.ravel(), np.repeat(attributes.face_parts[starts], 3)]
+    for name, step in SEAMS.items():
+        values = getattr(attributes, name)
+        if values is not None:
+            keys.append(np.rint(matrix @ values.reshape(matrix.shape[1], -1) / step))
+    _, first, groups = np.unique(
+        np.column_stack(keys), axis=0, return_index=True, return_inverse=True
+    )
+    worn = _gather(attributes, mesh, matrix[first[groups.ravel()]], starts)
+    # The mesh is smooth, also across seams of the texture.
+    joined = join_places(mesh)[0]
+    normals = mean_normals(joined)[joined.faces]
+    return replace(worn, places=places, normals=normals)
+
+
+def _corner_matrix(
+    faces: Int[np.ndarray, "f 3"], weights: Float[np.ndarray, "f 3 3"], old: TriangleMesh
+) -> csr_array:
+    """Return what the corners of old faces give to each corner, as `MeshAttributes.corners`."""
     columns = (3 * faces[:, :, None] + np.arange(3)).ravel()
-    rows = np.repeat(np.arange(3 * mesh.n_faces), 3)
+    rows = np.repeat(np.arange(faces.size), 3)
     entries = (weights.ravel(), (rows, columns))
-    matrix = csr_array(entries, shape=(3 * mesh.n_faces, 3 * old.n_faces))
+    matrix = csr_array(entries, shape=(faces.size, 3 * old.n_faces))
     matrix.eliminate_zeros()
+    return matrix
+
+
+def _gather(
+    attributes: MeshAttributes,
+    mesh: TriangleMesh,
+    matrix: csr_array,
+    starts: Int[np.ndarray, " f"],
+) -> MeshAttributes:
+    """Interpolate values of corners by a matrix, and take those of faces from one old face each."""
+    old = attributes.mesh
     carried: dict[str, Any] = {}
     for name in ("texture_coordinates", "normals", "colors"):
         values = getattr(attributes, name)
@@ -89,17 +146,18 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
             if name == "normals" and matrix.nnz > len(table):  # some are means
                 table = unit_vectors(table)
             carried[name] = table.reshape(-1, 3, values.shape[2])
-    fields = {}
-    for name, values in attributes.fields.items():
-        if len(values) != old.n_vertices:
-            fields[name] = values[starts]
-            continue
-        fields[name] = np.zeros((mesh.n_vertices, *values.shape[1:]), values.dtype)
+
+    def at_vertices(values: np.ndarray) -> np.ndarray:
+        rows = np.zeros((mesh.n_vertices, *values.shape[1:]), values.dtype)
         at_corners = values[old.faces.ravel()]
         # A corner that is an old vertex has its value, and all corners of a vertex agree but for rounding.
-        fields[name][mesh.faces.ravel()] = interpolate(
-            matrix, at_corners, blend=values.dtype.kind == "f"
-        )
+        rows[mesh.faces.ravel()] = interpolate(matrix, at_corners, blend=values.dtype.kind == "f")
+        return rows
+
+    fields = {}
+    for name, values in attributes.fields.items():
+        is_of_faces = len(values) != old.n_vertices
+        fields[name] = values[starts] if is_of_faces else at_vertices(values)
     return replace(
         attributes,
         mesh=mesh,
@@ -108,6 +166,7 @@ def carry_attributes(attributes: MeshAttributes, mesh: MeshLike) -> MeshAttribut
         face_parts=attributes.face_parts[starts],
         face_materials=attributes.face_materials[starts],
         face_groups=attributes.face_groups[starts],
+        places=None if attributes.places is None else at_vertices(attributes.places),
         **carried,
     )
 

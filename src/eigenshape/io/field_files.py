@@ -16,7 +16,6 @@ from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io.attributes import MeshAttributes, plain_attributes
-from eigenshape.io.formats.neuro.shared import side_of_file
 from eigenshape.io.formats.registry import (
     FIELD_FORMATS,
     MAP_FORMATS,
@@ -24,6 +23,7 @@ from eigenshape.io.formats.registry import (
     suffix_to_write,
 )
 from eigenshape.io.formats.rounding import loss_in_single
+from eigenshape.io.hemispheres import side_of_file
 from eigenshape.io.opening import SourceFile, naming, open_file
 
 WRITABLE = ("f8", "f4", "i8", "i4", "u1")  # numpy's types of fields that are written as they are

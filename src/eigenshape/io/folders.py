@@ -15,6 +15,7 @@ from certeig.kit.arrays import whole_number
 from certeig.kit.errors import FileFormatError, InvalidParameterError
 from certeig.kit.files import as_path, read_regular, require_lines
 from certeig.kit.typing import Integer
+from eigenshape._sealed import StoreWarning
 from eigenshape._workers import Item
 from eigenshape.io.formats.registry import (
     GZ,
@@ -24,7 +25,6 @@ from eigenshape.io.formats.registry import (
     signed_suffix,
     suffix_in,
 )
-from eigenshape.retrieval.store.damage import StoreWarning
 
 NAME, LABEL, TAGS = "name", "label", "tags"  # columns of a table of labels; others are attributes
 

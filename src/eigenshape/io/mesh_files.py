@@ -23,7 +23,6 @@ from eigenshape.io.attributes import (
     plain_attributes,
 )
 from eigenshape.io.carrying import carry_attributes
-from eigenshape.io.field_files import format_fields, read_field_attributes
 from eigenshape.io.formats.cells import SEGMENTS, require_kind, select_cells, split_sentence
 from eigenshape.io.formats.registry import (
     MESH_FORMATS,
@@ -236,13 +235,11 @@ def require_finite(
 
 
 def _read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
-    known = format_of(source.suffix)
-    if "attributes" in known.traits:
-        attributes: MeshAttributes = known.load("_attributes").read_attributes(source, mesh)
-        return attributes
-    if "fields" in known.traits:
-        return read_field_attributes(source, mesh)
-    return plain_attributes(mesh)
+    module = format_of(source.suffix).load_attributes()
+    if module is None:
+        return plain_attributes(mesh)
+    attributes: MeshAttributes = module.read_attributes(source, mesh)
+    return attributes
 
 
 def require_surface(points: np.ndarray, simplices: np.ndarray) -> None:
@@ -380,11 +377,8 @@ def save_mesh(
         held = replace(held, colors=opaque[mesh.faces], source=None)
     job = WriteJob(mesh, path, suffix, is_binary, held, face_labels, lost)
     try:
-        if "attributes" in known.traits:
-            files = known.load("_attributes").write(job)
-        elif "fields" in known.traits:
-            job.lose([kind for kind in held.contents if kind != "fields"])
-            files = {path: format_fields(mesh, suffix, held.fields)}
+        if module := known.load_attributes():
+            files = module.write(job)
         else:
             job.lose(held.contents)
             module = known.load()

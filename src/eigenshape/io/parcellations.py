@@ -8,8 +8,8 @@ from certeig.kit.files import as_path, replace_file
 from eigenshape.features.parcellation import Parcellation, require_parcels
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.io.field_files import structure_named
-from eigenshape.io.formats.neuro.shared import side_of_file
 from eigenshape.io.formats.registry import PARCEL_FORMATS, format_of, suffix_to_write
+from eigenshape.io.hemispheres import side_of_file
 from eigenshape.io.opening import naming, open_file
 
 

@@ -7,3 +7,5 @@ from .registration import register_scans as register_scans
 from .shape_match import ShapeMatch as ShapeMatch
 from .target import MatchTarget as MatchTarget
 from .target import prepare_target as prepare_target
+from .transfer import Outfit as Outfit
+from .transfer import transfer as transfer

@@ -17,6 +17,7 @@ from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import face_labels, vertex_values
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas
+from eigenshape.geometry.repairs.repair_report import count_nouns
 from eigenshape.plot.camera import Camera, Up, View, choose_camera
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import Drawing, draw, palette
@@ -373,9 +374,10 @@ def figure_segments(
     show(axes, drawing)
     mark(axes, drawing, marked, numbers=True)
     if len(marked):
-        title = f"{len(marked)} parts around their feature points (hollow: on the far side)"
+        points = "its feature point" if len(marked) == 1 else "their feature points"
+        title = f"{count_nouns(len(marked), 'part')} around {points} (hollow: on the far side)"
     else:
-        title = f"{len(np.unique(labels[labels >= 0]))} parts"
+        title = count_nouns(len(np.unique(labels[labels >= 0])), "part")
     axes.set_title(title, fontsize=10)
     return figure
 

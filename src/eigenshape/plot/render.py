@@ -8,8 +8,8 @@ from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.threads import one_blas_thread
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.creases import corner_normals
 from eigenshape.geometry.face_turns import orient_consistently
-from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.topology import boundary_edges
 from eigenshape.plot.camera import Camera, in_picture
 from eigenshape.scans.raster import Raster, rasterize
@@ -103,15 +103,15 @@ def draw(
     raster = rasterize(points, mesh.faces, fine.size, fine.size)
     seen = raster.face >= 0
 
-    def blend(values: Float[np.ndarray, "n c"]) -> Float[np.ndarray, "h w c"]:
-        return np.einsum("hwk,hwkc->hwc", raster.weights, values[mesh.faces[raster.face]])
+    def blend(at_corners: Float[np.ndarray, "f 3 c"]) -> Float[np.ndarray, "h w c"]:
+        return np.einsum("hwk,hwkc->hwc", raster.weights, at_corners[raster.face])
 
     colors = np.full((*raster.face.shape, 3), 0.78)
     if vertex_colors is not None:
-        colors = blend(vertex_colors)
+        colors = blend(vertex_colors[mesh.faces])
     if face_colors is not None:
         colors = face_colors[raster.face]
-    normals = blend(mean_normals(orient_consistently(mesh)) @ fine.rotation.T)
+    normals = blend(corner_normals(orient_consistently(mesh)) @ fine.rotation.T)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
     # Both sides of an open surface are lit.
     normals = np.where(normals[..., 2:] < 0, -normals, normals)
@@ -130,7 +130,7 @@ def draw(
     if face_colors is not None:
         ink |= _changes(colors.sum(axis=2), raster)
     if zero_set_of is not None:
-        ink |= _changes(np.sign(blend(zero_set_of[:, None])[..., 0]), raster)
+        ink |= _changes(np.sign(blend(zero_set_of[mesh.faces, None])[..., 0]), raster)
     radius = int(np.ceil(LINE * FINER / 2 - 0.5))
     thick = ink.copy()
     for down in range(-radius, radius + 1):

@@ -11,9 +11,11 @@ from matplotlib.ticker import MaxNLocator, NullFormatter
 from certeig.kit.arguments import require_type
 from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh, as_shape
+from eigenshape.geometry.measure import nearest_rotations, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.matching.shape_match import ShapeMatch
-from eigenshape.plot.camera import Up, View, aim_camera
+from eigenshape.plot.camera import Camera, Up, View, aim_camera
 from eigenshape.plot.fields import PANEL, map_colors, show
 from eigenshape.plot.figure import Figure
 from eigenshape.plot.render import draw
@@ -37,7 +39,8 @@ def figure_match(
     """Draw a part and a whole side by side, corresponding points in one color.
 
     The colors are the coordinates of the whole. Points of the part fade to gray as far as the map
-    is not sure of them.
+    is not sure of them. Both are seen from corresponding sides: the whole is turned like the part
+    by the rotation that agrees best with the map.
 
     Parameters
     ----------
@@ -47,9 +50,9 @@ def figure_match(
     match : ShapeMatch
         Of `match_shapes(part, whole)`.
     view : str or (3,) float
-        The side from which each shape is drawn, as in `aim_camera`.
+        The side from which the part is drawn, as in `aim_camera`.
     up : str or (3,) float
-        The upward direction of both shapes, as in `aim_camera`.
+        The upward direction of the part, as in `aim_camera`.
 
     Returns
     -------
@@ -86,11 +89,25 @@ def figure_match(
     colors = place_colors(whole.vertices)
     sure = match.confidence[:, None]
     pulled = sure * match.pull(colors) + (1 - sure) * GRAY
-    show(left, draw(part, aim_camera(part, view=view, up=up), vertex_colors=pulled))
-    show(right, draw(whole, aim_camera(whole, view=view, up=up), vertex_colors=colors))
+    camera = aim_camera(part, view=view, up=up)
+    turned = Camera(camera.rotation @ _rotation_of_map(part, whole, match).T, camera.size)
+    show(left, draw(part, camera, vertex_colors=pulled))
+    show(right, draw(whole, turned, vertex_colors=colors))
     left.set_title(f"part: {match.confidence.mean():.0%} sure on average", fontsize=10)
     right.set_title("whole", fontsize=10)
     return figure
+
+
+def _rotation_of_map(
+    part: TriangleMesh, whole: TriangleMesh, match: ShapeMatch
+) -> Float[np.ndarray, "3 3"]:
+    """Return the rotation that takes the part best to where the map sends it (Kabsch 1976)."""
+    points, _ = scale_to_unit(part)
+    images = match.pull(scale_to_unit(whole)[0])
+    weights = (match.confidence * dual_volumes(part))[:, None]
+    weights = weights / (weights.sum() or 1.0)
+    arms = points - (weights * points).sum(axis=0)
+    return nearest_rotations((images.T @ (weights * arms))[None])[0]
 
 
 def place_colors(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:

@@ -1,6 +1,6 @@
 """Pairs of shapes of an index that are nearly the same."""
 
-from functools import partial
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from certeig.kit.arguments import require_type
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress
 from eigenshape.retrieval.index import ShapeIndex
+from eigenshape.retrieval.search.options import QueryOptions
 
 # Of five kinds of synthetic creatures and eight real shapes, with six views each: moved and scaled,
 # or with another order of vertices, a shape has a score up to 0.053; with noise of a thousandth of
@@ -78,18 +79,13 @@ def find_duplicates(
             name = facts.name
             if progress is not None:
                 progress(number / len(places), name)
-            search = partial(
-                reader.search,
-                reader.state,
-                snapshot.descriptor(int(place)),
-                left_out=facts.id,
-                is_scaled=False,  # or shapes would be less alike where others are like them
-            )
-            n_matches = AT_FIRST
-            found = search(n_matches=n_matches)
-            while len(found) == n_matches and found[-1].score <= most_score:
-                n_matches *= 4
-                found = search(n_matches=n_matches)
+            descriptor = snapshot.descriptor(int(place))
+            # Scaled, shapes would be less alike where others are like them.
+            options = QueryOptions(AT_FIRST, without=name, is_scaled=False)
+            found = reader.ask(descriptor, options)
+            while len(found) == options.n_matches and found[-1].score <= most_score:
+                options = replace(options, n_matches=4 * len(found))
+                found = reader.ask(descriptor, options)
             for match in found:
                 if match.score <= most_score:
                     pair = min(name, match.name), max(name, match.name)

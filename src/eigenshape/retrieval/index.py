@@ -20,8 +20,9 @@ from eigenshape.retrieval.search.matches import Matches
 from eigenshape.retrieval.search.reader import EngineMaker, IndexReader, choose_recipe
 from eigenshape.retrieval.store.damage import warn_of_damage
 from eigenshape.retrieval.store.database import create, writing
+from eigenshape.retrieval.store.facts import ShapeFacts
 from eigenshape.retrieval.store.filters import choose_shapes
-from eigenshape.retrieval.store.state import IndexState, read_state, tags_and_attributes
+from eigenshape.retrieval.store.state import IndexState, read_state
 from eigenshape.retrieval.store.upkeep import (
     IndexReport,
     compact_index,
@@ -34,9 +35,6 @@ from eigenshape.retrieval.store.writing import (
     Record,
     Writer,
     described,
-    facts_text,
-    require_name,
-    require_text,
 )
 from eigenshape.retrieval.thumbnails import draw_thumbnail
 
@@ -337,21 +335,11 @@ class ShapeIndex:
         """
         mesh = as_mesh(mesh)
         require_type(recipe, AnyRecipe | None, "recipe")
-        # Before the mesh is described, which takes a second
-        require_name(name)
-        require_text(label, source)
-        facts_text(tags, attributes or {})
-        if recipe is None:
-            recipe = self.default_recipe()
-        descriptors = describe_to_store(mesh, recipe, n_views)
+        facts = ShapeFacts(name, label=label, source=source, tags=tags, attributes=attributes or {})
+        facts.as_row()  # which refuses them before the mesh is described, which takes a second
+        descriptors = describe_to_store(mesh, recipe or self.default_recipe(), n_views)
         shape = DescribedShape(
-            name,
-            descriptors,
-            label=label,
-            source=source,
-            tags=tags,
-            attributes=attributes or {},
-            thumbnail=draw_thumbnail(mesh),
+            descriptors=descriptors, thumbnail=draw_thumbnail(mesh), **vars(facts)
         )
         self.add_many([shape], replace=replace)
 
@@ -688,6 +676,5 @@ def _records(state: IndexState, chosen: set[int] | None = None) -> list[Record]:
     for facts in state.every():
         if chosen is None or facts.id in chosen:
             by = tuple(state.recipes[number] for number in sorted(used.get(facts.id, ())))
-            texts = (facts.name, facts.label, facts.source, facts.digest)
-            records.append(Record(*texts, *tags_and_attributes(facts), by))
+            records.append(Record(**facts.as_facts(), recipes=by))
     return sorted(records, key=lambda record: record.name)

@@ -20,7 +20,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.retrieval.heat.features import N_VIEWS, describe_views, find_heat_features
+from eigenshape.retrieval.heat.features import N_VIEWS, describe_views, heat_features
 from eigenshape.retrieval.heat.recipe import HeatRecipe
 from eigenshape.retrieval.heat.score import HeatDescriptor, match_features, matching_scores
 from eigenshape.retrieval.patches.codebook import read_codebook, write_codebook
@@ -34,7 +34,7 @@ from eigenshape.retrieval.patches.packing import (
     unpack_points,
 )
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
-from eigenshape.retrieval.patches.patches import extract_patches
+from eigenshape.retrieval.patches.patches import mesh_patches
 from eigenshape.retrieval.patches.verification import verified_scores
 from eigenshape.scans.partial import view_number
 
@@ -81,11 +81,22 @@ def describe(mesh: MeshLike, recipe: AnyRecipe | None = None) -> Descriptor:
     >>> es.describe(fish, es.retrieval.SCALE_FREE).vectors.shape  # 15 feature points
     (15, 15)
     """
-    mesh = as_mesh(mesh)
     require_type(recipe, AnyRecipe | None, "recipe")
+    return describe_mesh(as_mesh(mesh), recipe or PatchRecipe())
+
+
+def describe_mesh(mesh: TriangleMesh, recipe: AnyRecipe) -> Descriptor:
+    """Describe a mesh, as `describe` does."""
     if isinstance(recipe, HeatRecipe):
-        return find_heat_features(mesh, recipe).descriptor
-    return patch_descriptor(extract_patches(mesh), recipe or PatchRecipe())
+        return heat_features(mesh, recipe).descriptor
+    return patch_descriptor(mesh_patches(mesh), recipe)
+
+
+def describe_query(shape: MeshLike | Descriptor, recipe: AnyRecipe) -> Descriptor:
+    """Return what an index is asked by: a descriptor as it is, or that of a mesh."""
+    if isinstance(shape, Descriptor):
+        return shape
+    return describe_mesh(as_mesh(shape, "shape"), recipe)
 
 
 def describe_to_store(
@@ -95,8 +106,8 @@ def describe_to_store(
     usual = N_VIEWS if isinstance(recipe, HeatRecipe) else N_PATCH_VIEWS
     count = usual if n_views is None else view_number(n_views, "n_views")
     if isinstance(recipe, HeatRecipe):
-        return [describe(mesh, recipe), *describe_views(mesh, recipe, count)]
-    patches = extract_patches(mesh, n_views=count, n_frames=recipe.n_frames)
+        return [describe_mesh(mesh, recipe), *describe_views(mesh, recipe, count)]
+    patches = mesh_patches(mesh, n_views=count, n_frames=recipe.n_frames)
     return [patch_descriptor(patches, recipe)]
 
 

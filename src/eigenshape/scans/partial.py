@@ -23,6 +23,7 @@ SLACK = 1.5
 # Slopes are limited to this value. A larger one would keep vertices seen from their edge that
 # another part of the surface hides.
 STEEPEST_SURFACE = 10.0
+RESOLUTION = 512  # pixels along the longest side of the z-buffer
 MOST_VIEWS = 1000  # of one shape; a view takes about 0.1 s
 
 
@@ -53,12 +54,11 @@ class MeshPart(ReadOnly):
     source_faces: Int[np.ndarray, " f"]
 
 
-@one_blas_thread()
 def partial_scan(
     mesh: MeshLike,
     view: ArrayLike | np.random.Generator,
     *,
-    resolution: int = 512,
+    resolution: int = RESOLUTION,
     all_pieces: bool = False,
 ) -> MeshPart:
     """Keep the part of a mesh that is visible from one direction.
@@ -109,9 +109,20 @@ def partial_scan(
     >>> scan.source_vertices.shape
     (337,)
     """
-    mesh = as_mesh(mesh)
     whole_number(resolution, "resolution", 16, 8192)
     direction = unit_direction(view)
+    return visible_part(as_mesh(mesh), direction, resolution, all_pieces=all_pieces)
+
+
+@one_blas_thread()
+def visible_part(
+    mesh: TriangleMesh,
+    direction: Float[np.ndarray, "3"],
+    resolution: int = RESOLUTION,
+    *,
+    all_pieces: bool = False,
+) -> MeshPart:
+    """Keep what is visible of a mesh from a unit direction, as `partial_scan` does."""
     points = scale_to_unit(mesh)[0] @ rotation_towards(direction).T
     low = points.min(axis=0)
     span = float((points.max(axis=0) - low)[:2].max())
@@ -171,7 +182,7 @@ def view_of(mesh: TriangleMesh, number: int) -> MeshPart:
     """
     areas = face_areas(mesh)
     is_of_parts = bool(areas[faces_of_largest(mesh)].sum() < areas.sum() / 2)
-    return partial_scan(mesh, viewpoint(number), all_pieces=is_of_parts)
+    return visible_part(mesh, viewpoint(number), all_pieces=is_of_parts)
 
 
 def unit_direction(view: ArrayLike | np.random.Generator) -> Float[np.ndarray, "3"]:

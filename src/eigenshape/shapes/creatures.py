@@ -2,7 +2,7 @@
 
 import heapq
 import math
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -117,14 +117,11 @@ def make_creature(
 @lru_cache(maxsize=32)
 def _rest_pose(kind: str, n_vertices: int, individual: int) -> tuple[TriangleMesh, Joints]:
     body = place_limbs(PLANS[kind], individual)
-
-    def field(points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, " p"]:
-        return distance_to_body(points, body)
-
+    field = partial(distance_to_body, body=body)
     # Mesh the skin on a grid fine enough for the thinnest limb, then remove surplus vertices.
     wanted = find_spacing(field, *body.box, round(SURPLUS * n_vertices))
     spacing = min(wanted, body.thinnest)
-    mesh = collapse_shortest_edges(isosurface(field, *body.box, spacing), n_vertices)
+    mesh = collapse_shortest_edges(_fine_skin(kind, individual, spacing), n_vertices)
     mesh = relax(field, mesh, spacing)
     # The joints, the outermost first, and how much each vertex turns with each of them
     owner, place = nearest_limbs(mesh.vertices, body)
@@ -143,6 +140,13 @@ def _rest_pose(kind: str, n_vertices: int, individual: int) -> tuple[TriangleMes
     follows = diffuse(mesh, np.column_stack(beyond).astype(np.float64), np.array(widths))
     joints = Joints(table[:, :3], table[:, 3:6], np.radians(table[:, 6:]), follows)
     return mesh, joints
+
+
+@lru_cache(maxsize=len(CREATURES))
+def _fine_skin(kind: str, individual: int, spacing: float) -> TriangleMesh:
+    """Return the skin, which creatures of few vertices share: their thinnest limb chooses the spacing."""
+    body = place_limbs(PLANS[kind], individual)
+    return isosurface(partial(distance_to_body, body=body), *body.box, spacing)
 
 
 def diffuse(

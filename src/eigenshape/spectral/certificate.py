@@ -33,6 +33,7 @@ class Certificate(certeig.Certificate):
     estimate: float | None = None
 
     unit = "1/length²"
+    subject = "the operator"
 
     def _what(self) -> str:
         if self.count is not None:

@@ -7,6 +7,9 @@ from eigenshape.operators.laplacian import Laplacian
 
 LARGEST = 'repair(mesh, ["auto", "largest_component"]), or --repair auto,largest_component on the command line'
 ADVICE = Advice(
+    stiffness="stiffness",
+    mass="mass",
+    row="point",
     unit="1/length²",
     scales=(
         'Try repair(mesh, ["auto"]) or robust_laplacian(mesh); on the command line, --repair auto or '
@@ -22,6 +25,7 @@ ADVICE = Advice(
     ),
     rounding="Repair nearly degenerate elements.",
     inaccurate="Nearly degenerate elements do this.",
+    slow="Repair nearly degenerate elements, or request fewer pairs.",
 )
 
 

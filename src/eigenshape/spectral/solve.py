@@ -71,7 +71,9 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
     The approximate method factors nothing of full size and proves nothing. It aggregates points
     (Vaněk, Mandel and Brezina 1996), solves the coarsest level exactly, and refines the
     eigenvectors level by level by block Davidson iteration, in the spirit of Nasikun and
-    Hildebrandt (2022). It needs less memory, and less time for a few dozen pairs of many points.
+    Hildebrandt (2022). It needs less memory, and less time for a few dozen pairs of many points. Up
+    to 100,000 points, with less than a hundred entries a row, the certified method is as fast: there
+    it is taken in place of the approximate one, and meets every accuracy.
 
     Results do not depend on units: coordinates scaled by s give the eigenvalues divided by s².
 
@@ -114,8 +116,7 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
         cuts a multiple eigenvalue, `certificate.n_split` is the number of copies left out. If the
         operator's kernel is corrected, eigenvalues, residuals and certificate hold λ = -log(1 - t
         μ)/t for the eigenvalue μ of the pencil. Approximate results have `certificate.complete`
-        False and `certificate.count` None, except for operators so small that the certified method
-        is faster: these are certified.
+        False and `certificate.count` None, unless the certified method was taken in their place.
 
     Raises
     ------
@@ -165,12 +166,11 @@ def solve_spectrum(  # noqa: PLR0913 - one keyword for each choice: which pairs,
     >>> (drum.eigenvalues / (2 * 3.14159**2)).round(2).tolist()
     [1.0]
 
-    Approximate eigenpairs:
+    Of few points, approximate eigenpairs are certified:
 
-    >>> ball = es.cotangent_laplacian(es.icosphere(4))
-    >>> rough = es.solve_spectrum(ball, 9, method="approximate", accuracy=1e-2)
-    >>> rough.certificate.complete
-    False
+    >>> ball = es.cotangent_laplacian(es.icosphere(3))
+    >>> es.solve_spectrum(ball, 9, method="approximate").certificate.complete
+    True
     """
     require_type(laplacian, Laplacian, "laplacian")
     _require_fitting_options(method, k, above, below, accuracy, max_residual)

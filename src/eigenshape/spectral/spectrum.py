@@ -62,6 +62,7 @@ class Spectrum(certeig.Spectrum):
 
     certificate_class = Certificate
     maker = "eigenshape"
+    least = 0.0
 
 
 def count_zero_modes(spectrum: Spectrum) -> int:

@@ -10,11 +10,11 @@ from certeig.kit.arrays import ReadOnly, positive_values, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
-from eigenshape.features.bipartite_loops import match_rows
-from eigenshape.features.least_matching import least_perfect, near_pairs
 from eigenshape.geometry.samples.surface_points import SurfacePoints
 from eigenshape.geometry.simplices import size_one
 from eigenshape.stability.anchors import preimages, regions_met
+from eigenshape.stability.bipartite_loops import match_rows
+from eigenshape.stability.least_matching import least_perfect, near_pairs
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 
 
@@ -184,7 +184,7 @@ def correspondence_graph(
     nodes = nodes[used]
     # The points of N in the witness region of each node, as rows of a matrix.
     labels, before = preimages(perturbation, points_two)
-    near = near_pairs(nodes, before, reach, 2.0)
+    near = near_pairs(nodes, before, reach)
     rows, columns = [near.i], [np.flatnonzero(labels == OUTSIDE)[near.j]]
     meets = regions_met(perturbation, nodes, reach)
     for region in range(perturbation.n_regions):
@@ -267,5 +267,5 @@ def bottleneck_matching(one: ArrayLike, two: ArrayLike) -> BottleneckMatching:
             f"these are {first.shape} and {second.shape}."
         )
     both, scale = size_one(np.stack([first, second]))
-    distance, partners = least_perfect(both[0], both[1], 2.0)
+    distance, partners = least_perfect(both[0], both[1])
     return BottleneckMatching(partners, scale * distance)

@@ -125,7 +125,7 @@ class StabilityReport(ReadOnly):
                 "Graph Laplacians of such samples distinguish the shapes at "
                 f"{len(significant)} of {len(self.changes)} heat times, most clearly at "
                 f"t = {clearest.t:.3g}: eigenvalues change by up to {clearest.change:.3g} of the "
-                f"last, those of two samples of the first shape by {clearest.floor:.3g}, and "
+                f"last, the eigenvalues of two samples of the first shape by {clearest.floor:.3g}, and "
                 f"Weyl's bound is {clearest.weyl:.3g}."
             )
         else:

@@ -265,7 +265,7 @@ def test_shapes_that_a_codebook_is_learned_from_are_read_once(index, tmp_path):
 
 
 def test_learning_and_recipes_exclude_each_other(index):
-    with pytest.raises(InvalidParameterError, match="both were asked for"):
+    with pytest.raises(InvalidParameterError, match="both were given"):
         build_index(index, [], read_by_content, recipes=(RECIPE,), learn=True)
 
 

@@ -11,6 +11,7 @@ from eigenshape.retrieval.patches.distance import USUAL_ISOLATION, packed_distan
 from eigenshape.retrieval.search import candidates, engines
 from eigenshape.retrieval.search.candidates import choose_candidates, n_compared
 from eigenshape.retrieval.search.coarse import coarse_rows
+from eigenshape.retrieval.search.options import QueryOptions
 
 
 @pytest.fixture
@@ -23,13 +24,15 @@ def source(tmp_path, monkeypatch):
 
 def ask(source, query, **options):
     allowed = options.pop("allowed", np.ones(source.n_shapes, dtype=bool))
+    isolations = options.pop("isolations", np.full(source.n_shapes, USUAL_ISOLATION))
+    supplier = options.pop("supplier", None)
     return choose_candidates(
         as_query(query),
         lambda: coarse_rows(source, RECIPE),
         allowed,
-        options.pop("isolations", np.full(source.n_shapes, USUAL_ISOLATION)),
-        n_matches=options.pop("n_matches", 5),
-        **options,
+        isolations,
+        QueryOptions(**options),
+        supplier,
     )
 
 

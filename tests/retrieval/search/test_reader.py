@@ -126,7 +126,7 @@ def test_a_reader_keeps_its_state_until_it_is_refreshed(index):
         assert repr(reader) == f"IndexReader({str(index.folder)!r}, 9 shapes)"
         assert reader.default_recipe() == RECIPE
     assert repr(reader) == "IndexReader(closed)"
-    with pytest.raises(es.StoreError, match="A reader must be open to be asked; it was closed"):
+    with pytest.raises(es.StoreError, match="A reader must be open to be queried; it was closed"):
         reader.query(descriptor(1))
 
 

@@ -145,7 +145,9 @@ def test_what_cannot_be_merged(index, tmp_path):
     longer = es.ShapeIndex.create(tmp_path / "longer")
     rows = es.retrieval.HeatDescriptor(np.ones((2, 5)), np.arange(2), RECIPE)
     keep(longer, "x", [rows])
-    with pytest.raises(es.InvalidParameterError, match="must have as many numbers; those of"):
+    with pytest.raises(
+        es.InvalidParameterError, match="must have as many numbers; the features of"
+    ):
         index.merge([longer])
     assert len(index) == 3
 

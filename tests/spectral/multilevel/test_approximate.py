@@ -25,6 +25,12 @@ RING = cotangent_laplacian(torus(36, 24))
 SIX = cotangent_laplacian(disjoint_union(*[icosphere(2)] * 6))
 
 
+@pytest.fixture(autouse=True)
+def never_certify(monkeypatch):
+    """Take the multilevel solver where the certified one is as fast."""
+    monkeypatch.setattr(approximate, "CERTIFIED_POINTS", 0)
+
+
 @pytest.fixture
 def always_coarsen(monkeypatch):
     """Take the road of large operators, also for small ones."""
@@ -158,6 +164,19 @@ def test_scans(data, name):
     scale = exact.eigenvalues[-1]
     assert found.residuals.max() <= 1.01e-3 * scale
     np.testing.assert_allclose(found.eigenvalues, exact.eigenvalues, atol=2e-4 * scale)
+
+
+@pytest.mark.parametrize("options", [{}, {"accuracy": 1e-2}, {"max_residual": 1e-9}])
+def test_up_to_100_000_points_pairs_are_certified(monkeypatch, options):
+    monkeypatch.undo()
+    ball = cotangent_laplacian(icosphere(4))
+    found, exact = solve_roughly(ball, 9, **options), solve_spectrum(ball, 9)
+    assert found.certificate.complete
+    np.testing.assert_array_equal(found.eigenvalues, exact.eigenvalues)
+    # An operator that the certified method would not factor either is approximated.
+    dense = mesh_laplacian(icosphere(4), h=0.3)
+    assert dense.stiffness.nnz > 100 * dense.n_points
+    assert not solve_roughly(dense, 9, **options | {"max_residual": None}).certificate.complete
 
 
 def test_few_points_are_solved_and_proved():

@@ -19,7 +19,7 @@ class CerteigError(Exception):
     ...     certeig.eigenpairs([[2.0]], k=1)
     ... except certeig.CerteigError as err:
     ...     print(err)
-    W must be a square sparse matrix; it is a list of shape (1, 1).
+    W must be a square sparse matrix; it is a list of shape (1, 1). Pass scipy.sparse.csr_array(W).
     """
 
 

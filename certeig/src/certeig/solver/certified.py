@@ -14,7 +14,7 @@ from certeig.solver.eigenpairs import Pairs, error_bound, lowest_pairs, polish
 from certeig.solver.factor import Factor
 from certeig.solver.inertia import count_beside
 from certeig.solver.lanczos import Wanted, block_lanczos
-from certeig.solver.pencil import Pencil
+from certeig.solver.pencil import Pencil, largest_bound
 from certeig.solver.shift import factor_below, factorize_near
 from certeig.solver.slices import (
     CLEAR_GAP,
@@ -44,7 +44,9 @@ def certified_pairs(
     try:
         if k:
             return solve_lowest(pencil, k, report)
-        low, high = np.ldexp(interval, -pencil.value_exponent).tolist()
+        # A value beyond the range of floats in the pencil's units is as good as infinite.
+        with np.errstate(over="ignore"):
+            low, high = pencil.places_in(interval).tolist()
         return _solve_between(pencil, low, high, report)
     except ConvergenceError as error:
         require_solvable(pencil, error)
@@ -57,11 +59,16 @@ def _solve_between(
     report(0.01, "counting eigenvalues")
     found = None
     fallbacks: tuple[str, ...] = ()
+    # No factor serves far beyond all eigenvalues, and none is needed there.
+    ceiling = max(largest_bound(pencil), pencil.level)
+    if low > ceiling:
+        raise _none_between(pencil, low, high, pencil.n)
+    high = min(high, ceiling)
     if low > 0 and not dense_serves(pencil, 1):
         interval = count_interval(pencil, low, high)
         within = interval.below_high - interval.below_low
         few_below = interval.below_low < max(within, FEW_BELOW)
-        if not few_below and not dense_serves(pencil, interval.below_high):
+        if not few_below and not dense_serves(pencil, within):
             require_memory_for_pairs(pencil, within)
             try:
                 found = solve_interval(
@@ -78,13 +85,17 @@ def _solve_between(
     if start < stop:
         return take_pairs(pencil, pairs, certificate, start, stop)
     number = certificate.first + start
-    below, above = pencil.values_out(np.array([high, low])).tolist()
-    if number == 0:
-        lowest = pencil.values_out(pairs.values[:1])[0]
-        raise InvalidParameterError(
-            f"below must exceed the lowest eigenvalue, {lowest:.6g}; it is {below:.6g}."
-        )
+    if number:
+        raise _none_between(pencil, low, high, number)
+    lowest, below = pencil.places_out(np.array([pairs.values[0], high])).tolist()
     raise InvalidParameterError(
+        f"below must exceed the lowest eigenvalue, {lowest:.6g}; it is {below:.6g}."
+    )
+
+
+def _none_between(pencil: Pencil, low: float, high: float, number: int) -> InvalidParameterError:
+    above, below = pencil.places_out(np.array([low, high])).tolist()
+    return InvalidParameterError(
         f"There must be eigenvalues between above and below; {number} lie below {above:.6g} and none from there to "
         f"{below:.6g}."
     )
@@ -92,7 +103,8 @@ def _solve_between(
 
 def _lowest_below(pencil: Pencil, limit: float, report: Progress) -> tuple[Pairs, Certificate]:
     """Certify one pair more than there are below the limit; then none of those is missing."""
-    k = min(factor_below(pencil, limit).count + 1, pencil.n)
+    # No eigenvalue is negative but by rounding, and no factor serves at zero.
+    k = min(factor_below(pencil, limit).count + 1, pencil.n) if limit > 0 else 1
     while True:
         pairs, certificate = solve_lowest(pencil, k, report)
         count = int(np.count_nonzero(pairs.values < limit))
@@ -161,7 +173,7 @@ def _complete(
     for _ in range(INTERVAL_RUNS):
         pairs = polish(pencil, factor, lowest_pairs(pencil, vectors, vectors.shape[1]))
         report(0.9)
-        gaps = _clear_gaps(pairs.values, interval)
+        gaps = _clear_gaps(pairs.values, interval, pencil.n)
         if gaps is None:
             return None
         (index, step), after = gaps
@@ -197,10 +209,12 @@ def _complete(
 
 
 def _clear_gaps(
-    values: Float[np.ndarray, " k"], interval: Interval
+    values: Float[np.ndarray, " k"], interval: Interval, n: int
 ) -> tuple[tuple[int, float], ...] | None:
     """Return where to count on each side: a pair, and the step from it into the widest gap outside the interval."""
     starts, ends = values[:-1], values[1:]
+    if interval.below_high == n:  # nothing lies above the interval, so the count is made there
+        starts, ends = values, np.append(ends, 1.01 * max(interval.high, float(values[-1])))
     before, after = (
         np.minimum(ends, interval.low) - starts,
         ends - np.maximum(starts, interval.high),

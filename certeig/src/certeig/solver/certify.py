@@ -64,7 +64,7 @@ def certify_pairs(
         raise InvalidParameterError(
             f"eigenvalues must ascend; {drops[0] + 1} is {values[drops[0] + 1]} after {values[drops[0]]}."
         )
-    own = np.ldexp(values, -pencil.value_exponent)
+    own = pencil.places_in(values)
     vectors = np.ldexp(vectors, -pencil.vector_exponent)
     certificate = prove(pencil, Pairs(own, vectors, residual_norms(pencil, own, vectors)))
     return in_user_units(pencil, certificate), float(values[-1])
@@ -113,7 +113,7 @@ def prove(
     if resolution > WIDEST_CLUSTER * _scale(pencil, pairs):
         raise ConvergenceError(
             f"Neighboring eigenvalues must differ by more than the rounding of the factor; the last {k - first} "
-            f"of {k} do not. Repair nearly degenerate elements."
+            f"of {k} do not. {pencil.advice.rounding}"
         )
     certificate = with_count(certificate, pairs, below.shift, below.count)
     return replace(certificate, resolution=resolution, n_split=above.count - k)
@@ -145,7 +145,7 @@ def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
         gap=(float(pairs.values[-1]), np.inf),
         resolution=resolution,
         orthonormality=orthonormality,
-        max_residual=float(relative[worst]),
+        max_residual=float(pairs.residuals.max()) / _user_scale(pencil, pairs),
         n_split=0,
         clusters=_clusters(pairs.values, resolution),
     )
@@ -153,9 +153,10 @@ def quality(pencil: Pencil, pairs: Pairs) -> Certificate:
 
 def in_user_units(pencil: Pencil, certificate: Certificate) -> Certificate:
     """Return the certificate with every value in the user's units."""
-    shift, floor, low, high, resolution = pencil.values_out(
-        np.array([certificate.shift, certificate.floor, *certificate.gap, certificate.resolution])
+    shift, floor, low, high = pencil.places_out(
+        np.array([certificate.shift, certificate.floor, *certificate.gap])
     ).tolist()
+    resolution = float(np.ldexp(certificate.resolution, pencil.value_exponent))
     return replace(certificate, shift=shift, floor=floor, gap=(low, high), resolution=resolution)
 
 
@@ -199,6 +200,12 @@ def _scale(pencil: Pencil, pairs: Pairs) -> float:
     # level / n is far below the first positive eigenvalue of a surface; it is the scale if all
     # eigenvalues found are 0.
     return max(float(np.abs(pairs.values).max()), pencil.level / pencil.n)
+
+
+def _user_scale(pencil: Pencil, pairs: Pairs) -> float:
+    """Return the scale as the user sees it, from the user's zero."""
+    origin = float(np.ldexp(pencil.origin, -pencil.value_exponent))
+    return _scale(pencil, replace(pairs, values=pairs.values + origin))
 
 
 def require_orthonormal(pencil: Pencil, pairs: Pairs) -> float:

@@ -72,7 +72,7 @@ def prove_outside(pencil: Pencil, pairs: Pairs, k: int, below: Factor) -> tuple[
     if missing is None:
         raise ConvergenceError(
             f"A proof by a sparser operator needs pairs above a gap and precise ones; of {len(pairs.values)} pairs "
-            f"{len(found.values)} end at {np.ldexp(shift, pencil.value_exponent):.6g}{pencil.advice.units}."
+            f"{len(found.values)} end at {pencil.place_out(shift):.6g}{pencil.advice.units}."
         )
     certificate = with_count(certificate, found, shift, len(found.values) + missing)
     return found, replace(certificate, n_deflated=len(pairs.values))

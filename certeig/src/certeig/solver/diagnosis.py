@@ -34,10 +34,11 @@ def require_solvable(pencil: Pencil, error: ConvergenceError) -> None:
     if not np.isnan(scales).all():
         soft, stiff = int(np.nanargmin(scales)), int(np.nanargmax(scales))
         if scales[stiff] > DIGITS * scales[soft]:
-            low, high = pencil.values_out(scales[[soft, stiff]])
+            row = pencil.advice.row
+            low, high = pencil.places_out(scales[[soft, stiff]])
             raise InvalidParameterError(
-                f"W_ii/B_ii must not span more digits than floats have; it is {high:.3g} at point {stiff} and "
-                f"{low:.3g} at point {soft}, and rounding at the one hides the eigenvalues of the other. "
+                f"W_ii/B_ii must not span more digits than floats have; it is {high:.3g} at {row} {stiff} and "
+                f"{low:.3g} at {row} {soft}, and rounding at the one hides the eigenvalues of the other. "
                 f"{remedy_for(pencil)}"
             ) from error
 
@@ -50,12 +51,12 @@ def require_solvable(pencil: Pencil, error: ConvergenceError) -> None:
         if farther is None:
             break
         last = farther
-    high, low, least = pencil.values_out(
+    high, low, least = pencil.places_out(
         np.array([first.shift, last.shift, STEP_DOWN * last.shift])
     )
     raise InvalidParameterError(
-        f"stiffness must be positive semidefinite; eigenvalue 0 lies between {least:.3g} and {low:.3g}, and "
-        f"{first.count} lie below {high:.1e}."
+        f"{pencil.advice.stiffness} must be positive semidefinite; eigenvalue 0 lies between {least:.3g} "
+        f"and {low:.3g}, and {first.count} lie below {high:.1e}."
     ) from error
 
 

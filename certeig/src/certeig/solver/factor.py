@@ -52,7 +52,7 @@ def factorize(
     lower = factorize_symmetric(
         pattern.elimination, data, pattern.memory, spent.lower if spent else None
     )
-    return Factor(shift, int(np.count_nonzero(lower.pivots < 0)), slack, lower) if lower else None
+    return Factor(shift, lower.n_negative, slack, lower) if lower else None
 
 
 def rounding(factor: Factor) -> Float[np.ndarray, " n"]:

@@ -17,6 +17,42 @@ WIDENING = 3.7
 SPARE = 1 / 16
 # Factors for one count before giving up.
 COUNT_TRIALS = 12
+# Slack of a count far from what is known, in multiples of the rounding of a factor without.
+SLACK = 2.0
+# Where no factor serves at a value, or rounding is too large there, eigenvalues are counted this far on
+# both sides of it, in shares of trace W / trace B: the same count proves that none is between.
+COUNT_STEPS = (0.0, 1e-9, 1e-6, 1e-4)
+# Values are moved to at most this size, far beyond any eigenvalue, where factors still have no infinities.
+LARGEST_SHIFT = 1e200
+
+
+def count_below_shift(pencil: Pencil, shift: float) -> int:
+    """Count the eigenvalues below a shift in the pencil's units, without knowing any of them.
+
+    Raises a ConvergenceError if an eigenvalue is at the shift, up to rounding.
+    """
+    shift = min(max(shift, -LARGEST_SHIFT), LARGEST_SHIFT)
+    for step in COUNT_STEPS:
+        below, above = shift - step * pencil.level, shift + step * pencil.level
+        least, most = bound_count(pencil, below, -1.0), bound_count(pencil, above, 1.0)
+        if least is not None and least == most:
+            return least
+    raise ConvergenceError(
+        f"To count eigenvalues below a value none may be at it, up to rounding; {pencil.place_out(shift):.6g} "
+        f"is too near to one. Choose a value a little higher or lower."
+    )
+
+
+def bound_count(pencil: Pencil, shift: float, side: float) -> int | None:
+    """Bound the number of eigenvalues below a shift, from above or (side -1) below; None if rounding forbids it."""
+    plain = factorize(pencil, shift)
+    if plain is None or not np.isfinite(loss := rounding(plain)).all():
+        return None
+    # W - σB - S with S above the rounding is nowhere above W - σB, and has at least as many negative
+    # eigenvalues; with -S it has at most as many.
+    slack = SLACK * loss
+    moved = factorize(pencil, shift, side * slack)
+    return moved.count if moved and (rounding(moved) <= slack).all() else None
 
 
 def count_beside(
@@ -77,6 +113,6 @@ def count_beside(
             sigma = value + step
     raise ConvergenceError(
         f"To count eigenvalues, rounding must be smaller than their distance to σ; near "
-        f"{np.ldexp(value, pencil.value_exponent):.6g}{pencil.advice.units} it is "
+        f"{pencil.place_out(value):.6g}{pencil.advice.units} it is "
         f"{np.ldexp(uncertainty(wanted), pencil.value_exponent):.1e}. {pencil.advice.rounding}"
     )

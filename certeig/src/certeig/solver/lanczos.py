@@ -278,7 +278,7 @@ def grow_space(
         report(size / (size + 0.6 * n_wanted + block))
     raise ConvergenceError(
         f"Block Lanczos must converge within {capacity} vectors; {missing} of {n_wanted} eigenvalues did not. "
-        f"Repair nearly degenerate elements, or request fewer pairs."
+        f"{inner.pencil.advice.slow}"
     )
 
 

@@ -71,6 +71,9 @@ class Pencil:
     value_exponent, vector_exponent : int
         Eigenvalues are 2**value_exponent times larger in the user's units, and vectors
         2**vector_exponent times.
+    origin : float
+        What is added to eigenvalues then: the solver works from zero upward, so W is W - origin·B
+        of the user where that has eigenvalues below zero or far above it.
     saturation : float
         s of an operator whose eigenvalues are about level (1 - e^{-sx}) where others have level·x,
         as those of Gaussian kernels are; 0 for others.
@@ -86,6 +89,7 @@ class Pencil:
     level: float
     value_exponent: int
     vector_exponent: int
+    origin: float = 0.0
     saturation: float = 0.0
     advice: Advice = ADVICE
 
@@ -106,8 +110,20 @@ class Pencil:
         return self.mass @ vectors
 
     def values_out(self, values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
-        """Return eigenvalues in the user's units."""
+        """Return differences of eigenvalues in the user's units."""
         return np.ldexp(values, self.value_exponent)
+
+    def place_out(self, value: float) -> float:
+        """Return an eigenvalue in the user's units, from the user's zero."""
+        return float(np.ldexp(value, self.value_exponent)) + self.origin
+
+    def places_out(self, values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Return eigenvalues in the user's units, from the user's zero."""
+        return np.ldexp(values, self.value_exponent) + self.origin
+
+    def places_in(self, values: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        """Return eigenvalues, given as the user has them, in the pencil's units."""
+        return np.ldexp(values - self.origin, -self.value_exponent)
 
     def vectors_out(self, vectors: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
         """Return B-normalized vectors in the user's units."""
@@ -120,39 +136,41 @@ def normalize(
     *,
     known_floor: float = 0.0,
     saturation: float = 0.0,
+    origin: float = 0.0,
     advice: Advice = ADVICE,
 ) -> Pencil:
     """Scale W and B by powers of two, and find a lower bound of B.
 
-    `known_floor` is a c with B ≥ c diag(B) that is known from how B was made, or 0.
+    `known_floor` is a c with B ≥ c diag(B) that is known from how B was made, or 0. `origin` is the
+    value by which the user's eigenvalues are larger than those of W and B.
 
     Raises an InvalidParameterError if B is not positive definite, or entries on a diagonal lie too
     far apart for floats.
     """
-    _require_range("stiffness", stiffness.diagonal())
-    _require_range("mass", mass.diagonal())
-    pencil = _pencil(stiffness, mass, known_floor=known_floor)
-    return replace(pencil, saturation=saturation, advice=advice)
+    _require_range(advice.stiffness, stiffness.diagonal())
+    _require_range(advice.mass, mass.diagonal())
+    pencil = _pencil(stiffness, mass, known_floor=known_floor, advice=advice)
+    return replace(pencil, saturation=saturation, origin=origin)
 
 
 def part_pencil(whole: Pencil, stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
     """Return the pencil of one part, given by its W and B, scaled to its own units."""
-    part = _pencil(stiffness, mass, known_floor=whole.mass_floor)
+    part = _pencil(stiffness, mass, known_floor=whole.mass_floor, advice=whole.advice)
     return replace(
         part,
         saturation=whole.saturation,
-        advice=whole.advice,
+        origin=whole.origin,
         value_exponent=whole.value_exponent + part.value_exponent,
         vector_exponent=whole.vector_exponent + part.vector_exponent,
     )
 
 
-def as_pencil(stiffness: sp.sparray, mass: sp.sparray) -> Pencil:
+def as_pencil(stiffness: sp.sparray, mass: sp.sparray, advice: Advice = ADVICE) -> Pencil:
     """Make a pencil without scaling, for entries that are already of moderate size.
 
     Raises an InvalidParameterError if B is not positive definite.
     """
-    return _pencil(stiffness, mass, scaled=False)
+    return _pencil(stiffness, mass, scaled=False, advice=advice)
 
 
 def _pencil(
@@ -161,12 +179,13 @@ def _pencil(
     *,
     scaled: bool = True,
     known_floor: float = 0.0,
+    advice: Advice,
 ) -> Pencil:
     up_w, up_b = (_exponent(stiffness), _exponent(mass)) if scaled else (0, 0)
     up_b -= up_b % 2  # an even power, so that its square root is a power of two as well
     stiffness, mass = _scale(stiffness, -up_w), _scale(mass, -up_b)
     diagonal = mass.diagonal()
-    mass_floor = _mass_floor(mass, diagonal, known_floor)
+    mass_floor = _mass_floor(mass, diagonal, known_floor, advice)
     pattern = abs(stiffness) if mass_floor == 1.0 else abs(stiffness) + abs(mass)
     labels = connected_components(pattern, directed=False)[1].astype(np.int64)
     return Pencil(
@@ -178,6 +197,7 @@ def _pencil(
         level=_level(stiffness.diagonal(), diagonal, labels),
         value_exponent=up_w - up_b,
         vector_exponent=-(up_b // 2),
+        advice=advice,
     )
 
 
@@ -254,11 +274,14 @@ def _keys(matrix: sp.csc_array) -> Int[np.ndarray, " e"]:
     return np.repeat(np.arange(n) * n, np.diff(matrix.indptr)) + matrix.indices
 
 
-def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"], known: float) -> float:
+def _mass_floor(
+    mass: sp.csc_array, diagonal: Float[np.ndarray, " n"], known: float, advice: Advice
+) -> float:
     if (mass - sp.diags_array(diagonal)).count_nonzero() == 0:
         return 1.0
-    # Linear elements have c = 1/2. The first of these that holds is used.
-    floors = 0.49 * 0.5 ** np.arange(12)
+    # Linear elements have c = 1/2. The first of these that holds is used; those of badly scaled
+    # bases are small, and farther apart.
+    floors = 0.49 * 0.5 ** np.concatenate([np.arange(12), np.arange(14, 33, 3)])
     if known >= floors[-1]:
         return float(floors[floors <= known].max())
     # B - cD is positive definite exactly when all its pivots are positive.
@@ -269,11 +292,19 @@ def _mass_floor(mass: sp.csc_array, diagonal: Float[np.ndarray, " n"], known: fl
             return floor
     place = int(np.argmax(lower.pivots <= 0)) if lower else 0
     where = (
-        f", {lower.pivots[place]:.3g} at point {pattern.elimination.order[place]}" if lower else ""
+        f", {lower.pivots[place]:.3g} at {advice.row} {pattern.elimination.order[place]}"
+        if lower
+        else ""
     )
     raise InvalidParameterError(
-        f"mass must be positive definite; B - {floor:.1e} diag(B) has a pivot that is not positive{where}."
+        f"{advice.mass} must be positive definite; B - {floor:.1e} diag(B) has a pivot that is not positive{where}."
     )
+
+
+def largest_bound(pencil: Pencil) -> float:
+    """Bound the eigenvalues from above, by W ≤ diag(Σ_j |W_ij|) and B ≥ c D."""
+    ratios = abs(pencil.stiffness).sum(axis=1) / pencil.mass_diagonal
+    return float(ratios.max()) * (1 + 1e-9) / pencil.mass_floor
 
 
 def rayleigh_residuals(

@@ -80,7 +80,7 @@ def factorize_near(pencil: Pencil, shift: float) -> Factor:
             return factor
     raise ConvergenceError(
         "A factor of W - σB must have its pivots on the diagonal, and little rounding; none has near "
-        f"σ = {np.ldexp(shift, pencil.value_exponent):.6g}{pencil.advice.units}. {pencil.advice.rounding}"
+        f"σ = {pencil.place_out(shift):.6g}{pencil.advice.units}. {pencil.advice.rounding}"
     )
 
 

@@ -65,6 +65,8 @@ def walk_on(
         kept, floor = _find_cut(values, factor.shift)
         parts.append(vectors[:, values < floor])
         known = factor.count + kept
+        if known >= k:  # the overlap of this slice holds all that was left
+            return np.hstack(parts), factor
         upper_half = np.sort(values[values < floor])[parts[-1].shape[1] // 2 :]
         spacing = (floor - float(upper_half[0])) / len(upper_half)
         factor = factor_beyond(pencil, floor, spacing, known, next_slice(k, known))

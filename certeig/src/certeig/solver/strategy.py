@@ -87,8 +87,7 @@ def _solve_connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, C
         return _solve_dense(pencil, k, report)
     # Methods, the fastest first. If one does not converge, the next is tried, and the certificate names it.
     methods: list[tuple[str, Solve]] = []
-    filled = pencil.stiffness.nnz >= FILTER_ENTRIES * pencil.n
-    if filled and pencil.mass_floor == 1.0 and k <= ONE_SHIFT_PAIRS:
+    if is_filled(pencil) and pencil.mass_floor == 1.0 and k <= ONE_SHIFT_PAIRS:
         methods.append(("a filter", _solve_filtered))
     if k > ONE_SHIFT_PAIRS:
         methods.append(("slices", partial(_solve_sparse, in_slices=True)))
@@ -109,6 +108,11 @@ def _solve_connected(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, C
     return pairs, replace(certificate, fallbacks=tuple(fallbacks))
 
 
+def is_filled(pencil: Pencil) -> bool:
+    """Return whether W has so many entries that products with it are cheaper than its factors."""
+    return pencil.stiffness.nnz >= FILTER_ENTRIES * pencil.n
+
+
 def dense_serves(pencil: Pencil, k: int) -> bool:
     """Return whether a dense solve is faster than a sparse one for k pairs."""
     return pencil.n <= DENSE_POINTS or (DENSE_SHARE * k > pencil.n and pencil.n <= DENSE_LIMIT)
@@ -116,7 +120,7 @@ def dense_serves(pencil: Pencil, k: int) -> bool:
 
 def _solve_dense(pencil: Pencil, k: int, report: Progress) -> tuple[Pairs, Certificate]:
     require_memory_for_pairs(pencil, k, 32 * pencil.n**2)
-    report(0.1, f"solving {pencil.n} points densely")
+    report(0.1, f"solving {pencil.n} {pencil.advice.row}s densely")
     roots = np.sqrt(pencil.mass_diagonal)
     stiffness = pencil.stiffness.toarray() / np.outer(roots, roots)
     mass = None if pencil.mass_floor == 1.0 else pencil.mass.toarray() / np.outer(roots, roots)
@@ -253,7 +257,7 @@ def require_memory_for_pairs(pencil: Pencil, k: int, factors: int | None = None)
         advice = pencil.advice.pieces.format(n=n_pieces)
     require_memory(
         "A spectrum",
-        f"{k} pairs of {pencil.n} points",
+        f"{k} pairs of {pencil.n} {pencil.advice.row}s",
         {"bases": bases, "factors of their operator": factors},
         advice,
     )

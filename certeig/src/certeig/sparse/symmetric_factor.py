@@ -5,12 +5,14 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from certeig.kit.arrays import record
+from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import (
     SpareMemory,
     free_threads,
     map_in_threads,
     one_blas_thread,
 )
+from certeig.kit.typing import ArrayLike
 from certeig.sparse import front_loops as fronts
 from certeig.sparse.basis_loops import LANES
 from certeig.sparse.blas import blas_routines
@@ -41,13 +43,27 @@ class SymmetricFactor:
     panels: Float[np.ndarray, " e"]
     pivots: Float[np.ndarray, " n"]
 
-    def solve(
-        self, right: Float[np.ndarray, "n b"], scratch: Scratch | None = None
-    ) -> Float[np.ndarray, "n b"]:
-        """Solve A x = right, in the given scratch memory or in new memory.
+    @property
+    def n_negative(self) -> int:
+        """Number of negative pivots, which is that of the negative eigenvalues of L D Lᵀ."""
+        return int(np.count_nonzero(self.pivots < 0))
+
+    def solve(self, right: ArrayLike, scratch: Scratch | None = None) -> Float[np.ndarray, "n *b"]:
+        """Solve A x = right for one right-hand side or for columns, in given scratch memory or in new memory.
 
         Threads share eight right-hand sides; if there are more, each takes eight at a time.
+
+        Raises an InvalidParameterError if `right` does not have n rows of real numbers.
         """
+        right, n = np.asarray(right), len(self.pivots)
+        if right.dtype.kind not in "biuf":
+            raise InvalidParameterError(f"right must be real numbers; the type is {right.dtype}.")
+        if right.ndim not in (1, 2) or len(right) != n:
+            raise InvalidParameterError(
+                f"right must have shape ({n},) or ({n}, b); its shape is {right.shape}."
+            )
+        if right.ndim == 1:
+            return self.solve(right[:, None], scratch)[:, 0]
         solution = np.empty(right.shape)
 
         def solve_part(start: int, memory: Scratch) -> None:

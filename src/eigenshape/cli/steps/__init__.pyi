@@ -12,7 +12,6 @@ from .facts import note_seams as note_seams
 from .facts import shape_facts as shape_facts
 from .indexing import choose_shapes as choose_shapes
 from .indexing import describe_all as describe_all
-from .indexing import find_doubles as find_doubles
 from .indexing import learn_codebook as learn_codebook
 from .indexing import parse_filters as parse_filters
 from .indexing import parse_part as parse_part
@@ -32,6 +31,7 @@ from .reading import load_shape as load_shape
 from .reading import load_surface as load_surface
 from .reading import read_examples as read_examples
 from .reading import read_map as read_map
+from .reading import repair_worn as repair_worn
 from .recipes import index_recipe as index_recipe
 from .recipes import query_recipe as query_recipe
 from .sheets import CAPTION as CAPTION

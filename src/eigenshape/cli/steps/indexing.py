@@ -75,7 +75,7 @@ def worker_processes(
 
 
 def describe_all(
-    shelf: ShapeIndex,
+    index: ShapeIndex,
     items: Sequence[Item],
     recipe: AnyRecipe | None,
     workers: Workers,
@@ -87,10 +87,10 @@ def describe_all(
 
     Without a recipe, an index that has none learns a codebook.
     """
-    learns = recipe is None and not shelf.recipes()
+    learns = recipe is None and not index.recipes()
     with progress_bar("index") as progress:
         report = build_index(
-            shelf,
+            index,
             items,
             read_surface,
             recipes=None if recipe is None else (recipe,),
@@ -101,7 +101,7 @@ def describe_all(
             callback=batch_reporter(progress),
         )
     if learns:
-        comes_along = shelf.default_recipe() == PatchRecipe(default_codebook())
+        comes_along = index.default_recipe() == PatchRecipe(default_codebook())
         err.print(
             "codebook: the one that comes with eigenshape, because there are too few shapes to learn from"
             if comes_along
@@ -114,44 +114,26 @@ def learn_codebook(
     items: Sequence[Item],
     workers: Workers,
     repairs: tuple[str, ...],
-    shelf: ShapeIndex | None = None,
+    index: ShapeIndex | None = None,
 ) -> PatchCodebook:
     """Learn a codebook with a progress bar; `index stats` of an index says how far it is."""
     with progress_bar("codebook") as progress, ExitStack() as stack:
         report: Callback = batch_reporter(progress)
-        if shelf is not None:
-            report = stack.enter_context(announce_learning(shelf.folder, report))
+        if index is not None:
+            report = stack.enter_context(announce_learning(index.folder, report))
         return train_codebook_from_files(
             items, read_surface, repairs=repairs, workers=workers, callback=report
         )
 
 
-def prune(shelf: ShapeIndex, sources: Sequence[Path]) -> list[str]:
+def prune(index: ShapeIndex, sources: Sequence[Path]) -> list[str]:
     """Remove the shapes whose files lay in some folders and are no longer there; name them."""
     folders = [source.absolute() for source in sources if source.is_dir()]
     gone = []
-    for record in shelf.records():
+    for record in index.records():
         path = Path(record.source) if record.source else None
         if path and any(path.is_relative_to(folder) for folder in folders) and not path.exists():
             gone.append(record.name)
     if gone:
-        shelf.remove(*gone)  # in one step: each change of an index waits for the disk
+        index.remove(*gone)  # in one step: each change of an index waits for the disk
     return gone
-
-
-def find_doubles(shelf: ShapeIndex, names: Sequence[str]) -> list[tuple[str, str]]:
-    """Pair each of some shapes with one of another name and the same content, if there is one.
-
-    A folder and one of its own folders name the same files differently, so both are indexed.
-    """
-    added = set(names)
-    records = sorted(shelf.records(), key=lambda record: record.name in added)
-    first: dict[str, str] = {}
-    pairs = []
-    for record in records:
-        if record.digest is None:
-            continue
-        known = first.setdefault(record.digest, record.name)
-        if known != record.name and record.name in added:
-            pairs.append((known, record.name))
-    return pairs

@@ -19,6 +19,8 @@ from eigenshape.geometry.repairs.repair_names import drops_missing
 from eigenshape.geometry.repairs.repair_report import RepairedCloud, RepairedMesh
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.io import shape_files
+from eigenshape.io.attributes import MeshAttributes
+from eigenshape.io.carrying import carry_attributes
 from eigenshape.io.formats.registry import CellKind
 from eigenshape.io.labeled_shapes import (
     find_labeled_shapes,
@@ -40,6 +42,13 @@ def load_surface(path: Path, repairs: str) -> TriangleMesh:
         report += (f"vertices have new numbers, up to {done.mesh.n_vertices - 1:,}",)
     print_repairs(report)
     return done.mesh
+
+
+def repair_worn(mesh: TriangleMesh, worn: MeshAttributes, repairs: str) -> MeshAttributes:
+    """Repair a mesh, print on stderr what was done, and carry its attributes along."""
+    done = repair(mesh, repair_names(repairs))
+    print_repairs(done.report)
+    return carry_attributes(worn, done.mesh)
 
 
 def load_shape(

@@ -16,7 +16,7 @@ from eigenshape.retrieval.patches.descriptor import PatchRecipe
 
 
 def index_recipe(
-    shelf: ShapeIndex, name: str, codebook: Path | None, *, in_parts: bool, n_frames: int | None
+    index: ShapeIndex, name: str, codebook: Path | None, *, in_parts: bool, n_frames: int | None
 ) -> AnyRecipe | None:
     """Return the recipe by which an index describes shapes, or None if it is to learn a codebook."""
     if name != "patches":
@@ -26,10 +26,10 @@ def index_recipe(
                     f"{option} is for --method patches; the method is {name}. Leave one of them out."
                 )
         return PRESETS[name]
-    kept = _patch_recipe(shelf)
+    kept = _patch_recipe(index)
     if kept is not None and n_frames not in (None, kept.n_frames):
         raise InvalidParameterError(
-            f"All shapes of an index are described alike; {shelf.folder} has {kept.n_frames} frames "
+            f"All shapes of an index are described alike; {index.folder} has {kept.n_frames} frames "
             f"a shape. Leave --frames out, or choose another index."
         )
     if codebook is not None:
@@ -50,7 +50,7 @@ def index_recipe(
                 ) from error
         if kept not in (None, asked):
             raise InvalidParameterError(
-                f"An index has one codebook; {shelf.folder} has another one than {codebook}. "
+                f"An index has one codebook; {index.folder} has another one than {codebook}. "
                 "Leave --codebook out, or choose another index."
             )
         return asked
@@ -63,21 +63,21 @@ def index_recipe(
     return kept
 
 
-def query_recipe(shelf: ShapeIndex, name: str | None) -> AnyRecipe:
+def query_recipe(index: ShapeIndex, name: str | None) -> AnyRecipe:
     """Return the recipe of a method by which an index can answer; without a name, its own."""
     if name is None:
-        return shelf.default_recipe()
+        return index.default_recipe()
     if name == "patches":
-        recipe: AnyRecipe | None = _patch_recipe(shelf)
+        recipe: AnyRecipe | None = _patch_recipe(index)
     else:
-        recipe = PRESETS[name] if PRESETS[name] in shelf.recipes() else None
+        recipe = PRESETS[name] if PRESETS[name] in index.recipes() else None
     if recipe is None:
         raise StoreError(
-            f"An index answers by the methods that it was made with; {shelf.folder} has no "
+            f"An index answers by the methods that it was made with; {index.folder} has no "
             f"descriptions by {name}. Run `eigenshape index add` with --method {name} first."
         )
     return recipe
 
 
-def _patch_recipe(shelf: ShapeIndex) -> PatchRecipe | None:
-    return next((recipe for recipe in shelf.recipes() if isinstance(recipe, PatchRecipe)), None)
+def _patch_recipe(index: ShapeIndex) -> PatchRecipe | None:
+    return next((recipe for recipe in index.recipes() if isinstance(recipe, PatchRecipe)), None)

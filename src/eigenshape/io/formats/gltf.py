@@ -357,7 +357,7 @@ def _merge_pieces(pieces: Sequence[Piece]) -> Piece:
 
 def _placements(gltf: Gltf, scene: int | None) -> dict[int, Placement]:
     """Return how each node of a scene shows its mesh."""
-    matrices, hidden = _world_matrices(gltf, scene)
+    matrices, hidden = world_matrices(gltf, scene)
     skins: dict[int, np.ndarray] = {}
     found = {}
     for index, matrix in matrices.items():
@@ -386,8 +386,8 @@ def _placements(gltf: Gltf, scene: int | None) -> dict[int, Placement]:
     return found
 
 
-def _world_matrices(gltf: Gltf, scene: int | None) -> tuple[dict[int, np.ndarray], set[int]]:
-    """Return the matrices of all nodes of a scene, and which of these nodes are hidden."""
+def world_matrices(gltf: Gltf, scene: int | None) -> tuple[dict[int, np.ndarray], set[int]]:
+    """Return the matrices of all nodes of a scene, parents first, and which of these nodes are hidden."""
     nodes = gltf.entries("nodes")
     coarser = _named_nodes(_list(extension(node, LEVELS), "ids") for node in nodes)
     if scene is None:
@@ -408,7 +408,7 @@ def _world_matrices(gltf: Gltf, scene: int | None) -> tuple[dict[int, np.ndarray
         if index in coarser:
             continue
         is_shown &= extension(node, VISIBILITY).get("visible") is not False
-        matrices[index] = above @ _local_matrix(node)
+        matrices[index] = above @ local_matrix(node)
         if not is_shown:
             hidden.add(index)
         waiting.extend(
@@ -460,7 +460,8 @@ def _instances(gltf: Gltf, node: Entry) -> np.ndarray:
     return _compose(*columns)
 
 
-def _local_matrix(node: Entry) -> np.ndarray:
+def local_matrix(node: Entry) -> np.ndarray:
+    """Return the matrix of a node from its coordinates to those of its parent."""
     if "matrix" in node:
         return _numbers(node, "matrix", [0.0] * 16).reshape(4, 4).T  # stored by columns
     return _compose(
@@ -551,8 +552,23 @@ def pose_matrices(
 
     Return also how many vertices have weights that do not sum to 1.
     """
+    joints, weights, n_odd = skin_weights(attributes, read, len(bones))
+    pairs = zip(weights.T, joints.T, strict=True)
+    return sum(weight[:, None, None] * bones[joint] for weight, joint in pairs), n_odd
+
+
+def skin_weights(
+    attributes: Iterable[str], read: Callable[[str], np.ndarray], n_joints: int
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Return the joints of each vertex, their weights with sum 1, and how many sums were others."""
     # Each set has four joints and weights, and the first one must be there.
     sets = sorted({"JOINTS_0", *(name for name in attributes if name.startswith("JOINTS"))})
+    wanted = [name.replace("JOINTS", kind) for name in sets for kind in SKINS]
+    if missing := [name for name in wanted if name not in attributes]:
+        raise FileFormatError(
+            f"A mesh with a skin must have {', '.join(wanted)}; it has no {', '.join(missing)}. "
+            "Without its skin, or bound to its joints again by the program that wrote it, it can be read."
+        )
     joints, weights = (
         np.hstack([read(name.replace("JOINTS", kind)) for name in sets]) for kind in SKINS
     )
@@ -561,14 +577,13 @@ def pose_matrices(
     weights[sums == 0, 0] = 1.0
     weights /= weights.sum(axis=1, keepdims=True)
     joints = np.where(weights != 0, joints, 0).astype(np.int64)
-    bad, places = np.nonzero((joints < 0) | (joints >= len(bones)))
+    bad, places = np.nonzero((joints < 0) | (joints >= n_joints))
     if bad.size:
         raise FileFormatError(
-            f"Joints of vertices must be within 0..{len(bones) - 1}; vertex {bad[0]} has joint "
+            f"Joints of vertices must be within 0..{n_joints - 1}; vertex {bad[0]} has joint "
             f"{joints[bad[0], places[0]]}."
         )
-    pairs = zip(weights.T, joints.T, strict=True)
-    return sum(weight[:, None, None] * bones[joint] for weight, joint in pairs), n_odd
+    return joints, weights, n_odd
 
 
 def transform_points(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:

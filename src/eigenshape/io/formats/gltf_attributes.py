@@ -3,8 +3,9 @@
 import copy
 import json
 import mimetypes
+import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,10 +29,8 @@ from eigenshape.io.carrying import interpolate
 from eigenshape.io.formats.gltf import (
     COMPRESSIONS,
     INSTANCES,
-    KINDS,
     LEVELS,
     SURFACES,
-    WIDTHS,
     Column,
     Entry,
     Gltf,
@@ -42,7 +41,6 @@ from eigenshape.io.formats.gltf import (
     extension,
     families,
     member,
-    pack,
     place_triangles,
     pose_matrices,
     raw_accessor,
@@ -53,12 +51,12 @@ from eigenshape.io.formats.gltf import (
     turn_back,
     view_of,
 )
+from eigenshape.io.formats.gltf_document import Columns, Document
+from eigenshape.io.formats.gltf_fit import fit_scene
 from eigenshape.io.formats.rounding import rounding_loss
 from eigenshape.io.formats.stl import single_precision
 from eigenshape.io.opening import SourceFile
 
-COMPONENTS = {kind[-2:]: number for number, kind in KINDS.items()}
-TYPES = {width: name for name, width in WIDTHS.items()}
 # What a document may hold besides a scene with materials.
 EXTRAS = ("skins", "animations", "cameras", "extensions")
 TANGENTS = "tangents, which viewers compute anew"
@@ -75,7 +73,6 @@ OF_GEOMETRY = {
 # A shape that lies this many times its size from the origin is written about its own middle: three
 # of the 24 binary digits of single precision are worth a node that is moved.
 FAR = 8
-Columns = dict[str, Column]
 
 
 def read_attributes(source: SourceFile, mesh: TriangleMesh) -> MeshAttributes:
@@ -229,84 +226,20 @@ def _others(gltf: Gltf) -> tuple[str, ...]:
     return tuple(names)
 
 
-class _Document:
-    """A glTF tree and the contents of its views, to which accessors are added."""
-
-    def __init__(self, tree: Entry, contents: Iterable[bytes | memoryview] = ()) -> None:
-        self.tree, self.contents = tree, list(contents)
-
-    def add_view(self, data: bytes, **entry: Any) -> int:
-        self.contents.append(data)
-        self.tree.setdefault("bufferViews", []).append(entry)
-        return len(self.contents) - 1
-
-    def add_accessor(self, rows: np.ndarray, view: int, **entry: Any) -> int:
-        accessors: list[Any] = self.tree.setdefault("accessors", [])
-        kind = {"componentType": COMPONENTS[rows.dtype.str[1:]], "type": TYPES[rows.shape[1]]}
-        accessors.append({"bufferView": view, "count": len(rows), **kind, **entry})
-        return len(accessors) - 1
-
-    def add_columns(self, columns: Columns) -> dict[str, int]:
-        """Add columns, and return their accessors by name."""
-        found = {}
-        for name, (values, is_normalized) in columns.items():
-            rows = np.ascontiguousarray(values)
-            octets = rows.view(np.uint8).reshape(len(rows), -1)
-            # Rows of attributes begin at multiples of four bytes.
-            padded = np.pad(octets, ((0, 0), (0, -octets.shape[1] % 4)))
-            view = self.add_view(padded.tobytes(), byteStride=padded.shape[1], target=34962)
-            facts: Entry = {"normalized": True} if is_normalized else {}
-            if name == "POSITION":
-                facts |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
-            found[name] = self.add_accessor(rows, view, **facts)
-        return found
-
-    def add_indices(self, indices: np.ndarray, n_vertices: int) -> int:
-        rows = indices.astype("<u2" if n_vertices < 2**16 - 1 else "<u4").reshape(-1, 1)
-        return self.add_accessor(rows, self.add_view(rows.tobytes(), target=34963))
-
-    def pack(self) -> bytes:
-        """Write the document, without views that nothing uses."""
-        users = list(_view_users(self.tree))
-        views: list[Entry] = []
-        places = {}
-        binary = bytearray()
-        for index in sorted({user["bufferView"] for user in users}):
-            data = self.contents[index]
-            places[index] = len(views)
-            place = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(data)}
-            views.append({**self.tree["bufferViews"][index], **place})
-            binary += data
-            binary += b"\0" * (-len(binary) % 4)
-        for user in users:
-            user["bufferView"] = places[user["bufferView"]]
-        self.tree |= {"bufferViews": views, "buffers": [{"byteLength": len(binary)}]}
-        return pack(self.tree, bytes(binary))
-
-
-def _view_users(value: Any) -> Iterator[Entry]:
-    """Give all objects of a tree that name a view; extensions do so by the same key."""
-    if isinstance(value, dict):
-        if type(value.get("bufferView")) is int:
-            yield value
-        value = list(value.values())
-    if isinstance(value, list):
-        for part in value:
-            yield from _view_users(part)
-
-
 def write(job: WriteJob) -> dict[Path, bytes]:
     """Write a GLB file: that of the source with other positions and triangles, or a new one."""
     source = job.attributes.source
     if source and source.suffix in (".glb", ".gltf"):
         return {job.path: _rewrite(source, job)}
-    job.lose(["fields"])
+    fields = job.attributes.fields.values()
+    all_fit = all(_is_column(values, job.attributes.mesh) for values in fields)
+    job.lose([] if all_fit else ["fields"])
     places, offset = _local_places(job.mesh)
     job.lost.extend(rounding_loss(job.mesh, (places + offset)[job.mesh.faces]))
     return {job.path: write_new(job.attributes, job.mesh)}
 
 
-def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
+def _rewrite(source: SourceFile, job: WriteJob) -> bytes:  # noqa: PLR0915 - a file from top to bottom
     """Write a glTF file again as GLB with other positions and triangles, and name what is lost.
 
     Everything else in the file stays as it is: nodes, materials, images, skins, animations and
@@ -321,6 +254,9 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     places = mesh.vertices[mesh.faces]
     found = np.zeros_like(places)  # where the written file puts the corners
     normals = corner_normals(attributes, mesh)
+    fit = None
+    if attributes.places is not None:
+        fit = fit_scene(document, gltf, scene, attributes, mesh)
     written: dict[int, list[Entry]] = {}
     for node, place in scene.placements.items():
         primitives = gltf.entry("meshes", place.mesh)["primitives"]
@@ -331,25 +267,27 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
             if not chosen.size:
                 continue
             # The rows of the file that the corners come from, and what each gives to each corner
-            blends = attributes.corners[(3 * chosen[:, None] + [0, 1, 2]).ravel()]
+            corners = (3 * chosen[:, None] + [0, 1, 2]).ravel()
+            vertices = mesh.faces[chosen].ravel()
+            blends = attributes.corners[corners]
             used, inverse = np.unique(blends.indices, return_inverse=True)
             rows = file_rows[used]
             blends = csr_array((blends.data, inverse.ravel(), blends.indptr))
             columns = _carry_columns(gltf, shared, rows, blends)
             old = decode(*columns[0].pop("POSITION"))
             normal = np.empty((blends.shape[0], 0))
-            if normals is not None and "NORMAL" in shared["attributes"]:
+            if normals is not None and ("NORMAL" in shared["attributes"] or fit):
                 normal = normals[chosen].reshape(-1, 3)
+            shown = fit.fit_columns(gltf, node, columns, corners, vertices) if fit else place
+            columns[0] |= field_columns(attributes, vertices)
             # Corners of the file agree if their rows do, others if all their values do.
             keys = [rows[blends.indices]]
             if blends.nnz > 3 * len(chosen):
                 keys = [values for table in columns for values, _ in table.values()]
-            first, indices = _split_corners(
-                [mesh.faces[chosen].ravel(), *keys, np.rint(normal * 1e5)]
-            )
+            first, indices = _split_corners([vertices, *keys, np.rint(normal * 1e5)])
             columns = [_choose_rows(table, first) for table in columns]
             wanted = places[chosen].reshape(-1, 3)[first]
-            turned, put = _place_vertices(place, columns, old[first], wanted, normal[first])
+            turned, put = _place_vertices(shown, columns, old[first], wanted, normal[first])
             triangles = indices.reshape(-1, 3)
             found[chosen] = put[triangles]
             triangles = turn_back(triangles, turned)  # as the reader does
@@ -369,6 +307,21 @@ def _rewrite(source: SourceFile, job: WriteJob) -> bytes:
     _replace_meshes(document.tree, written)
     job.lost.extend(_drop_extensions(document.tree, written))
     return document.pack()
+
+
+def field_columns(attributes: MeshAttributes, vertices: np.ndarray) -> Columns:
+    """Return functions on vertices as attributes of corners; other programs find them by these names."""
+    found: Columns = {}
+    for name, values in attributes.fields.items():
+        if _is_column(values, attributes.mesh):
+            rows = values[vertices].reshape(len(vertices), -1).astype("<f4")
+            found["_" + re.sub(r"\W", "_", name, flags=re.ASCII).upper()] = rows, False
+    return found
+
+
+def _is_column(values: np.ndarray, mesh: TriangleMesh) -> bool:
+    """Return whether an attribute of vertices can hold a field: up to four numbers for each."""
+    return len(values) == mesh.n_vertices and values.size <= 4 * len(values)
 
 
 def _choose_rows(columns: Columns, chosen: np.ndarray) -> Columns:
@@ -464,11 +417,11 @@ def _blend(gltf: Gltf, index: int, name: str, rows: np.ndarray, blends: csr_arra
     return interpolate(blends, values, blend=not is_chosen), is_normalized
 
 
-def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> _Document:
+def _copy_document(gltf: Gltf, source: SourceFile, lost: list[str]) -> Document:
     """Copy a tree, with the contents of its views, and images of other files as views."""
     tree = copy.deepcopy(gltf.tree)
     count = len(tree.get("bufferViews", []))
-    document = _Document(tree, [view_of(gltf, index)[0] for index in range(count)])
+    document = Document(tree, [view_of(gltf, index)[0] for index in range(count)])
     for entry in tree.get("images", []):
         uri = str(entry.get("uri", "data:"))
         if uri.startswith("data:"):
@@ -514,7 +467,7 @@ def _accessors_of(meshes: list[Entry]) -> set[int]:
 
 def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
     """Write a GLB file with a node for each group and a primitive for each of its materials."""
-    document = _Document({"asset": {"version": "2.0", "generator": "eigenshape"}, "scene": 0})
+    document = Document({"asset": {"version": "2.0", "generator": "eigenshape"}, "scene": 0})
     nodes: list[Entry] = []
     meshes: list[Entry] = []
     places, offset = _local_places(mesh)
@@ -539,16 +492,15 @@ def write_new(attributes: MeshAttributes, mesh: TriangleMesh) -> bytes:
             for name, table in tables.items()
         }
         if not tables and len(groups) == 1:  # vertices keep their order, also those without a face
-            first, indices, positions = np.arange(mesh.n_vertices), corners, places
+            first = vertices = np.arange(mesh.n_vertices)
+            indices = corners
         else:
             first, indices = _split_corners([corners, *rows.values()])
-            positions = places[corners]
-        columns = document.add_columns(
-            {
-                name: (values[first], False)
-                for name, values in {"POSITION": positions, **rows}.items()
-            }
-        )
+            vertices = corners[first]
+        table: Columns = {"POSITION": (places[vertices], False)}
+        table |= {name: (values[first], False) for name, values in rows.items()}
+        table |= field_columns(attributes, vertices)
+        columns = document.add_columns(table)
         materials = attributes.face_materials[in_group]
         primitives: list[Entry] = []
         for material in np.unique(materials).tolist():
@@ -577,7 +529,7 @@ def _local_places(
     return (mesh.vertices - middle).astype(np.float32), middle
 
 
-def _write_material(document: _Document, material: Material) -> Entry:
+def _write_material(document: Document, material: Material) -> Entry:
     *tint, alpha = material.color
     color = [*linear_colors(np.array(tint)).tolist(), alpha]
     pbr: Entry = {"baseColorFactor": color, "metallicFactor": 0.0}

@@ -54,7 +54,7 @@ class Format:
         - "cloud": `format_points(points, suffix)` writes points.
         - "attributes": the file holds more than positions and faces. The module whose name ends in
           ``_attributes`` has `read_attributes(source, mesh)`, and `write(job)`, which returns the
-          files to write.
+          files to write. For the other formats with fields, `field_attributes` has them.
         - "fields": `parse_fields(data)` returns the functions on points, those on the simplices that
           are read, and notes, as `parse` does;
           `format_fields(mesh, of_points, of_cells)` writes them with the mesh.
@@ -76,9 +76,17 @@ class Format:
     module: str
     traits: tuple[Trait, ...]
 
-    def load(self, ending: str = "") -> Any:
-        """Return the module, or the one that goes with it, such as ``ply_attributes``."""
-        return import_module(f"eigenshape.io.formats.{self.module}{ending}")
+    def load(self) -> Any:
+        """Return the module."""
+        return import_module(f"eigenshape.io.formats.{self.module}")
+
+    def load_attributes(self) -> Any:
+        """Return the module that reads and writes what is beside a mesh; None if nothing can be."""
+        if "attributes" in self.traits:
+            return import_module(f"eigenshape.io.formats.{self.module}_attributes")
+        if "fields" in self.traits:
+            return import_module("eigenshape.io.formats.field_attributes")
+        return None
 
 
 FORMATS = (

@@ -2,7 +2,7 @@
 
 import os
 import socket
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -33,7 +33,7 @@ from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_to_store
 from eigenshape.retrieval.patches.codebook import PatchCodebook, default_codebook
 from eigenshape.retrieval.patches.descriptor import PatchRecipe, patch_descriptor
 from eigenshape.retrieval.patches.patches import N_VIEWS as N_PATCH_VIEWS
-from eigenshape.retrieval.patches.patches import extract_patches
+from eigenshape.retrieval.patches.patches import mesh_patches
 from eigenshape.retrieval.patches.training import train_codebook
 from eigenshape.retrieval.store.upkeep import find_damaged
 from eigenshape.retrieval.store.writing import DescribedShape
@@ -182,7 +182,7 @@ def build_index(  # noqa: PLR0913 - one keyword for each choice of a batch
         require_each(recipes, AnyRecipe, "recipes")
     if learn and recipes is not None:
         raise InvalidParameterError(
-            "An index either learns a codebook or is given recipes; both were asked for. "
+            "An index either learns a codebook or is given recipes; both were given. "
             "Pass learn=False."
         )
     views = None if n_views is None else view_number(n_views, "n_views")
@@ -303,7 +303,7 @@ def _read_teachers(
     if len(items) < FEWEST_TO_TRAIN:
         return {}
     chosen = sorted(items, key=lambda item: sha256(item.name.encode()).digest())[:MOST_TO_TRAIN]
-    extract = partial(extract_patches, n_views=max(n_views, N_TRAINING_VIEWS))
+    extract = partial(mesh_patches, n_views=max(n_views, N_TRAINING_VIEWS))
     work = partial(_read_file, read, extract)
     found = {}
     with closing(run_in_workers(work, chosen, workers)) as outcomes:
@@ -384,19 +384,24 @@ def _describe(
 
 
 def _shape(item: Item, file: _ReadFile) -> DescribedShape:
-    attributes = dict(item.attributes)
-    if file.repairs:
-        attributes[REPAIRS] = "; ".join(file.repairs)
+    done = {REPAIRS: "; ".join(file.repairs)} if file.repairs else {}
     return DescribedShape(
         item.name,
         file.found,
-        label=item.label,
-        source=str(item.path.absolute()),
         digest=file.digest,
-        tags=item.tags,
-        attributes=attributes,
         thumbnail=file.thumbnail,
+        **_facts_of(item, done),
     )
+
+
+def _facts_of(item: Item, repairs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what an index keeps of an item, with the attribute of what was repaired, if it was."""
+    return {
+        "label": item.label,
+        "source": str(item.path.absolute()),
+        "tags": tuple(sorted(set(item.tags))),
+        "attributes": {**item.attributes, **repairs},
+    }
 
 
 class _Writer:
@@ -453,16 +458,8 @@ def _update_known(
             todo.append(item)
             continue
         record = known[item.name]
-        attributes = dict(item.attributes)
-        if REPAIRS in record.attributes:
-            attributes[REPAIRS] = record.attributes[REPAIRS]
-        new = replace(
-            record,
-            label=item.label,
-            source=str(item.path.absolute()),
-            tags=tuple(sorted(set(item.tags))),
-            attributes=attributes,
-        )
+        done = {key: text for key, text in record.attributes.items() if key == REPAIRS}
+        new = replace(record, **_facts_of(item, done))
         if new != record:
             changed.append(new)
     if changed:  # a change takes the lock of the index, also one of nothing

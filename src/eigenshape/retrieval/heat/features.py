@@ -196,6 +196,17 @@ def find_heat_features(
     mesh = as_mesh(mesh)
     require_type(recipe, HeatRecipe, "recipe")
     height = None if values is None else vertex_values(values, "values", mesh.n_vertices)
+    return heat_features(mesh, recipe, height, accuracy, progress)
+
+
+def heat_features(
+    mesh: TriangleMesh,
+    recipe: HeatRecipe,
+    height: Float[np.ndarray, " n"] | None = None,
+    accuracy: float | None = None,
+    progress: Progress | None = None,
+) -> HeatFeatures:
+    """Find the features of a mesh, as `find_heat_features` does."""
     require_describable(mesh)
     if recipe.unit == "box":
         mesh = normalize_mesh(mesh, "box")
@@ -263,7 +274,7 @@ def describe_views(mesh: TriangleMesh, recipe: HeatRecipe, n_views: int) -> list
 
 
 def _describe_view(recipe: HeatRecipe, part: MeshPart) -> HeatDescriptor:
-    descriptor = find_heat_features(part.mesh, recipe).descriptor
+    descriptor = heat_features(part.mesh, recipe).descriptor
     return replace(descriptor, vertices=part.source_vertices[descriptor.vertices])
 
 
@@ -272,7 +283,7 @@ def find_view_features(
 ) -> tuple[MeshPart, HeatFeatures]:
     """Return what one of the viewpoints of `describe_views` sees, and its features."""
     part = view_of(mesh, view)
-    return part, find_heat_features(part.mesh, recipe)
+    return part, heat_features(part.mesh, recipe)
 
 
 def _approximate_heat(

@@ -255,8 +255,8 @@ def _best_start(first: PatchPoints, second: PatchPoints) -> _Matches:
     """Match by patches alone, at the relative size at which most agrees."""
     if first.numbers.shape[1:] != second.numbers.shape[1:]:
         raise InvalidParameterError(
-            f"Only points by one codebook match; those of the first have {first.numbers.shape[1:]} "
-            f"numbers each, those of the second {second.numbers.shape[1:]}."
+            f"Only points by one codebook match; the points of the first have {first.numbers.shape[1:]} "
+            f"numbers each, the points of the second {second.numbers.shape[1:]}."
         )
     starts = [
         _consistent(first, second, squared_distances(first, second, step), step) for step in STEPS

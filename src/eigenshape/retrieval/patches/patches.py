@@ -82,7 +82,6 @@ class Patches(ReadOnly):
     distances: Float32[np.ndarray, "m m"]
 
 
-@one_blas_thread()
 def extract_patches(
     mesh: MeshLike,
     *,
@@ -144,21 +143,37 @@ def extract_patches(
     >>> whole.numbers.shape
     (20, 9, 64)
     """
-    mesh = as_mesh(mesh)
-    count = whole_number(n_samples, "n_samples", 1)
-    n_viewpoints = view_number(n_views, "n_views")
-    n_shots = view_number(n_frames, "n_frames")
+    return mesh_patches(
+        as_mesh(mesh),
+        n_samples=whole_number(n_samples, "n_samples", 1),
+        n_views=view_number(n_views, "n_views"),
+        n_frames=view_number(n_frames, "n_frames"),
+        clean=clean,
+    )
+
+
+@one_blas_thread()
+def mesh_patches(
+    mesh: TriangleMesh,
+    *,
+    n_samples: int = N_SAMPLES,
+    n_views: int = N_VIEWS,
+    n_frames: int = 0,
+    clean: bool = True,
+) -> list[Patches]:
+    """Describe the discs of a mesh and of its views, as `extract_patches` does."""
     require_describable(mesh)
     whole = np.arange(mesh.n_vertices)
     if mesh.n_vertices > MOST_VERTICES:
         mesh, whole = thin_out(mesh, MOST_VERTICES)
     if clean:
         mesh = denoise(orient_outward(mesh))
-    jobs = [lambda: surface_patches(mesh, n_samples=count)]
+    jobs = [lambda: surface_patches(mesh, n_samples=n_samples)]
     if is_closed(mesh):
-        jobs += [partial(_view_patches, mesh, number, count) for number in range(n_viewpoints)]
+        jobs += [partial(_view_patches, mesh, number, n_samples) for number in range(n_views)]
         jobs += [
-            partial(_frame_patches, mesh, number, count, clean=clean) for number in range(n_shots)
+            partial(_frame_patches, mesh, number, n_samples, clean=clean)
+            for number in range(n_frames)
         ]
     found = map_in_threads(lambda job: job(), jobs)
     return [replace(each, vertices=whole[each.vertices]) for each in found]

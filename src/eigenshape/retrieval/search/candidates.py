@@ -11,6 +11,7 @@ from certeig.kit.arrays import record
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor
 from eigenshape.retrieval.patches.distance import scale_distances
 from eigenshape.retrieval.search.coarse import CoarseRows
+from eigenshape.retrieval.search.options import QueryOptions
 
 # Below this number of shapes all are compared: it takes 30 ms, and a file of coarse rows would
 # hardly be faster.
@@ -47,14 +48,12 @@ class Candidates:
     n_shapes: int
 
 
-def choose_candidates(  # noqa: PLR0913 - what is searched, and the choices of a query
+def choose_candidates(
     query: PatchDescriptor,
     coarse: Callable[[], CoarseRows],
     allowed: Bool[np.ndarray, " n"],
     isolations: Float[np.ndarray, " n"],
-    *,
-    n_matches: int,
-    exact: bool = False,
+    options: QueryOptions,
     supplier: Supplier | None = None,
 ) -> Candidates:
     """Choose the shapes that are compared exactly with a query.
@@ -68,10 +67,8 @@ def choose_candidates(  # noqa: PLR0913 - what is searched, and the choices of a
         Which shapes may be found.
     isolations : (n,) float
         By which scores are scaled.
-    n_matches : int
-        Shapes that are wanted.
-    exact : bool
-        Whether to compare all of them.
+    options : QueryOptions
+        How many shapes are wanted, and whether all are compared.
     supplier : callable, optional
         Return the places of so many shapes that may be near, in place of the coarse scan.
 
@@ -80,8 +77,8 @@ def choose_candidates(  # noqa: PLR0913 - what is searched, and the choices of a
     Candidates
     """
     places = np.flatnonzero(allowed)
-    wanted = n_compared(len(allowed), n_matches)
-    if exact or len(places) <= max(FEWEST_TO_SCAN, wanted):
+    wanted = n_compared(len(allowed), int(options.n_matches))
+    if options.exact or len(places) <= max(FEWEST_TO_SCAN, wanted):
         return Candidates(places, "exact", len(places))
     if supplier is not None:
         supplied = np.unique(supplier(query.codes[0], wanted))

@@ -7,17 +7,16 @@ from threading import RLock
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from certeig.kit.arguments import describe_value, require_type
-from certeig.kit.arrays import whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import html_repr
 from certeig.kit.typing import Integer
 from eigenshape._errors import StoreError
 from eigenshape._sealed import is_log_long
-from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe
+from eigenshape.geometry.conversion import MeshLike
+from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, describe_query
 from eigenshape.retrieval.patches.descriptor import PatchDescriptor, PatchRecipe
 from eigenshape.retrieval.patches.distance import USUAL_ISOLATION
 from eigenshape.retrieval.search.candidates import (
@@ -29,10 +28,10 @@ from eigenshape.retrieval.search.candidates import (
 from eigenshape.retrieval.search.coarse import CoarseRows, coarse_rows, stored_isolations
 from eigenshape.retrieval.search.engines import Engine, supply_from
 from eigenshape.retrieval.search.matches import Matches
+from eigenshape.retrieval.search.options import QueryOptions
 from eigenshape.retrieval.search.scoring import search_candidates
 from eigenshape.retrieval.store.damage import warn_of_damage
 from eigenshape.retrieval.store.database import DATABASE
-from eigenshape.retrieval.store.filters import choose_shapes
 from eigenshape.retrieval.store.state import DamagedEntryError, IndexState, Snapshot, read_state
 
 # Return an engine that holds the vectors of all shapes, as `FaissEngine` does.
@@ -97,7 +96,9 @@ class IndexReader:
         """Return the state that queries see now."""
         state = self._state
         if state is None:
-            raise StoreError("A reader must be open to be asked; it was closed. Open another one.")
+            raise StoreError(
+                "A reader must be open to be queried; it was closed. Open another one."
+            )
         return state
 
     def close(self) -> None:
@@ -185,76 +186,31 @@ class IndexReader:
         InvalidShapeError, InvalidParameterError, StoreError
             As `ShapeIndex.query`.
         """
-        wanted = whole_number(n_matches, "n_matches", 1, 2**31)
-        state = self.state
-        # Before a mesh is described, which takes seconds
-        chosen = choose_shapes(state, where)
-        left_out = -1
-        if without is not None:
-            facts = state.find(without)
-            if facts is None:
-                raise InvalidParameterError(
-                    f"without must be the name of a shape of the index; {without!r} is none. "
-                    "`records` lists them."
-                )
-            left_out = facts.id
-        if isinstance(shape, Descriptor):
-            descriptor = shape
-        else:
-            recipe = choose_recipe(list(state.recipes.values()))
-            descriptor = describe(as_mesh(shape, "shape"), recipe)
-        return self.search(state, descriptor, wanted, chosen, left_out=left_out, exact=exact)
+        return self.ask(shape, QueryOptions(n_matches, where, without, exact))
 
-    def search(  # noqa: PLR0913 - the choices of a query, each of which has a default
-        self,
-        state: IndexState,
-        descriptor: Descriptor,
-        n_matches: int,
-        chosen: Int[np.ndarray, " k"] | None = None,
-        *,
-        left_out: int = -1,
-        exact: bool = False,
-        is_scaled: bool = True,
+    def ask(
+        self, shape: MeshLike | Descriptor, options: QueryOptions, state: IndexState | None = None
     ) -> Matches:
-        """Search one state for a descriptor.
-
-        Parameters
-        ----------
-        state : IndexState
-        descriptor : HeatDescriptor or PatchDescriptor
-        n_matches : int
-        chosen : (k,) int, optional
-            Numbers of the shapes that may be found; by default all.
-        left_out : int
-            Number of a shape that is not.
-        exact : bool
-            Whether all are compared.
-        is_scaled : bool
-            Whether scores are corrected for hubness; otherwise they depend on the two
-            shapes alone.
-
-        Returns
-        -------
-        Matches
-        """
+        """Find the shapes that are most similar, as `query` does, in the latest state by default."""
+        if state is None:
+            state = self.state
+        choice = options.choose(state)  # before a mesh is described, which takes seconds
+        recipe = choose_recipe(list(state.recipes.values()))
+        descriptor = describe_query(shape, recipe)
         while True:  # again without what turns out to be damaged
             try:
                 scan = self._scan(state, descriptor.recipe)
                 snapshot = scan.snapshot
-                allowed = np.ones(snapshot.n_shapes, dtype=bool)
-                if chosen is not None:
-                    allowed = np.isin(snapshot.shape_of, chosen)
-                if left_out >= 0:
-                    allowed &= snapshot.shape_of != left_out
-                isolations = (
-                    scan.isolations() if is_scaled else np.full(snapshot.n_shapes, USUAL_ISOLATION)
-                )
+                allowed = choice.allowed(snapshot.shape_of)
+                isolations = np.full(snapshot.n_shapes, USUAL_ISOLATION)
+                if options.is_scaled:
+                    isolations = scan.isolations()
                 places = np.flatnonzero(allowed)
                 candidates = Candidates(places, "exact", len(places))
                 if isinstance(descriptor, PatchDescriptor):  # by heat all are compared
                     supplier = None
                     is_large = snapshot.n_shapes > FEWEST_TO_SCAN
-                    if self._engine is not None and is_large and not exact:
+                    if self._engine is not None and is_large and not options.exact:
                         scan.coarse(descriptor.recipe)  # which makes the engine at the first query
                         supplier = scan.supplier
                     candidates = choose_candidates(
@@ -262,11 +218,12 @@ class IndexReader:
                         partial(scan.coarse, descriptor.recipe),
                         allowed,
                         isolations,
-                        n_matches=n_matches,
-                        exact=exact,
-                        supplier=supplier,
+                        options,
+                        supplier,
                     )
-                return search_candidates(snapshot, descriptor, candidates, n_matches, isolations)
+                return search_candidates(
+                    snapshot, descriptor, candidates, int(options.n_matches), isolations
+                )
             except DamagedEntryError as err:  # the rest is served
                 warn_of_damage(str(state.folder), err.damages)
                 state.leave_out(err.ids)

@@ -11,19 +11,18 @@ from typing import Any
 import numpy as np
 
 from certeig.kit.arguments import require_type
-from certeig.kit.arrays import whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.files import as_path
 from certeig.kit.typing import Integer
 from eigenshape._typing import IndexLike
-from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.retrieval.kinds import Descriptor, describe
+from eigenshape.geometry.conversion import MeshLike
+from eigenshape.retrieval.kinds import Descriptor, describe_query
 from eigenshape.retrieval.patches.verification import N_VERIFIED
 from eigenshape.retrieval.search.chances import chances
 from eigenshape.retrieval.search.matches import Matches
+from eigenshape.retrieval.search.options import MOST_MATCHES, QueryOptions
 from eigenshape.retrieval.search.reader import IndexReader
 from eigenshape.retrieval.store.database import DATABASE
-from eigenshape.retrieval.store.filters import choose_shapes
 
 MOST_OPEN = 256  # readers that a process keeps open between queries
 
@@ -91,7 +90,8 @@ def query_indexes(
     ['fish', 'bird']
     """
     require_type(executor, Executor | None, "executor")
-    wanted = whole_number(n_matches, "n_matches", 1, 2**30)
+    # One of several indexes need not have each attribute.
+    options = QueryOptions(n_matches, where, exact=exact, must_know=False)
     if not isinstance(folders, Iterable) or isinstance(folders, str | PathLike):
         raise InvalidParameterError(
             f"folders takes a list of indexes; it was given one: {str(folders)!r}. Put it into a list."
@@ -106,14 +106,10 @@ def query_indexes(
                 f"folders must differ, or each match would come twice; folders[{number}] is {path}, "
                 f"as folders[{paths.index(path)}] is. Leave it out."
             )
-    if isinstance(shape, Descriptor):
-        descriptor = shape
-    else:
-        recipe = _open_reader(paths[0]).default_recipe()
-        descriptor = describe(as_mesh(shape, "shape"), recipe)
-    ask = partial(
-        _ask, descriptor=descriptor, n_matches=wanted + N_VERIFIED, where=where, exact=exact
-    )
+    descriptor = describe_query(shape, _open_reader(paths[0]).default_recipe())
+    wanted = int(n_matches)
+    more = replace(options, n_matches=min(wanted + N_VERIFIED, MOST_MATCHES))
+    ask = partial(_ask, descriptor=descriptor, options=more)
     answers = list(map(ask, paths) if executor is None else executor.map(ask, paths))
     # Each index has matched the points of its own thirty nearest shapes. Here those count that are
     # among the thirty nearest of all, as they would in one index; the others keep the distance of
@@ -136,20 +132,10 @@ def query_indexes(
     )
 
 
-def _ask(
-    folder: Path,
-    *,
-    descriptor: Descriptor,
-    n_matches: int,
-    where: Mapping[str, Any] | None,
-    exact: bool,
-) -> Matches:
+def _ask(folder: Path, *, descriptor: Descriptor, options: QueryOptions) -> Matches:
     reader = _open_reader(folder)
     reader.refresh()
-    # One of several indexes need not have each attribute.
-    state = reader.state
-    chosen = choose_shapes(state, where, must_know=False)
-    return reader.search(state, descriptor, n_matches, chosen, exact=exact)
+    return reader.ask(descriptor, options)
 
 
 def _open_reader(folder: Path) -> IndexReader:

@@ -5,23 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from certeig.kit.text import Shown, printable
+from eigenshape._sealed import StoreWarning
 
+__all__ = ["Damage", "StoreWarning", "warn_of_damage"]  # the warning for the room, as it is
 MOST_NAMED = 3  # damages that a warning names; `ShapeIndex.verify` lists all
-
-
-class StoreWarning(UserWarning):
-    """A part of an index on disk is damaged; the rest is served.
-
-    See Also
-    --------
-    ShapeIndex.verify : List all damage.
-
-    Examples
-    --------
-    >>> import eigenshape as es
-    >>> issubclass(es.retrieval.StoreWarning, UserWarning)
-    True
-    """
 
 
 @dataclass(frozen=True)

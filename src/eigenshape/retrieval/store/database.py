@@ -4,7 +4,6 @@ import sqlite3
 from contextlib import AbstractContextManager, suppress
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Int64
@@ -67,24 +66,6 @@ PRIME, FACTOR = (
     2**31 - 1,
     1_000_003,
 )  # of checksums of integers, which NumPy makes of all rows at once
-
-
-class Facts(NamedTuple):
-    """A row of `shape`; tags and attributes are JSON.
-
-    By the numbers of its descriptors and pictures, of which there is one or none, it is noticed if a
-    row of these is lost.
-    """
-
-    id: int
-    name: str
-    label: str | None
-    source: str | None
-    digest: str | None
-    tags: str
-    attributes: str
-    n_descriptors: int
-    n_pictures: int
 
 
 def integer_checksums(rows: Int64[np.ndarray, "k c"]) -> Int64[np.ndarray, " k"]:

@@ -9,9 +9,9 @@ from jaxtyping import Int
 
 from certeig.kit.arguments import require_each, require_type
 from certeig.kit.errors import InvalidParameterError
-from eigenshape.retrieval.store.state import IndexState, tags_and_attributes
+from eigenshape.retrieval.store.facts import RESERVED
+from eigenshape.retrieval.store.state import IndexState
 
-RESERVED = ("label", "tag")  # keys of a filter that are no attributes; their values are texts
 RANGE = ".."  # between the least and the largest number of a filter as text
 NOT = "!="  # after a key: shapes that do not meet the condition
 
@@ -108,7 +108,7 @@ def choose_shapes(
         return chosen
     found, known = [], set(RESERVED)
     for facts in state.every():
-        tags, attributes = tags_and_attributes(facts)
+        tags, attributes = facts.tags_and_attributes()
         known |= attributes.keys()
         for key, wanted, test in tests:
             values = tags if key == "tag" else [attributes[key]] if key in attributes else []

@@ -1,6 +1,5 @@
 """One state of an index: a transaction that is held, and the integers of all descriptors in arrays."""
 
-import json
 import sqlite3
 import weakref
 from collections.abc import Iterator, Sequence
@@ -32,7 +31,6 @@ from eigenshape.retrieval.store.database import (
     DATABASE,
     INDEX,
     INTEGERS,
-    Facts,
     integer_checksums,
     lost_changes,
     open_to_read,
@@ -40,6 +38,7 @@ from eigenshape.retrieval.store.database import (
     read_recipes,
     read_seals,
 )
+from eigenshape.retrieval.store.facts import ShapeRow
 
 SHAPES_AT_ONCE = 20_000  # whose facts are in memory at a time: 10 MB
 DESCRIPTOR = ", ".join((*INTEGERS[1:], "checksum", "rows", "details"))
@@ -62,14 +61,9 @@ class StoredDescriptor(NamedTuple):
 
 
 class StoredShape(NamedTuple):
-    """All that an index holds of a shape; tags and attributes are JSON."""
+    """All that an index holds of a shape."""
 
-    name: str
-    label: str | None
-    source: str | None
-    digest: str | None
-    tags: str
-    attributes: str
+    row: ShapeRow
     picture: bytes | None
     descriptors: Sequence[StoredDescriptor]
 
@@ -162,16 +156,16 @@ class IndexState:
         with self.lock:
             return read_rows(self.database, table, columns, numbers) if numbers else {}
 
-    def facts(self, ids: Int[np.ndarray, " k"] | Sequence[int]) -> dict[int, Facts]:
+    def facts(self, ids: Int[np.ndarray, " k"] | Sequence[int]) -> dict[int, ShapeRow]:
         """Return what is known of some shapes, by their numbers.
 
         Raise DamagedEntryError if some cannot be read, with all that are damaged.
         """
-        columns = ", ".join((*Facts._fields[1:], "checksum"))
-        found: dict[int, Facts] = {}
+        columns = ", ".join((*ShapeRow._fields[1:], "checksum"))
+        found: dict[int, ShapeRow] = {}
         for number, row in self.read("shape", columns, ids).items():
             if checksum(*row[:-1]) == row[-1]:
-                found[number] = Facts(*row[:-1])
+                found[number] = ShapeRow(*row[:-1])
         lost = sorted(set(np.asarray(ids).tolist()) - set(found))
         if lost:
             what = "row {} of table shape is lost or differs from its checksum"
@@ -180,7 +174,7 @@ class IndexState:
             raise DamagedEntryError(rows["id"][np.isin(rows["shape"], lost)].tolist(), damages)
         return found
 
-    def every(self) -> Iterator[Facts]:
+    def every(self) -> Iterator[ShapeRow]:
         """Yield what is known of all shapes; damage is noted, and the rest comes."""
         for first in range(0, len(self.shape_ids), SHAPES_AT_ONCE):
             some = self.shape_ids[first : first + SHAPES_AT_ONCE]
@@ -207,7 +201,7 @@ class IndexState:
         """Return the names of all shapes, sorted."""
         return sorted(facts.name for facts in self.every())
 
-    def find(self, name: str) -> Facts | None:
+    def find(self, name: str) -> ShapeRow | None:
         """Return what is known of a shape by its name, or None if there is none.
 
         Raise DamagedEntryError if it is damaged.
@@ -223,22 +217,22 @@ class IndexState:
                     return facts
         return None
 
-    def require(self, name: str, purpose: str) -> Facts:
+    def require(self, name: str, purpose: str) -> ShapeRow:
         """Return what is known of a shape by its name; raise MissingShapeError if there is none."""
         facts = self.find(name)
         if facts is None:
             raise MissingShapeError(name, purpose)
         return facts
 
-    def shape(self, facts: Facts) -> StoredShape:
+    def shape(self, facts: ShapeRow) -> StoredShape:
         """Return all that the index holds of a shape, checked.
 
         Raise DamagedEntryError if anything of it is damaged.
         """
         descriptors = self.stored(self.descriptor_ids(facts))
-        return StoredShape(*facts[1:7], self.picture(facts), descriptors)
+        return StoredShape(facts, self.picture(facts), descriptors)
 
-    def is_whole(self, facts: Facts) -> bool:
+    def is_whole(self, facts: ShapeRow) -> bool:
         """Return whether a shape, its numbers and its picture agree with their checksums."""
         try:
             self.facts([facts.id])
@@ -247,7 +241,7 @@ class IndexState:
             return False
         return True
 
-    def descriptor_ids(self, facts: Facts) -> list[int]:
+    def descriptor_ids(self, facts: ShapeRow) -> list[int]:
         """Return the numbers of the descriptors of a shape.
 
         Raise DamagedEntryError if some are lost.
@@ -303,7 +297,7 @@ class IndexState:
         damages = [Damage(DATABASE, what, names.get(shape)) for shape in shapes.tolist()]
         return DamagedEntryError(ids, damages or [Damage(DATABASE, what)])
 
-    def picture(self, facts: Facts) -> bytes | None:
+    def picture(self, facts: ShapeRow) -> bytes | None:
         """Return the picture of a shape, or None if it has none.
 
         Raise DamagedEntryError if it is damaged.
@@ -396,7 +390,7 @@ class Snapshot:
         (stored,) = self.state.stored([int(self.columns["id"][place])])
         return stored.restored()
 
-    def facts(self, places: Int[np.ndarray, " k"]) -> list[Facts]:
+    def facts(self, places: Int[np.ndarray, " k"]) -> list[ShapeRow]:
         """Return what is known of the shapes of some places."""
         shapes = self.columns["shape"][places]
         found = self.state.facts(np.unique(shapes))
@@ -437,8 +431,3 @@ def read_state(folder: Path, before: IndexState | None = None) -> IndexState:
             if name in before.__dict__:
                 state.__dict__[name] = before.__dict__[name]
     return state
-
-
-def tags_and_attributes(facts: Facts) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """Return the tags and the attributes of a shape."""
-    return tuple(json.loads(facts.tags)), json.loads(facts.attributes)

@@ -1,9 +1,8 @@
 """Adding shapes to an index: what is known of each, what is checked, and which rows are written."""
 
-import json
 import sqlite3
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,22 +10,20 @@ from zlib import crc32
 
 import numpy as np
 
-from certeig.kit.arguments import require_each, require_type, require_unicode
+from certeig.kit.arguments import require_each
 from certeig.kit.arrays import record
 from certeig.kit.errors import InvalidParameterError
-from certeig.kit.text import Shown
 from eigenshape._errors import StoreError
 from eigenshape._sealed import checksum
 from eigenshape.retrieval.kinds import AnyRecipe, Descriptor, details_of, recipe_to_text, rows_of
 from eigenshape.retrieval.store.damage import Damage
 from eigenshape.retrieval.store.database import (
     DATABASE,
-    Facts,
     integer_checksums,
     read_recipes,
     read_seals,
 )
-from eigenshape.retrieval.store.filters import RESERVED
+from eigenshape.retrieval.store.facts import ShapeFacts, ShapeRow
 from eigenshape.retrieval.store.state import (
     IndexState,
     MissingShapeError,
@@ -36,7 +33,7 @@ from eigenshape.retrieval.store.state import (
 
 
 @dataclass(frozen=True)
-class Record(Shown):
+class Record(ShapeFacts):
     """What an index holds of a shape beside its descriptors.
 
     Attributes
@@ -70,20 +67,14 @@ class Record(Shown):
     [('fish 1', {'length': 0.4})]
     """
 
-    name: str
-    label: str | None
-    source: str | None
-    digest: str | None
-    tags: tuple[str, ...]
-    attributes: dict[str, Any]
-    recipes: tuple[AnyRecipe, ...]
+    recipes: tuple[AnyRecipe, ...] = ()
 
 
 LARGEST_THUMBNAIL = 8192  # bytes, so that a shape takes less than 60 KB
 
 
 @record
-class DescribedShape(Shown):
+class DescribedShape(ShapeFacts):
     """A shape that is described already, to be added to an index.
 
     Descriptors of one recipe are views of the shape: the whole first, then what is seen of it from
@@ -121,60 +112,8 @@ class DescribedShape(Shown):
     'fish'
     """
 
-    name: str
     descriptors: Sequence[Descriptor]
-    label: str | None = None
-    source: str | None = None
-    digest: str | None = None
-    tags: Sequence[str] = ()
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-    thumbnail: bytes | None = None
-
-
-def require_name(name: str) -> None:
-    """Raise an error if a shape cannot have a name: in a path or an address it must say something."""
-    require_text(name)
-    if not (name or "").strip() or "\0" in name:
-        raise InvalidParameterError(
-            f"The name of a shape must have a character that shows, and no NUL; it is {name!r}."
-        )
-
-
-def require_text(*texts: str | None) -> None:
-    """Raise an error if a name, label, source or digest is not Unicode text."""
-    for text in texts:
-        if text is not None:
-            require_unicode(text, "Names, labels, sources and digests in an index")
-
-
-def facts_text(tags: Sequence[str], attributes: Mapping[str, Any]) -> tuple[str, str]:
-    """Return tags and attributes as they are stored; refuse what cannot be."""
-    if isinstance(tags, str):
-        raise InvalidParameterError(
-            f"tags must be a list of texts; it is {tags!r}. Try [{tags!r}]."
-        )
-    require_each(tags, str, "tags")
-    require_type(attributes, Mapping, "attributes")
-    for tag in tags:
-        require_text(tag)
-    for key, value in attributes.items():
-        require_text(key)
-        is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        is_finite = isinstance(value, float | np.floating) and bool(np.isfinite(value))
-        if not (isinstance(value, str) or is_whole or is_finite):
-            raise InvalidParameterError(
-                f"An attribute must be a text or a finite number; {key!r} is {value!r}. Use a tag "
-                "for what is true or false."
-            )
-        if isinstance(value, str):
-            require_text(value)
-        if key in RESERVED:
-            raise InvalidParameterError(
-                f"An attribute may have any name but {' and '.join(RESERVED)}, by which filters "
-                f"choose labels and tags; one is {key!r}."
-            )
-    numbers = json.dumps(dict(attributes), sort_keys=True, default=np.generic.item)
-    return json.dumps(sorted(set(tags))), numbers
+    thumbnail: bytes | None = field(default=None, kw_only=True)
 
 
 def rows_of_each(name: str, descriptors: Sequence[Descriptor]) -> list[np.ndarray]:
@@ -190,7 +129,7 @@ def require_columns(recipe: AnyRecipe, n_columns: int, known: int) -> None:
     """Raise an error if rows by a recipe are longer or shorter than others."""
     if n_columns != known:
         raise InvalidParameterError(
-            f"All features of one recipe must have as many numbers; those of recipe "
+            f"All features of one recipe must have as many numbers; the features of recipe "
             f"{recipe.name!r} have {known}, and these have {n_columns}."
         )
 
@@ -198,9 +137,7 @@ def require_columns(recipe: AnyRecipe, n_columns: int, known: int) -> None:
 def described(shape: DescribedShape) -> StoredShape:
     """Return a shape as it is stored; refuse what cannot be."""
     require_each(shape.descriptors, Descriptor, "descriptors")
-    require_name(shape.name)
-    require_text(shape.label, shape.source, shape.digest)
-    facts = facts_text(shape.tags, shape.attributes)
+    row = shape.as_row()
     if shape.thumbnail is not None and len(shape.thumbnail) > LARGEST_THUMBNAIL:
         raise InvalidParameterError(
             f"A thumbnail must have at most {LARGEST_THUMBNAIL} bytes; that of {shape.name!r} has "
@@ -216,9 +153,7 @@ def described(shape: DescribedShape) -> StoredShape:
         view, data = views[recipe], rows.tobytes()
         stored.append(StoredDescriptor(recipe, view, n_rows, n_columns, data, details))
         views[recipe] += 1
-    return StoredShape(
-        shape.name, shape.label, shape.source, shape.digest, *facts, shape.thumbnail, stored
-    )
+    return StoredShape(row, shape.thumbnail, stored)
 
 
 class NameTakenError(StoreError):
@@ -260,13 +195,14 @@ class Writer:
         Raise StoreError if the name is in the index with another digest and `replace` is False, and
         InvalidParameterError if rows are longer or shorter than those of others by the same recipe.
         """
-        old = self.find(shape.name)
-        same = old is not None and old.digest is not None and old.digest == shape.digest
+        name, digest = shape.row.name, shape.row.digest
+        old = self.find(name)
+        same = old is not None and old.digest is not None and old.digest == digest
         if old is not None and not same and not replace:
-            digests = f"with digest {old.digest}, not {shape.digest}"
+            digests = f"with digest {old.digest}, not {digest}"
             raise NameTakenError(
-                f"A name stands for one shape; {shape.name!r} is in the index "
-                f"{digests if old.digest and shape.digest else 'already'}. Remove it first, or add it "
+                f"A name stands for one shape; {name!r} is in the index "
+                f"{digests if old.digest and digest else 'already'}. Remove it first, or add it "
                 "with replace=True (--replace)."
             )
         if old is not None and not (same and self.state.is_whole(old)):
@@ -275,9 +211,12 @@ class Writer:
         known = set()
         if old is None:
             number = self._next("shape")
-            n_pictures = int(shape.picture is not None)
-            facts = Facts(number, *shape[:6], len(shape.descriptors), n_pictures)
-            self._insert("shape", *facts, checksum(*facts))
+            row = shape.row._replace(
+                id=number,
+                n_descriptors=len(shape.descriptors),
+                n_pictures=int(shape.picture is not None),
+            )
+            self._insert("shape", *row, checksum(*row))
             if shape.picture is not None:
                 self._insert("picture", number, shape.picture, checksum(number, shape.picture))
         else:
@@ -290,18 +229,18 @@ class Writer:
             sizes = (each.view, each.n_rows, each.n_columns)
             checksums = (crc32(each.rows), crc32(each.details))
             integers = (self._next("descriptor"), number, recipe, *sizes, *checksums)
-            row = integer_checksums(np.array([integers], dtype=np.int64))
-            self._insert("descriptor", *integers, int(row[0]), each.rows, each.details)
+            seal = integer_checksums(np.array([integers], dtype=np.int64))
+            self._insert("descriptor", *integers, int(seal[0]), each.rows, each.details)
         if old is not None and new:
             self._update(old._replace(n_descriptors=old.n_descriptors + len(new)))
         return not same
 
-    def find(self, name: str) -> Facts | None:
+    def find(self, name: str) -> ShapeRow | None:
         """Return the shape of a name, or None if there is none."""
         found = self.database.execute("SELECT id FROM shape WHERE name = ?", (name,)).fetchone()
         if found is None:
             return None
-        query = f"SELECT {', '.join(Facts._fields)} FROM shape WHERE id = ?"
+        query = f"SELECT {', '.join(ShapeRow._fields)} FROM shape WHERE id = ?"
         row = self.database.execute(query, found).fetchone()
         if row is None or row[1] != name:  # a flipped bit in the list of names
             raise StoreError(
@@ -309,7 +248,7 @@ class Writer:
                 f"{row and row[1]!r}. {self.state.folder / DATABASE} is damaged: merge the index "
                 "into a new one to keep what is whole."
             )
-        return Facts(*row)
+        return ShapeRow(*row)
 
     def remove(self, name: str) -> None:
         """Delete a shape, its descriptors and its picture."""
@@ -318,7 +257,7 @@ class Writer:
             raise MissingShapeError(name, "be removed")
         self.delete(facts)
 
-    def delete(self, facts: Facts) -> None:
+    def delete(self, facts: ShapeRow) -> None:
         """Delete the rows of a shape."""
         self.database.execute("DELETE FROM descriptor WHERE shape = ?", (facts.id,))
         for table in ("picture", "shape"):
@@ -326,23 +265,16 @@ class Writer:
 
     def update(self, record: Record) -> None:
         """Write what is known of a shape anew."""
-        require_text(record.name, record.label, record.source, record.digest)
-        tags, attributes = facts_text(record.tags, record.attributes)
+        row = record.as_row()
         old = self.find(record.name)
         if old is None:
             raise MissingShapeError(record.name, "be updated")
-        new = old._replace(
-            label=record.label,
-            source=record.source,
-            digest=record.digest,
-            tags=tags,
-            attributes=attributes,
-        )
+        new = ShapeRow(old.id, *row[1:7], old.n_descriptors, old.n_pictures)
         if new != old:
             self._update(new)
 
-    def _update(self, facts: Facts) -> None:
-        fields = ", ".join(f"{name} = ?" for name in Facts._fields[1:])
+    def _update(self, facts: ShapeRow) -> None:
+        fields = ", ".join(f"{name} = ?" for name in ShapeRow._fields[1:])
         query = f"UPDATE shape SET {fields}, checksum = ? WHERE id = ?"
         self.database.execute(query, (*facts[1:], checksum(*facts), facts.id))
 

@@ -4,7 +4,7 @@ import * as three from "three";
 import { orderFaces } from "./order";
 
 /** What the surface hands on to the split vertices: how they move, and how they are lit. */
-const SHARED = ["position", "normal", "exact", "exact_normal", "shares", "mark", "ambient"];
+const SHARED = ["position", "normal", "crease", "exact", "exact_normal", "shares", "mark", "ambient"];
 const COLUMNS = 7; // of the table: the vertex, two places in the image, three colors, the image
 const MOST_TEXELS = 1 << 25; // of all images: 128 MB
 const LARGEST = 2048; // texels along a side of an image

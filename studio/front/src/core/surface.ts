@@ -3,6 +3,7 @@
 import * as three from "three";
 import { softenBorders } from "./borders";
 import { colorMap, findRange, rgbOf, type Scale } from "./colors";
+import { markCreases } from "./creases";
 import { define, type Motion } from "./motion";
 import { orderFaces } from "./order";
 import { MAX_REGIONS } from "./regions";
@@ -47,9 +48,12 @@ export class Surface extends three.Mesh<three.BufferGeometry, three.ShaderMateri
     const count = vertices.length / 3;
     Object.assign(this, { vertices, faces });
     this.setSkin(null);
+    const creased = markCreases(vertices, faces);
+    define(this.material, "CREASED", creased.some((mark) => mark > 0) ? 1 : undefined);
     const attributes = {
       position: [vertices, 3],
       normal: [vertexNormals(vertices, faces), 3],
+      crease: [creased, 1],
       exact: [vertices.slice(), 3],
       exact_normal: [new Float32Array(3 * count), 3],
       shares: [new Float32Array(MAX_REGIONS * count), MAX_REGIONS],

@@ -29,6 +29,10 @@ in vec4 v_mark;
 in vec3 v_place;
 uniform vec4 clip; // normal of the plane, and how far along it the shape is seen
 #endif
+#ifdef CREASED
+in float v_crease;
+in vec3 v_seen;
+#endif
 uniform float opacity;
 out vec4 color;
 void main() {
@@ -64,6 +68,10 @@ void main() {
   vec2 screen = 2.0 * gl_FragCoord.xy / picture - 1.0 + projectionMatrix[2].xy;
   vec3 eye = normalize(vec3(-screen / vec2(projectionMatrix[0][0], projectionMatrix[1][1]), 1.0));
   vec3 n = normalize(v_normal);
+#ifdef CREASED
+  // At a crease the normals of vertices are means across it: the face is drawn flat instead.
+  if (v_crease > 0.0) n = normalize(cross(dFdx(v_seen), dFdy(v_seen)));
+#endif
   if (dot(n, eye) < 0.0) n = -n; // both sides of an open surface are lit
   // A large soft lamp at the upper left of the camera, a faint one at the lower right, and daylight,
   // of which creases see little. Light changes how bright a color is, never its hue.

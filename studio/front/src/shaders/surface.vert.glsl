@@ -25,6 +25,11 @@ out vec4 v_mark;
 #ifdef CLIPPED
 out vec3 v_place;
 #endif
+#ifdef CREASED
+in float crease;
+out float v_crease; // above 0 in the faces at a crease
+out vec3 v_seen;
+#endif
 out vec3 v_normal;
 void main() {
   vec3 turn;
@@ -49,6 +54,10 @@ void main() {
 #endif
 #ifdef MARKED
   v_mark = mark;
+#endif
+#ifdef CREASED
+  v_crease = crease;
+  v_seen = (modelViewMatrix * vec4(place, 1.0)).xyz;
 #endif
   gl_Position = projectionMatrix * (modelViewMatrix * vec4(place, 1.0));
 }

@@ -24,14 +24,10 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
 import eigenshape as es
+from eigenshape.retrieval.store.facts import ShapeFacts
 from eigenshape.retrieval.store.filters import parse_filters
 from eigenshape.retrieval.store.state import MissingShapeError
-from eigenshape.retrieval.store.writing import (
-    NameTakenError,
-    facts_text,
-    require_name,
-    require_text,
-)
+from eigenshape.retrieval.store.writing import NameTakenError
 from eigenshape_studio.guard import App, Guard, Rules, bearer_of, below, is_secret
 from eigenshape_studio.service import openapi
 from eigenshape_studio.service.describing import Describers, MeshRefusedError, Picture
@@ -129,20 +125,19 @@ class Service:
         self._require_writer(request)
         wanted = read_parameters(request, openapi.ADD)
         name, suffix = wanted["name"], _suffix(wanted["file"])
-        facts = {"label": wanted["label"], "tags": wanted["tag"] or ()}
-        facts |= {"attributes": _attributes(wanted["attributes"])}
-        # Before the mesh is described, which takes seconds
-        require_name(name)
-        require_text(facts["label"])
-        facts_text(facts["tags"], facts["attributes"])
+        facts = ShapeFacts(
+            name,
+            label=wanted["label"],
+            tags=wanted["tag"] or (),
+            attributes=_attributes(wanted["attributes"]),
+        )
+        facts.as_row()  # which refuses them before the mesh is described, which takes seconds
         await self._refresh()
         if name in self.shelf and not wanted["replace"]:
             raise _name_taken(name)
         data = await request.body()
         async with self._describing(wanted["file"]):
-            shape = await self.describers.describe_shape(
-                suffix, data, self.shelf.recipe, name, facts
-            )
+            shape = await self.describers.describe_shape(suffix, data, self.shelf.recipe, facts)
         added = await self._change(name, lambda: self.shelf.add(shape, replace=wanted["replace"]))
         return JSONResponse(self._facts(added), 201)
 

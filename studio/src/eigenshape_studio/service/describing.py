@@ -20,6 +20,7 @@ from matplotlib.image import imsave
 import eigenshape as es
 from eigenshape._workers import outcome_of, schedule_work, start_pool
 from eigenshape.retrieval.kinds import describe_to_store
+from eigenshape.retrieval.store.facts import ShapeFacts
 from eigenshape_studio.others.search import color_places
 from eigenshape_studio.shape.parse import Limits, read_upload
 
@@ -99,17 +100,15 @@ def describe_upload(recipe: Recipe, with_picture: bool, path: Path) -> Described
     return Described(descriptor, mesh.n_vertices, mesh.n_faces, surface.report, picture)
 
 
-def describe_shape(
-    recipe: Recipe, name: str, facts: dict[str, Any], path: Path
-) -> es.retrieval.DescribedShape:
+def describe_shape(recipe: Recipe, facts: ShapeFacts, path: Path) -> es.retrieval.DescribedShape:
     """Describe an uploaded file as an index keeps it: whole, from several sides, and as a picture."""
     surface = read_upload(path, Limits().n_faces, REPAIRS)
     done = {"repairs": "; ".join(surface.report)} if surface.report else {}
-    attributes = facts["attributes"] | done
-    descriptors = describe_to_store(surface.mesh, recipe)
-    picture = es.retrieval.draw_thumbnail(surface.mesh)
-    facts = facts | {"attributes": attributes, "thumbnail": picture}
-    return es.retrieval.DescribedShape(name, descriptors, **facts)
+    return es.retrieval.DescribedShape(
+        descriptors=describe_to_store(surface.mesh, recipe),
+        thumbnail=es.retrieval.draw_thumbnail(surface.mesh),
+        **(vars(facts) | {"attributes": {**facts.attributes, **done}}),
+    )
 
 
 def _picture_of_query(mesh: es.TriangleMesh, vertices: np.ndarray) -> dict[str, Any]:
@@ -177,10 +176,10 @@ class Describers:
         return await self._run_on(suffix, data, partial(self._describe, recipe, with_picture))
 
     async def describe_shape(
-        self, suffix: str, data: bytes, recipe: Recipe, name: str, facts: dict[str, Any]
+        self, suffix: str, data: bytes, recipe: Recipe, facts: ShapeFacts
     ) -> es.retrieval.DescribedShape:
         """Describe the bytes of a mesh file to be kept; raise MeshRefusedError as `describe`."""
-        return await self._run_on(suffix, data, partial(describe_shape, recipe, name, facts))
+        return await self._run_on(suffix, data, partial(describe_shape, recipe, facts))
 
     async def draw(self, path: Path) -> Picture:
         """Draw a file of the index; raise MeshRefusedError if it cannot be read."""

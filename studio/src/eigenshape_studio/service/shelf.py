@@ -12,9 +12,10 @@ import numpy as np
 from jaxtyping import Int
 
 import eigenshape as es
-from eigenshape.retrieval.store.database import Facts
+from eigenshape.retrieval.search.options import QueryOptions
+from eigenshape.retrieval.store.facts import ShapeRow
 from eigenshape.retrieval.store.filters import choose_shapes
-from eigenshape.retrieval.store.state import IndexState, MissingShapeError, tags_and_attributes
+from eigenshape.retrieval.store.state import IndexState, MissingShapeError
 
 REFRESH_SECONDS = 1.0  # between looks for shapes that other processes have added or removed
 
@@ -174,8 +175,8 @@ class ShelfReader:
         state = self._reader.state  # of which all is that is said; it may be an older one soon
         if not len(state):
             return Answer()
-        chosen = choose_shapes(state, where)
-        matches = self._reader.search(state, descriptor, n_matches, chosen, exact=exact)
+        options = QueryOptions(n_matches, where, exact=exact)
+        matches = self._reader.ask(descriptor, options, state)
         found = []
         for match in matches:
             ours, theirs = match.correspondences.T
@@ -209,13 +210,13 @@ class ShelfReader:
         return state.picture(_require(state, name, number))
 
 
-def _require(state: IndexState, name: str, number: int | None) -> Facts:
+def _require(state: IndexState, name: str, number: int | None) -> ShapeRow:
     facts = state.require(name, "be shown")
     if number not in (None, facts.id):  # one that has replaced it
         raise MissingShapeError(name, "be shown")
     return facts
 
 
-def _shape_of(facts: Facts) -> Shape:
-    known = (facts.id, facts.name, facts.label, facts.source, *tags_and_attributes(facts))
+def _shape_of(facts: ShapeRow) -> Shape:
+    known = (facts.id, facts.name, facts.label, facts.source, *facts.tags_and_attributes())
     return Shape(*known, bool(facts.n_pictures))

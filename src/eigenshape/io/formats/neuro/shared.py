@@ -1,7 +1,6 @@
 """What the formats of brains share: nibabel, if it is installed, and numbers of 32 bits."""
 
 import math
-import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,37 +9,11 @@ import numpy as np
 from certeig.kit.errors import FileFormatError
 from eigenshape._extras import import_extra
 from eigenshape.features.parcellation import Parcellation
-from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.repairs.masks import hemisphere_of
 from eigenshape.io.formats.numbers import find_keys
 
 Arrays = dict[str, np.ndarray]
 UNNAMED = "values"  # name of a function that has none in its file
 NO_PARCEL = "???"  # name of the label 0 in files of Connectome Workbench
-
-# Names of files that name a hemisphere: lh.aparc.annot, sub-01_hemi-L.label.gii, S1.L.aparc.label.gii
-SIDES = {
-    side: re.compile(rf"^{hemisphere}\.|hemi-{letter}\b|hemi-{letter}_|[._]{letter}\.")
-    for side, hemisphere, letter in (("left", "lh", "L"), ("right", "rh", "R"))
-}
-
-
-def side_of_file(mesh: TriangleMesh, name: str, structure: str = "") -> str:
-    """Return the hemisphere that a file of a surface names, "left", "right" or neither.
-
-    Raise FileFormatError if the surface lies on the other side.
-    """
-    found = hemisphere_of(mesh)
-    for side, pattern in SIDES.items():
-        if side in structure.lower() if structure else pattern.search(name):
-            if found not in (side, ""):
-                raise FileFormatError(
-                    f"A file must be of the hemisphere of the surface; it is of the {side} one "
-                    f"({structure or name}), and the surface lies on the {found}, x "
-                    f"{'<' if found == 'left' else '>'} 0."
-                )
-            return side
-    return ""
 
 
 def require_nibabel(module: str) -> Any:

@@ -1,14 +1,12 @@
 import numpy as np
+from known_spectra import kronecker_sum, ring, scaled
 
 from certeig.solver.eigenpairs import Pairs, lowest_pairs, polish
 from certeig.solver.factor import factorize
 from certeig.solver.lanczos import Wanted, block_lanczos
 from certeig.solver.pencil import rayleigh_residuals
-from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.shapes.surfaces import icosphere
-from eigenshape.spectral.pencils import normalize
 
-PENCIL = normalize(cotangent_laplacian(icosphere(3)))
+PENCIL = scaled(kronecker_sum(ring(25), ring(26)))
 FACTOR = factorize(PENCIL, 0.02 * PENCIL.level)
 
 

@@ -5,19 +5,12 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pencils import random_symmetric
-from scipy.spatial import Delaunay
+from known_spectra import adjacency, kronecker_sum, laplacian, random_symmetric, surface
 
-from certeig.sparse import dissection, elimination
+from certeig.sparse import dissection
 from certeig.sparse.elimination import analyze_pattern
 from certeig.sparse.front_loops import WIDE
 from certeig.sparse.symmetric_factor import factorize_symmetric
-from eigenshape.geometry.simplicial import SimplicialMesh
-from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.operators.elements import mass
-from eigenshape.operators.fem import fem_laplacian
-from eigenshape.shapes.domains import box
-from eigenshape.shapes.spheres import fibonacci_sphere
 
 
 def solved(matrix, width=3):
@@ -81,17 +74,17 @@ def test_fronts_have_the_rows_of_their_definition_and_the_room_for_them(n, densi
     assert np.diff(e.places).tolist() == sizes
 
 
-@pytest.mark.parametrize("mesh", [fibonacci_sphere(5000), box(9, 9, 9)])
-def test_meshes_below_zero_and_among_their_eigenvalues(mesh):
-    stiffness = sp.csc_array(cotangent_laplacian(mesh).stiffness)
+@pytest.mark.parametrize("matrix", [surface(5000), laplacian(kronecker_sum(*[adjacency(10)] * 3))])
+def test_surfaces_and_solids_below_zero_and_among_their_eigenvalues(matrix):
+    stiffness, n = sp.csc_array(matrix), matrix.shape[0]
     elimination = analyze_pattern(stiffness)
     for shift, negative in ((-0.1, 0), (0.1 * stiffness.diagonal().mean(), None)):
-        matrix = sp.csc_array(stiffness - shift * sp.eye_array(mesh.n_points))
+        matrix = sp.csc_array(stiffness - shift * sp.eye_array(n))
         factor = factorize_symmetric(elimination, matrix.data)
-        right = np.random.default_rng(1).normal(size=(mesh.n_points, 11))
+        right = np.random.default_rng(1).normal(size=(n, 11))
         np.testing.assert_allclose(matrix @ factor.solve(right), right, atol=1e-8)
         count = np.count_nonzero(factor.pivots < 0)
-        assert count == negative if negative is not None else 0 < count < mesh.n_points
+        assert count == negative if negative is not None else 0 < count < n
 
 
 def test_what_is_full_and_what_falls_apart():
@@ -140,9 +133,7 @@ def test_a_pivot_that_is_none(bad):
 
 
 def test_nothing_depends_on_the_run():
-    matrix = sp.csc_array(
-        cotangent_laplacian(fibonacci_sphere(2000)).stiffness + 0.1 * sp.eye_array(2000)
-    )
+    matrix = sp.csc_array(surface(2000) + 0.1 * sp.eye_array(2000))
     one, two = (factorize_symmetric(analyze_pattern(matrix), matrix.data) for _ in range(2))
     np.testing.assert_array_equal(one.panels, two.panels)
 
@@ -161,30 +152,6 @@ def test_the_bound_of_rounding_is_that_of_the_factor_in_any_unit():
         share = found[elimination.order] / (unit * np.finfo(np.float64).eps * sizes)
         assert (share <= lengths + 5).all()
         assert (share >= 4).all()
-
-
-@pytest.mark.parametrize("order", [2, 3])
-def test_nodes_of_elements_are_ordered_by_the_corners_that_dominate_them(order, monkeypatch):
-    mesh = box(6, 6, 6)
-    pattern = sp.csc_array(fem_laplacian(mesh, order).mass)
-    reduced = analyze_pattern(pattern)
-    # Corners alone are dissected, and each other node is eliminated before some corner of its element.
-    place = np.argsort(reduced.order)
-    for node in range(mesh.n_points, len(place)):
-        neighbors = pattern[:, [node]].indices
-        assert place[node] < place[neighbors[neighbors < mesh.n_points]].max()
-    monkeypatch.setattr(elimination, "DENSE", np.inf)
-    monkeypatch.setattr(dissection, "DENSE", np.inf)
-    assert reduced.n_entries < 0.9 * analyze_pattern(pattern).n_entries
-
-
-def test_solids_have_fewer_entries_with_several_keys_and_narrow_cuts(monkeypatch):
-    points = np.random.default_rng(0).random((1500, 3))
-    mesh = SimplicialMesh(points, Delaunay(points).simplices)
-    pattern = sp.csc_array(mass(mesh, mesh.simplices, 1))
-    narrow = analyze_pattern(pattern).n_entries
-    monkeypatch.setattr(dissection, "DENSE", np.inf)
-    assert narrow < 0.9 * analyze_pattern(pattern).n_entries
 
 
 @settings(max_examples=60, deadline=None)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from pencils import dense_eigenvalues, graph, path, tetrahedra
+from known_spectra import dense_values, full_parts, kronecker_sum, random_grid, ring, scaled, string
 
 from certeig.kit.errors import ConvergenceError
 from certeig.solver import lanczos
@@ -8,9 +8,6 @@ from certeig.solver.eigenpairs import lowest_pairs
 from certeig.solver.factor import factorize
 from certeig.solver.lanczos import MOST_LOST, Wanted, block_lanczos
 from certeig.solver.pencil import rayleigh_residuals
-from eigenshape.operators.cotangent import cotangent_laplacian
-from eigenshape.shapes.surfaces import icosphere, torus
-from eigenshape.spectral.pencils import normalize
 
 
 def run(pencil, factor, wanted, locked=None):
@@ -19,9 +16,9 @@ def run(pencil, factor, wanted, locked=None):
 
 
 def test_finds_both_sides_of_the_shift_orthonormal():
-    laplacian = cotangent_laplacian(icosphere(3), "consistent")
-    pencil = normalize(laplacian)
-    reference = np.ldexp(dense_eigenvalues(laplacian), -pencil.value_exponent)
+    matrices = random_grid(25, full=True)
+    pencil = scaled(*matrices)
+    reference = pencil.places_in(dense_values(*matrices))
     factor = factorize(pencil, float(reference[15] + reference[16]) / 2)
     assert factor.count == 16
     vectors = run(pencil, factor, Wanted(below=16, above=9))
@@ -34,7 +31,7 @@ def test_finds_both_sides_of_the_shift_orthonormal():
 
 
 def test_skipped_projections_cost_no_digit(monkeypatch):
-    pencil = normalize(cotangent_laplacian(torus(80, 40)))
+    pencil = scaled(*random_grid(57))
     factor = factorize(pencil, 0.05 * pencil.level)
     residuals = {}
     for most in (MOST_LOST, 0.0):
@@ -45,7 +42,7 @@ def test_skipped_projections_cost_no_digit(monkeypatch):
 
 
 def test_a_second_run_is_orthogonal_to_the_first_to_rounding():
-    pencil = normalize(cotangent_laplacian(icosphere(3)))
+    pencil = scaled(kronecker_sum(ring(25), ring(26)))
     factor = factorize(pencil, 0.05 * pencil.level)
     found = run(pencil, factor, Wanted(below=factor.count, above=12))
     first = lowest_pairs(pencil, found, found.shape[1]).vectors
@@ -54,7 +51,7 @@ def test_a_second_run_is_orthogonal_to_the_first_to_rounding():
 
 
 def test_a_second_run_finds_the_copies_that_the_block_was_too_narrow_for():
-    pencil = normalize(cotangent_laplacian(tetrahedra(100)))  # the eigenvalue 0 a hundred times
+    pencil = scaled(full_parts(100))  # the eigenvalue 0 a hundred times
     factor = factorize(pencil, 0.01 * pencil.level)
     assert factor.count == 100
     first = run(pencil, factor, Wanted(below=5, above=0))
@@ -66,7 +63,7 @@ def test_a_second_run_finds_the_copies_that_the_block_was_too_narrow_for():
 
 
 def test_nothing_above_the_ceiling_is_returned():
-    pencil = normalize(graph(path(300)))
+    pencil = scaled(string(300))
     factor = factorize(pencil, 0.002)
     below = factor.count
     everything = run(pencil, factor, Wanted(below=below, above=5))
@@ -76,7 +73,7 @@ def test_nothing_above_the_ceiling_is_returned():
 
 
 def test_too_little_room_is_an_error():
-    pencil = normalize(graph(path(40)))
+    pencil = scaled(string(40))
     factor = factorize(pencil, 0.1)
     with pytest.raises(ConvergenceError, match=r"Block Lanczos must converge within 32 vectors"):
         run(pencil, factor, Wanted(below=factor.count, above=40))

@@ -7,9 +7,9 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from pencils import random_symmetric
+from known_spectra import adjacency, kronecker_sum, random_symmetric, surface
 
-import eigenshape as es
+import certeig
 from certeig.sparse.dissection import dissect
 from certeig.sparse.elimination import analyze_pattern
 from certeig.sparse.symmetric_factor import factorize_symmetric
@@ -20,7 +20,7 @@ def small_work(monkeypatch):
     monkeypatch.setattr("certeig.sparse.tasks.FEWEST_ENTRIES", 1)
     monkeypatch.setattr("certeig.sparse.dissection.WORTH_A_THREAD", 60)
     yield
-    es.set_threads(None)
+    certeig.set_threads(None)
 
 
 def with_diagonal(matrix):
@@ -33,8 +33,8 @@ def with_diagonal(matrix):
 
 
 MATRICES = {
-    "surface": with_diagonal(es.cotangent_laplacian(es.shapes.fibonacci_sphere(4000)).stiffness),
-    "solid": with_diagonal(es.cotangent_laplacian(es.shapes.box(9, 9, 9)).stiffness),
+    "surface": with_diagonal(surface(4000)),
+    "solid": with_diagonal(kronecker_sum(*[adjacency(10)] * 3)),
     "pieces": with_diagonal(sp.block_diag([sp.csc_array(np.ones((7, 7)))] * 200)),
     "clique": with_diagonal(sp.csc_array(np.ones((300, 300)))),
     "one point": sp.csc_array(np.array([[2.0]])),
@@ -46,7 +46,7 @@ def test_digits_are_those_of_one_thread(name):
     matrix, found = MATRICES[name], []
     right = np.random.default_rng(0).normal(size=(matrix.shape[0], 19))
     for n in (1, 2, 4):
-        es.set_threads(n)
+        certeig.set_threads(n)
         elimination = analyze_pattern(matrix)
         factor = factorize_symmetric(elimination, matrix.data)
         arrays = elimination.order, factor.panels, factor.pivots, factor.solve(right)
@@ -62,7 +62,7 @@ def test_digits_are_those_of_one_thread(name):
 )
 @given(st.integers(1, 400), st.floats(0, 0.06), st.integers(0, 10**6))
 def test_tasks_solve_what_they_share(n, density, seed):
-    es.set_threads(2)
+    certeig.set_threads(2)
     matrix = with_diagonal(random_symmetric(n, density, seed))
     elimination = analyze_pattern(matrix)
     tasks = elimination.tasks
@@ -89,16 +89,16 @@ def test_a_pivot_that_is_zero_is_found_in_any_task():
         data, point = matrix.data.copy(), elimination.order[place]
         data[matrix.indptr[point] : matrix.indptr[point + 1]] = np.nan
         for n in (1, 2):
-            es.set_threads(n)
+            certeig.set_threads(n)
             assert factorize_symmetric(elimination, data) is None
 
 
 def test_threads_order_a_graph_as_one_does():
-    matrix = es.cotangent_laplacian(es.shapes.fibonacci_sphere(6000)).stiffness.tocsc()
+    matrix = surface(6000).tocsc()
     graph = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
     orders = []
     for n in (1, 2, 5):
-        es.set_threads(n)
+        certeig.set_threads(n)
         orders.append(dissect(*graph))
     assert sorted(orders[0].tolist()) == list(range(6000))
     np.testing.assert_array_equal(orders[0], orders[1])
