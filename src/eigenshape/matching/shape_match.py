@@ -28,15 +28,17 @@ class ShapeMatch(ReadOnly):
     confidence : (n,) float
         Probability, 0 to 1, that the point is less than 0.05 √area of the whole from the true one,
         along the surface. 0 on pieces that are too small to be matched.
-    evidence : (n, 12) float
+    evidence : (n, 15) float
         Numbers from which the confidence is computed by logistic regression; 0 where there are none:
         local orientation, misfit of distances, distance to the next matched point, distance to where
         other starts put the vertex, local stretch, gap that is left after bending, weight of the
         nearest patch, its difference from that of its image; and of the whole map orientation,
-        support, mean difference, and the logarithm of the gap after bending times the root of strain.
+        support, mean difference, and logarithms: of the gap after bending times the root of strain,
+        of the gap after a rigid turn, of how much worse the best map to other places fits, and of the
+        part's share of the area.
     score : float
         How good the whole map is, 0 to 1: orientation × coverage² × support of pairs × likeness⁴ of
-        patches. Of several scales the one with the highest score is taken.
+        patches. Of the sizes that `scale="unknown"` tries, the one with the highest score is taken.
     orientation : float
         Share of the part's area that the map keeps, minus the share that it turns over.
     coverage : float
@@ -48,10 +50,13 @@ class ShapeMatch(ReadOnly):
     n_equally_good : int
         How many maps that differ over most of the part fit as well as this one, itself among them: 1
         if it is the only one. A ball turned on itself has many, a cube 24. The search ends at about
-        ten. A whole of two equal pieces has two, and `report` names the other piece. Where other maps
+        ten. A whole of two equal pieces has two, and `report` names the other piece. A small part has
+        one more for each place that fits but for what a pose changes. Where other maps
         place a vertex elsewhere, its confidence is divided by their number.
     scale : float
         Factor by which lengths of the part were multiplied.
+    mirrored : bool
+        Whether the mirror image of the part was matched.
     report : tuple of str
         What was chosen or left out, in sentences: the scale, loose pieces, and, of a whole of several
         pieces, which piece of the part was placed on which of them.
@@ -82,6 +87,7 @@ class ShapeMatch(ReadOnly):
     n_equally_good: int
     scale: float
     report: tuple[str, ...]
+    mirrored: bool = False
 
     @property
     def n_vertices(self) -> int:
