@@ -61,7 +61,7 @@ class Spectrum(ReadOnly):
     residuals: Float[np.ndarray, " k"]
     certificate: Certificate
 
-    certificate_class = Certificate  # of `load`
+    _certificate_class = Certificate  # of `load`
     maker = "certeig"  # what files say
     least = -np.inf  # what files may hold
 
@@ -101,7 +101,7 @@ class Spectrum(ReadOnly):
             If the file is not a spectrum, is truncated, its parts do not fit together, its numbers
             are not finite, its eigenvalues are not ascending, or its key differs.
         """
-        return cls(**read_spectrum(path, key, cls.certificate_class, cls.maker, cls.least))
+        return cls(**read_spectrum(path, key, cls._certificate_class, cls.maker, cls.least))
 
     def _portrait(self) -> str:
         """Return a plot of the eigenvalues, and what is proved of them, as HTML."""

@@ -60,7 +60,7 @@ class Spectrum(certeig.Spectrum):
 
     certificate: Certificate
 
-    certificate_class = Certificate
+    _certificate_class = Certificate
     maker = "eigenshape"
     least = 0.0
 

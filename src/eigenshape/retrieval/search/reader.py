@@ -191,7 +191,15 @@ class IndexReader:
     def ask(
         self, shape: MeshLike | Descriptor, options: QueryOptions, state: IndexState | None = None
     ) -> Matches:
-        """Find the shapes that are most similar, as `query` does, in the latest state by default."""
+        """Find the shapes that are most similar, as `query` does.
+
+        Parameters
+        ----------
+        shape : MeshLike or descriptor
+        options : QueryOptions
+        state : IndexState, optional
+            By default the latest.
+        """
         if state is None:
             state = self.state
         choice = options.choose(state)  # before a mesh is described, which takes seconds
