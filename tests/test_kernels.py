@@ -4,6 +4,7 @@ import ctypes
 import importlib
 import os
 import re
+import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Annotated, get_args, get_origin
@@ -293,3 +294,12 @@ def test_a_new_kernel_is_compiled_declared_and_called(tmp_path, monkeypatch):
     rows, sums = np.random.default_rng(0).random((7, 3)), np.zeros(3)
     assert add_rows(rows, 0.5, sums)
     np.testing.assert_allclose(sums, rows.sum(axis=0) / 2)
+
+
+def test_sources_have_one_layout():
+    clang_format = pytest.importorskip("clang_format")
+    root = Path(hatch_build.__file__).parents[1]
+    sources = [path for package in PACKAGES for path in package.rglob("*.[ch]")]
+    command = [clang_format.get_executable("clang-format"), "--dry-run", "--Werror", *sources]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
