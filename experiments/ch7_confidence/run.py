@@ -24,7 +24,7 @@ from pairs import errors
 from real_shapes import require_data
 
 RIGHT = 5.0  # hundredths of √area: a vertex with a smaller error is right
-PENALTY = 5e-3  # on squares of factors of columns of spread 1: few pairs, 16 columns
+PENALTY = 5e-3  # on squares of factors of columns of spread 1: few pairs, 13 columns
 N_BINS = 10
 
 

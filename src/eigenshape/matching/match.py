@@ -326,7 +326,7 @@ def _match_piece(copy: WorkingCopy, target: TargetPiece, factor: float) -> _Piec
     if turn is not None:
         best = maps[0]
         quality = rate_map(part, whole, differences, best.pairs, best.fit.places)
-        evidence = vertex_evidence(part, whole, differences, maps, quality, turn)
+        evidence = vertex_evidence(part, whole, differences, maps, quality)
         if is_rigid(plan, turn) or len(target.modes.eigenvalues) < N_MODES[-1]:
             # A coarse whole has few modes, which would move vertices away from where they lie:
             # animals of 400 vertices in two poses have an error of 3.6 with them, and of 1.5 here.

@@ -28,14 +28,12 @@ class ShapeMatch(ReadOnly):
     confidence : (n,) float
         Probability, 0 to 1, that the point is less than 0.05 √area of the whole from the true one,
         along the surface. 0 on pieces that are too small to be matched.
-    evidence : (n, 15) float
+    evidence : (n, 12) float
         Numbers from which the confidence is computed by logistic regression; 0 where there are none:
         local orientation, misfit of distances, distance to the next matched point, distance to where
         other starts put the vertex, local stretch, gap that is left after bending, weight of the
         nearest patch, its difference from that of its image; and of the whole map orientation,
-        support, mean difference, and logarithms: of the gap after bending times the root of strain,
-        of the gap after a rigid turn, of how much worse the best map to other places fits, and of the
-        part's share of the area.
+        support, mean difference, and the logarithm of the gap after bending times the root of strain.
     score : float
         How good the whole map is, 0 to 1: orientation × coverage² × support of pairs × likeness⁴ of
         patches. Of the sizes that `scale="unknown"` tries, the one with the highest score is taken.
