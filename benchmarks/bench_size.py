@@ -30,6 +30,7 @@ INSTALLED = {
 QUICK = ("eigenshape",)
 # An editable installation lists none of its files, so ours are read where they are.
 SOURCES = {
+    "certeig": ROOT / "certeig" / "src",
     "eigenshape": ROOT / "src",
     "eigenshape-studio": ROOT / "studio" / "src",
 }
