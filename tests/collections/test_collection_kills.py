@@ -18,5 +18,5 @@ def test_kills_lose_nothing_and_turned_bits_are_named(store):
     assert done.returncode == 0, done.stderr
     kills, flips = done.stdout.splitlines()
     assert "'kills': 6" in kills
-    named, equal = (re.search(rf"'{word}': (\d+)", flips) for word in ("named", "equal"))
-    assert int(named[1]) + int(equal[1]) == 12
+    # None is silent or bare; of few bits in spare pages, all may change nothing.
+    assert sum(map(int, re.findall(r"'(?:named|equal)': (\d+)", flips))) == 12
