@@ -1,7 +1,7 @@
-"""eigenshape hears the shape of things.
+"""Compare, search, segment and bend 3D shapes by the spectra of their Laplace operators.
 
-A library for spectra, parts, search and deformation of 3D shapes. The functions that most people
-need stand here; all functions stand in the rooms:
+Shapes are meshes, point clouds and tetrahedra. The functions that most people need stand here; all
+functions stand in the rooms:
 
 geometry     meshes and point clouds: measures, topology, geodesics, repairs
 shapes       synthetic shapes, with exact spectra
