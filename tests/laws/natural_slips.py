@@ -293,6 +293,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.scans.DepthCamera: es.scans.DepthCamera,
     es.plot.Panel: lambda: es.plot.Panel(body(), "body", labels(), np.arange(3)),
     es.retrieval.LabeledShape: lambda: es.retrieval.LabeledShape(body(), labels()),
+    es.matching.Outfit: lambda: es.matching.transfer(written_attributes(), body()),
     es.retrieval.LabelTransfer: lambda: es.transfer_labels(
         es.retrieval.LabeledShape(body(), labels()), body()
     ),

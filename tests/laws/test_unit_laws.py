@@ -361,6 +361,7 @@ WITHOUT = {
     "suggest_repairs",
     "to_pyvista",
     "to_trimesh",
+    "transfer",
     "transfer_labels",
     "vertex_components",
     "view",

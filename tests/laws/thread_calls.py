@@ -831,6 +831,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_labeled_shapes": lambda v: [
         shape.labels for shape in es.io.read_labeled_shapes(v.labeled_folder).values()
     ],
+    "transfer": lambda v: es.matching.transfer(v.attributes, es.icosphere(2)).places,
     "transfer_labels": lambda v: es.transfer_labels(v.labeled, v.pose),
     "admissible_times": lambda v: es.stability.admissible_times(
         delta=0.01, spacing=0.02, eigenvalue=9.0

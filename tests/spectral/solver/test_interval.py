@@ -202,7 +202,7 @@ def test_where_counts_and_finds_never_agree_nothing_is_returned(monkeypatch):
         ConvergenceError, match=r"Every eigenvalue that inertia counts .* in the interval were"
     ):
         certified.solve_interval(pencil, counted, lambda done: None)
-    monkeypatch.setattr(certified, "_clear_gaps", lambda values, interval: None)
+    monkeypatch.setattr(certified, "_clear_gaps", lambda *_: None)
     monkeypatch.setattr(certified, "walk_on", lambda pencil, factor, *rest: (pairs.vectors, factor))
     with pytest.raises(ConvergenceError, match="An interval must end in a gap between eigenvalues"):
         certified.solve_interval(pencil, counted, lambda done: None)
