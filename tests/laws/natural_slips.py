@@ -220,6 +220,13 @@ def written_attributes() -> es.io.MeshAttributes:
     return attributes
 
 
+def worn_attributes() -> es.io.MeshAttributes:
+    """Return what a file of a mesh with a field holds besides."""
+    es.io.write_fields(body(), FOLDER / "worn.vtp", {"height": height()})
+    attributes: es.io.MeshAttributes = es.read_mesh(FOLDER / "worn.vtp", attributes=True)[1]
+    return attributes
+
+
 def skulls() -> np.ndarray:
     """Landmarks of four specimens."""
     return np.random.default_rng(0).standard_normal((4, 6, 3)) * FORM.unit
@@ -293,7 +300,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.scans.DepthCamera: es.scans.DepthCamera,
     es.plot.Panel: lambda: es.plot.Panel(body(), "body", labels(), np.arange(3)),
     es.retrieval.LabeledShape: lambda: es.retrieval.LabeledShape(body(), labels()),
-    es.matching.Outfit: lambda: es.matching.transfer(written_attributes(), body()),
+    es.matching.Outfit: lambda: es.matching.transfer(worn_attributes(), body()),
     es.retrieval.LabelTransfer: lambda: es.transfer_labels(
         es.retrieval.LabeledShape(body(), labels()), body()
     ),

@@ -89,7 +89,7 @@ MADE: dict[str, Callable[[Shared], Any]] = {
     "FusedScan": lambda v: es.matching.fuse_scans([v.fish_scan]),
     "IndexReport": lambda v: v.index.verify(),
     "Operator": lambda v: es.operators.OPERATORS["cotangent"],
-    "Outfit": lambda v: es.matching.transfer(v.attributes, es.icosphere(2)),
+    "Outfit": lambda v: es.matching.transfer(v.worn, es.icosphere(2)),
     "Panel": lambda v: es.plot.Panel(v.ball, "a", np.zeros(v.ball.n_faces, int), np.arange(3)),
     "Parcellation": lambda v: v.halves,
     "PartDecomposition": lambda v: es.find_parts(v.animal),

@@ -194,6 +194,8 @@ class Shared:
         es.io.write_fields(self.animal, self.folder / "heat.mgh", {"heat": self.heat[:, 0]})
         self.label_image = np.arange(1000).reshape(10, 10, 10) % 7
         self.attributes = es.read_mesh(self.folder / "ball.ply", attributes=True)[1]
+        es.io.write_fields(es.icosphere(1), self.folder / "worn.vtp", {"x": np.arange(42.0)})
+        self.worn = es.read_mesh(self.folder / "worn.vtp", attributes=True)[1]
 
 
 def drawn(figure: Any) -> bytes:
@@ -831,7 +833,7 @@ CALLS: dict[str, Callable[[Shared], object]] = {
     "read_labeled_shapes": lambda v: [
         shape.labels for shape in es.io.read_labeled_shapes(v.labeled_folder).values()
     ],
-    "transfer": lambda v: es.matching.transfer(v.attributes, es.icosphere(2)).places,
+    "transfer": lambda v: es.matching.transfer(v.worn, es.icosphere(2)).places,
     "transfer_labels": lambda v: es.transfer_labels(v.labeled, v.pose),
     "admissible_times": lambda v: es.stability.admissible_times(
         delta=0.01, spacing=0.02, eigenvalue=9.0
