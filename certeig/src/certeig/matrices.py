@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
-from certeig.kit.arrays import as_array
+from certeig.kit.arrays import as_array, freeze
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 
@@ -89,3 +89,12 @@ def find_zero_row_sums(matrix: sp.sparray) -> Bool[np.ndarray, " n"]:
     """
     sums, sizes = np.abs(matrix.sum(axis=1)), abs(matrix).sum(axis=1)
     return sums <= ZERO_ROW_SUM * sizes
+
+
+def on_all_rows(
+    vectors: Float[np.ndarray, "f k"], free: Int[np.ndarray, " f"], n: int
+) -> Float[np.ndarray, "n k"]:
+    """Extend vectors on the free rows by zeros at the fixed ones; the result is read-only."""
+    every = np.zeros((n, vectors.shape[1]))
+    every[free] = vectors
+    return freeze(every)

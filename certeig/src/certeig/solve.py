@@ -12,7 +12,7 @@ from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
-from certeig.matrices import as_symmetric, require_points
+from certeig.matrices import as_symmetric, on_all_rows, require_points
 from certeig.solver.certified import certified_pairs
 from certeig.solver.certify import certify_pairs, in_user_units
 from certeig.solver.inertia import count_below_shift
@@ -128,7 +128,7 @@ def eigenpairs(  # noqa: PLR0913 - one keyword for each choice of pairs
     report(1.0, "proved complete")
     return Spectrum(
         eigenvalues=freeze(values),
-        eigenvectors=vectors if free is None else _on_all_unknowns(vectors, free, whole.shape[0]),
+        eigenvectors=vectors if free is None else on_all_rows(vectors, free, whole.shape[0]),
         mass=whole,
         residuals=freeze(pencil.values_out(pairs.residuals)),
         certificate=proof,
@@ -314,12 +314,3 @@ def _interval(
             f"above must be less than below; above is {above} and below is {below}."
         )
     return np.array([low, high])
-
-
-def _on_all_unknowns(
-    vectors: Float[np.ndarray, "f k"], free: Int[np.ndarray, " f"], n: int
-) -> Float[np.ndarray, "n k"]:
-    """Extend eigenvectors by zeros at the fixed unknowns."""
-    every = np.zeros((n, vectors.shape[1]))
-    every[free] = vectors
-    return freeze(every)

@@ -36,6 +36,16 @@ ROUNDING = 1e-5
 
 
 @record
+class _Measures:
+    """A surface scaled to area 1: its points, area vectors and areas of faces, and lengths of edges."""
+
+    points: Float[np.ndarray, "n 3"]
+    vectors: Float[np.ndarray, "f 3"]
+    areas: Float[np.ndarray, " f"]
+    lengths: Float[np.ndarray, " e"]
+
+
+@record
 class _Cut:
     """What rises from a ledge: its faces, its area, the creases at its foot, and the odds of a part."""
 
@@ -71,10 +81,11 @@ def crease_tree(mesh: TriangleMesh, heat: Float[np.ndarray, " n"]) -> PartTree:
         With the persistence o / (1 + o), at least `FINE_CONTRAST`.
     """
     n_bodies, bodies = label_components(mesh.n_faces, *face_pairs(edge_table(mesh))[0].T)
-    areas, lengths = _measures(mesh)
+    measures = _measure(mesh)
+    areas, lengths = measures.areas, measures.lengths
     cuts: list[_Cut] = []
     labels, parents = bodies, [-1] * n_bodies
-    for cut in sorted(_cuts_at_ledges(mesh), key=lambda cut: -cut.odds):
+    for cut in sorted(_cuts_at_ledges(mesh, measures), key=lambda cut: -cut.odds):
         used = np.concatenate([np.empty(0, dtype=np.int64), *(other.creases for other in cuts)])
         fresh = np.setdiff1d(cut.creases, used)
         if lengths[fresh].sum() < LEAST_FRESH * lengths[cut.creases].sum():
@@ -102,21 +113,25 @@ def crease_tree(mesh: TriangleMesh, heat: Float[np.ndarray, " n"]) -> PartTree:
     return tree_of_merges(Segmentation(labels, points), merges)
 
 
-def _measures(mesh: TriangleMesh) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, " e"]]:
-    """Return the areas of faces and the lengths of edges, of the surface scaled to area 1."""
-    points, _ = scale_to_unit(mesh)
-    areas = np.linalg.norm(area_vectors(points[mesh.faces]), axis=1)
-    begin, end = points[edge_table(mesh).edges].transpose(1, 0, 2)
-    return areas / areas.sum(), np.linalg.norm(end - begin, axis=1) / areas.sum() ** 0.5
-
-
-def _cuts_at_ledges(mesh: TriangleMesh) -> Iterator[_Cut]:
-    """List what rises from each flat ledge behind a concave crease, if the odds are high enough."""
+def _measure(mesh: TriangleMesh) -> _Measures:
+    """Scale a surface to area 1, and measure its faces and edges."""
     points, _ = scale_to_unit(mesh)
     vectors = area_vectors(points[mesh.faces])
-    scale = np.linalg.norm(vectors, axis=1).sum()
-    points, vectors = points / scale**0.5, vectors / scale
-    areas, lengths = _measures(mesh)
+    areas = np.linalg.norm(vectors, axis=1)
+    begin, end = points[edge_table(mesh).edges].transpose(1, 0, 2)
+    area = areas.sum()
+    return _Measures(
+        points / area**0.5,
+        vectors / area,
+        areas / area,
+        np.linalg.norm(end - begin, axis=1) / area**0.5,
+    )
+
+
+def _cuts_at_ledges(mesh: TriangleMesh, measures: _Measures) -> Iterator[_Cut]:
+    """List what rises from each flat ledge behind a concave crease, if the odds are high enough."""
+    points, vectors = measures.points, measures.vectors
+    areas, lengths = measures.areas, measures.lengths
     table = edge_table(mesh)
     pairs, edges = face_pairs(table)
 

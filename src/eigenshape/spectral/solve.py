@@ -15,6 +15,7 @@ from certeig.kit.files import as_path
 from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
+from certeig.matrices import on_all_rows
 from certeig.solver.certified import certified_pairs
 from certeig.solver.certify import in_user_units
 from certeig.solver.eigenpairs import Pairs
@@ -294,6 +295,5 @@ def _on_all_points(
     """Extend eigenvectors of the free points by zeros at the fixed ones."""
     if free is None:
         return spectrum
-    vectors = np.zeros((laplacian.n_points, spectrum.eigenvectors.shape[1]))
-    vectors[free] = spectrum.eigenvectors
-    return replace(spectrum, eigenvectors=freeze(vectors), mass=laplacian.mass)
+    vectors = on_all_rows(spectrum.eigenvectors, free, laplacian.n_points)
+    return replace(spectrum, eigenvectors=vectors, mass=laplacian.mass)
