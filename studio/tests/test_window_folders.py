@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from test_company import collection  # noqa: F401  a fixture
-from test_opening import folder, index  # noqa: F401  fixtures
+from test_studio_opening import folder, index  # noqa: F401  fixtures
 from test_workspace import Page
 
 import eigenshape as es

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,13 @@ def test_the_readme_runs_the_checks_and_ci_the_rest_of_them():
     commands = (ROOT / "README.md").read_text().split("```")[1]
     assert commands.rstrip().endswith("python3 check.py")
     assert "\npython3 check.py --rest\n" in (ROOT / ".ci" / "run").read_text()
+
+
+def test_no_two_test_files_have_the_same_name():
+    # pytest imports them by name, and a second one of a name is an error in one process of two
+    folders = [ROOT / "tests", ROOT / "studio" / "tests", ROOT / "certeig" / "tests"]
+    names = Counter(path.name for folder in folders for path in folder.rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 @pytest.mark.parametrize(
