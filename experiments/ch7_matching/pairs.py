@@ -173,13 +173,32 @@ def make_pair(
     animal: str, poses: tuple[str, str], kind: str, seed: int, *, stretch: bool = False
 ) -> Pair:
     """Return a part of the first pose, which may be stretched, and the second pose as a whole."""
-    rng = np.random.default_rng(seed)
     first, second = (read_shape(pose) for pose in poses)
     if stretch:
         # drawn apart, so that what is cut does not depend on it
         first = stretched(first, np.random.default_rng(seed + 7))
-    whole = remesh(second, N_VERTICES, np.random.default_rng(1))
-    part = cut(remesh(first, N_VERTICES, np.random.default_rng(2)), kind, rng)
+    name = f"{kind} {seed}: {poses[0]} on {poses[1]}"
+    rest = read_shape(SYMMETRIC[animal]) if animal in SYMMETRIC else None
+    return pair_of(name, (first, second), kind, np.random.default_rng(seed), rest=rest)
+
+
+def pair_of(
+    name: str,
+    poses: tuple[es.TriangleMesh, es.TriangleMesh],
+    kind: str,
+    rng: np.random.Generator,
+    *,
+    sizes: tuple[int, int] = (N_VERTICES, N_VERTICES),
+    rest: es.TriangleMesh | None = None,
+) -> Pair:
+    """Return a part of the first of two shapes with the same faces, and the second one as a whole.
+
+    `sizes` are the vertices of the first shape before it is cut and of the whole; `rest` is a pose
+    that is its own mirror image.
+    """
+    first, second = poses
+    whole = remesh(second, sizes[1], np.random.default_rng(1))
+    part = cut(remesh(first, sizes[0], np.random.default_rng(2)), kind, rng)
     foot = es.geometry.closest_points(first, part.vertices)
     # Tubes of bridges lie on no place of the animal.
     unit = np.sqrt(es.geometry.surface_area(first))
@@ -189,8 +208,7 @@ def make_pair(
     corners, weights = first.faces[foot.simplices[chosen]], foot.weights[chosen]
     points = np.einsum("pc,pcd->pd", weights, second.vertices[corners])
     mirrored = mirrored_distances = None
-    if animal in SYMMETRIC:
-        rest = read_shape(SYMMETRIC[animal])
+    if rest is not None:
         images = np.einsum("pc,pcd->pd", weights, rest.vertices[corners]) * [-1, 1, 1]
         image = es.geometry.closest_points(rest, images)
         mirrored = np.einsum(
@@ -202,7 +220,6 @@ def make_pair(
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     part = es.TriangleMesh(part.vertices @ turn.T, part.faces)
-    name = f"{kind} {seed}: {poses[0]} on {poses[1]}"
     return Pair(name, part, whole, chosen, points, distances, mirrored, mirrored_distances)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
@@ -30,6 +30,7 @@ def match(
     whole: Path,
     *,
     scale: str = "auto",
+    mirrored: Annotated[bool | None, typer.Option("--mirrored/--no-mirrored")] = None,
     repair: str = "auto",
     output: Path | None = None,
     picture: Path | None = None,
@@ -54,7 +55,11 @@ def match(
         Size of the part: known if both files have one unit of length, unknown to search for it, or
         a number by which lengths of the part are multiplied. auto takes the root of the ratio of
         areas if both shapes are complete and differ in size, known if not, and unknown if the part
-        is too large or too small for that.
+        is too large or too small for that. If the proportions differ, as those of a broken bone,
+        known is tried, too.
+    mirrored
+        Match the mirror image of the part, as a left hand to a right one. By default it is tried where
+        patches suggest it, and what was done is printed; --no-mirrored never does that.
     output
         Write the map: a table with face, weights and confidence of each vertex of the part (CSV),
         the same as arrays (NPZ), or the nearest vertex of the whole, one a line, as `stability
@@ -74,7 +79,8 @@ def match(
             ) from error
     ours, theirs = (steps.load_surface(path, repair) for path in (mesh, whole))
     with progress_bar("match") as progress:
-        found = es.match_shapes(ours, theirs, scale=size, progress=progress)
+        side_of_part = "auto" if mirrored is None else mirrored
+        found = es.match_shapes(ours, theirs, scale=size, mirrored=side_of_part, progress=progress)
     if as_json:
         each = {"vertices": found.vertices, "vertex_confidence": found.confidence}
         print_json({"path": mesh, "whole": whole, **_match_facts(found), **each})
@@ -105,7 +111,8 @@ def _print_match(found: es.matching.ShapeMatch) -> None:
     if found.n_equally_good > 1:
         text += (
             f" At least {found.n_equally_good} maps that differ fit equally well, since the shape "
-            "can be turned into itself or the whole has equal pieces; this is one of them."
+            "can be turned into itself, the whole has equal pieces, or nothing tells the places of a "
+            "small part apart; this is one of them."
         )
     out.print("\n".join([text, *(f"{sentence}." for sentence in found.report)]))
 

@@ -240,7 +240,7 @@ def _posed_fits(
         for mirrored in sides:
             if mirrored:
                 source = TriangleMesh(source.vertices @ MIRROR, source.faces[:, ::-1])
-            image = match_shapes(source, whole).pull(target.vertices)
+            image = match_shapes(source, whole, mirrored=False).pull(target.vertices)
             fit = bend_onto(source, image, target, LEVELS)
             side: Side = "mirrored" if mirrored else "same"
             fits.append(replace(fit, method="intrinsic", side=side))

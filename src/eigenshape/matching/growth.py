@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from certeig.kit.threads import map_in_threads
 from eigenshape.geometry.measure import edge_lengths
 from eigenshape.matching.assignment import N_FAR, assign_far_points
-from eigenshape.matching.evidence import FittedMap
+from eigenshape.matching.evidence import OTHER_PLACE, FittedMap
 from eigenshape.matching.fitting import (
     LARGEST_GAP,
     Fit,
@@ -31,6 +31,15 @@ from eigenshape.matching.pairs import (
 )
 from eigenshape.matching.spectral_refinement import Modes, smooth_places
 from eigenshape.matching.surface import Surface
+from eigenshape.matching.turns import (
+    APART,
+    NEARLY_RIGID,
+    Turn,
+    is_rigid,
+    rolled_turns,
+    settle_map,
+    turned_fit,
+)
 
 # Of rough bends, the best ones are grown, the first few before the others; of grown maps, the best
 # few once more
@@ -41,6 +50,7 @@ N_GROWN, N_FIRST_GROWN, N_GROWN_AGAIN = 9, 4, 4
 N_TRIED = 10
 # Modes that make a map smooth before the part is bent again: 30 and 100 lower the misfit less.
 N_LOW_MODES = 60
+N_BENT_ROLLS = 2  # rolls of a nearly rigid part from which it is bent
 MOST_SMOOTHINGS = 2  # it ends earlier if a bend is no better
 # Misfit up to which a map is as good as any, and the same in mean edges of the whole, which is more
 # on coarse meshes. The best rivals of 24 balls, ellipsoids, rings, cylinders and boxes, turned into
@@ -55,8 +65,11 @@ EQUALLY_GOOD, EQUALLY_GOOD_IN_EDGES = 4.5e-3, 0.12
 # copies with 1,500, and of eight beams, crosses and jacks, the whole search finds the same numbers; of 41
 # creatures, whole or scanned, and 15 round shapes, it finds a second map of one hand.
 NEARLY_AS_GOOD = 1.2
-# Two places differ if they are farther apart, in units: 0.05 √area, as in the confidence.
-OTHER_PLACE = 0.06
+# A part with less of the area of the whole may lie in another place that fits as well but for what a
+# pose changes: a turn leaves at most POSED, in units, and so many times as much as that of the map.
+# At its true place in another pose, a foot of a quadruped is 0.0027 to 0.0068 away from the surface by
+# a turn; at the ends of other legs, 0.0011 to 0.0016.
+SMALL_SHARE, POSED, TIMES_AS_FAR, N_SMALL_PLACES = 0.15, 0.008, 6.0, 8
 MOST_OF_AREA = 0.5  # two maps differ if they do over this share of the part
 TAKEN = 0.12  # places this near to the image of a point are taken by the best map
 
@@ -104,16 +117,24 @@ def _best_first(maps: list[FittedMap]) -> list[FittedMap]:
 
 def find_maps(
     plan: FitPlan, differences: Float[np.ndarray, "m k"], ours: Modes, theirs: Modes
-) -> list[FittedMap]:
-    """Return maps of a part, the best fit first, which low modes made smooth and which slid.
+) -> tuple[list[FittedMap], Turn | None]:
+    """Return maps of a part, the best fit first, and the rigid turn in which the best one settles.
 
-    A part with so few points that it bends to any map has none.
+    A rigid part is turned. Of others, the best map is made smooth by low modes, and slides. A part
+    with so few points that it bends to any map has none.
     """
     maps = grow_maps(plan, differences) if len(plan.part.points) >= N_FAR else []
     if not maps:
-        return []
+        return [], None
     # Bend the part again from the best map, made smooth by low modes, as long as that is better.
     # The new map takes the place of the one that it was made from, and keeps its pairs.
+    turn = settle_map(plan, maps[0].fit.places)
+    if not is_rigid(plan, turn) and turn.gap < NEARLY_RIGID:
+        # Bending forgives a roll about a long axis, so that starts that are rolled are missing.
+        maps = _best_first(maps + _rolled_maps(plan, differences, maps[0], turn))
+        turn = settle_map(plan, maps[0].fit.places)
+    if is_rigid(plan, turn):
+        return [FittedMap(maps[0].pairs, turned_fit(plan, turn)), *maps[1:]], turn
     best = maps[0]
     for _ in range(MOST_SMOOTHINGS):
         places, _ = smooth_places(ours, theirs, best.fit.places, N_LOW_MODES)
@@ -121,7 +142,25 @@ def find_maps(
         if fit.misfit >= best.fit.misfit:
             break
         best = FittedMap(best.pairs, fit)
-    return [FittedMap(best.pairs, slide_part(plan, best.fit)), *maps[1:]]
+    return [FittedMap(best.pairs, slide_part(plan, best.fit)), *maps[1:]], turn
+
+
+def _rolled_maps(
+    plan: FitPlan, differences: Float[np.ndarray, "m k"], best: FittedMap, turn: Turn
+) -> list[FittedMap]:
+    """Return maps that are bent from rolls of the turn of the best map, to other places than that."""
+    maps = []
+    for rolled in rolled_turns(plan, turn)[:N_BENT_ROLLS]:
+        start = turned_fit(plan, rolled)
+        # Where the best map lies already, nearest points only add mistakes, as those of fingers on
+        # the next finger. Bones that it rolls are 0.08 away from the best roll, hands 0.03.
+        away = np.linalg.norm(start.points - best.fit.points, axis=1)
+        if plan.shares @ away < APART:
+            continue
+        pairs = _grow_again(plan, descriptor_costs(differences), [start.select(plan.part.points)])
+        if pairs:
+            maps.append(FittedMap(pairs[0], fit_part(plan, start.places[plan.frames])))
+    return maps
 
 
 def grow_maps(
@@ -185,30 +224,53 @@ def _grow_again(plan: FitPlan, costs: Float[np.ndarray, "m k"], fits: list[Fit])
 
 
 def equally_good_maps(
-    plan: FitPlan, differences: Float[np.ndarray, "m k"], maps: Sequence[FittedMap]
+    plan: FitPlan, differences: Float[np.ndarray, "m k"], maps: Sequence[FittedMap], turn: Turn
 ) -> tuple[int, Float[np.ndarray, " n"]]:
     """Count maps that differ from each other and fit as well as any, the first one among them.
 
     It is 0 if the first one does not. Also return at how many places each vertex may lie: 1, and 1
     for each other map that moves it.
     """
-    best = maps[0]
+    best, whole = maps[0], plan.whole
     found, n_places = [best], np.ones(len(plan.shares))
-    most = max(EQUALLY_GOOD, EQUALLY_GOOD_IN_EDGES * float(edge_lengths(plan.whole.mesh).mean()))
-    if best.fit.misfit > most:
+    most = max(EQUALLY_GOOD, EQUALLY_GOOD_IN_EDGES * float(edge_lengths(whole.mesh).mean()))
+    if plan.part.area < SMALL_SHARE * whole.area and turn.gap < POSED:
+        rivals, most = _small_places(plan, maps), min(POSED, TIMES_AS_FAR * turn.gap)
+    elif best.fit.misfit > most:
         return 0, n_places
-
-    # Starts of a search all lead to one map if that fits perfectly. So the search is repeated with
-    # patches that are less alike where the first map places them.
-    ends = plan.whole.nearest[best.fit.places[plan.part.points]]
-    taken = plan.whole.between[ends] < TAKEN
-    unlike = differences + np.median(differences) * taken
-    others = grow_maps(plan, unlike, wanted=NEARLY_AS_GOOD * most, known=best)
-    for one in [*maps[1:], *others]:
+    else:
+        # Starts of a search all lead to one map if that fits perfectly. So the search is repeated with
+        # patches that are less alike where the first map places them.
+        ends = whole.nearest[best.fit.places[plan.part.points]]
+        unlike = differences + np.median(differences) * (whole.between[ends] < TAKEN)
+        others = grow_maps(plan, unlike, wanted=NEARLY_AS_GOOD * most, known=best)
+        rivals = [*maps[1:], *others]
+        if is_rigid(plan, turn):
+            # What bends to another place is no rival of what fits as it is.
+            turns = [settle_map(plan, one.fit.places) for one in rivals]
+            rivals = [
+                FittedMap(one.pairs, turned_fit(plan, turn))
+                for one, turn in zip(rivals, turns, strict=True)
+                if is_rigid(plan, turn)
+            ]
+    for one in rivals:
         if one.fit.misfit <= most and all(_differ(plan, one, other) for other in found):
             found.append(one)
             n_places += _placed_apart(plan, best, one)
     return len(found), n_places
+
+
+def _small_places(plan: FitPlan, maps: Sequence[FittedMap]) -> list[FittedMap]:
+    """Return where a small part lies by turns that settle from different maps, rolled, too."""
+    different: list[FittedMap] = []
+    for one in maps:
+        if all(_differ(plan, one, other) for other in different):
+            different.append(one)
+    places = []
+    for one in different[:N_SMALL_PLACES]:
+        rolled = rolled_turns(plan, settle_map(plan, one.fit.places))
+        places += [FittedMap(one.pairs, turned_fit(plan, turn)) for turn in rolled[:N_BENT_ROLLS]]
+    return places
 
 
 def _differ(plan: FitPlan, one: FittedMap, other: FittedMap) -> bool:

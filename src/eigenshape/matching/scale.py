@@ -7,6 +7,7 @@ import numpy as np
 from certeig.kit.errors import InvalidParameterError
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
+from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import boundary_loops
 from eigenshape.matching.evidence import rate_map
 from eigenshape.matching.fitting import plan_fit
@@ -22,6 +23,9 @@ MOST_AREA = 1.5
 # Two complete shapes whose lengths differ by less, by the root of their areas, are taken as one
 # individual in one unit: poses of one cat differ by up to 5 %, those of a centaur by 6 %.
 SAME_SIZE = 1.1
+# Spreads along the longest axis that differ by more, as a logarithm, are of other proportions: that of
+# a bone without 30 % of its length is 0.2 smaller.
+OTHER_PROPORTIONS = 0.1
 # A shape is complete if its boundaries are as long as the boundaries of discs with this share of its
 # area in all.
 LARGEST_HOLES = 0.05
@@ -46,10 +50,13 @@ def require_scale(scale: object) -> str | float:
     return float(numbers)
 
 
-def choose_factor(
+def choose_factors(
     mesh: TriangleMesh, pieces: Sequence[Piece], target: MatchTarget, scale: str | float
-) -> tuple[float, tuple[str, ...]]:
-    """Return the factor for lengths of a part, and a sentence that says so if it was chosen."""
+) -> list[tuple[float, tuple[str, ...]]]:
+    """Return the factors for lengths of a part to try, each with a sentence if it was chosen.
+
+    They are two if both shapes look complete but one may be broken.
+    """
     area = sum(piece.clean_area() for piece in pieces)
     ratio = target.area / area
     if scale == "auto" and is_complete(mesh) and is_complete(target.mesh):
@@ -62,13 +69,24 @@ def choose_factor(
             reason = f"the areas of piece 0 of the part and piece {nearest} of the whole"
         factor = float(np.sqrt(ratio))
         if 1 / SAME_SIZE < factor < SAME_SIZE:
-            return 1.0, ()
+            return [(1.0, ())]
         chosen = f"lengths of the part were multiplied by {factor:.3g}"
-        return factor, (f"{chosen}, the root of the ratio of {reason}",)
+        scaled = factor, (f"{chosen}, the root of the ratio of {reason}",)
+        # A broken bone has other proportions; the area without noise of a coarse mesh is too small.
+        lengths = [_relative_length(shape) for shape in (mesh, target.mesh)]
+        change = abs(np.log(lengths[0] / lengths[1]))
+        given = surface_area(target.mesh) / surface_area(mesh)
+        is_same = 1 / SAME_SIZE**2 < given < SAME_SIZE**2
+        if ratio * MOST_AREA > 1 and (change > OTHER_PROPORTIONS or is_same):
+            known = "both shapes are in one unit: they look complete, but that map is surer"
+            return [scaled, (1.0, (known,))]
+        return [scaled]
     is_small = max(piece.area for piece in pieces) < LEAST_AREA * surface_area(target.mesh)
     if scale == "unknown" or (scale == "auto" and (is_small or ratio * MOST_AREA < 1)):
         factor = _find_factor(pieces[0], target)
-        return factor, (f"lengths of the part were multiplied by {factor:.3g}, which fits best",)
+        return [
+            (factor, (f"lengths of the part were multiplied by {factor:.3g}, which fits best",))
+        ]
     factor = 1.0 if isinstance(scale, str) else scale
     # Noise must not refuse a whole, but an area with noise is enough to accept it.
     if min(area, surface_area(mesh)) * factor**2 > MOST_AREA * surface_area(target.mesh):
@@ -77,7 +95,15 @@ def choose_factor(
             f'{factor**2 / ratio:.3g} times. Exchange the two shapes, or pass scale="unknown" '
             "(--scale unknown on the command line)."
         )
-    return factor, ()
+    return [(factor, ())]
+
+
+def _relative_length(mesh: TriangleMesh) -> float:
+    """Return the spread along the longest axis, in roots of the area."""
+    areas = dual_volumes(mesh)
+    points = mesh.vertices - areas @ mesh.vertices / areas.sum()
+    spreads = np.linalg.eigvalsh((points * areas[:, None]).T @ points)
+    return float(np.sqrt(spreads[-1])) / float(areas.sum())
 
 
 def is_complete(mesh: TriangleMesh) -> bool:

@@ -36,7 +36,7 @@ class ShapeMatch(ReadOnly):
         support, mean difference, and the logarithm of the gap after bending times the root of strain.
     score : float
         How good the whole map is, 0 to 1: orientation × coverage² × support of pairs × likeness⁴ of
-        patches. Of several scales the one with the highest score is taken.
+        patches. Of the sizes that `scale="unknown"` tries, the one with the highest score is taken.
     orientation : float
         Share of the part's area that the map keeps, minus the share that it turns over.
     coverage : float
@@ -48,10 +48,13 @@ class ShapeMatch(ReadOnly):
     n_equally_good : int
         How many maps that differ over most of the part fit as well as this one, itself among them: 1
         if it is the only one. A ball turned on itself has many, a cube 24. The search ends at about
-        ten. A whole of two equal pieces has two, and `report` names the other piece. Where other maps
+        ten. A whole of two equal pieces has two, and `report` names the other piece. A small part has
+        one more for each place that fits but for what a pose changes. Where other maps
         place a vertex elsewhere, its confidence is divided by their number.
     scale : float
         Factor by which lengths of the part were multiplied.
+    mirrored : bool
+        Whether the mirror image of the part was matched.
     report : tuple of str
         What was chosen or left out, in sentences: the scale, loose pieces, and, of a whole of several
         pieces, which piece of the part was placed on which of them.
@@ -82,6 +85,7 @@ class ShapeMatch(ReadOnly):
     n_equally_good: int
     scale: float
     report: tuple[str, ...]
+    mirrored: bool = False
 
     @property
     def n_vertices(self) -> int:

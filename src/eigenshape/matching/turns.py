@@ -1,0 +1,110 @@
+"""Rigid turns of a part on a whole: they decide what bending leaves open.
+
+Bending forgives a roll about a long axis, and another place on a smooth surface. A rigid turn does
+not: how far points and normals stay from the whole tells turns and places apart.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial.transform import Rotation
+
+from certeig.kit.arrays import record
+from eigenshape.geometry.measure import nearest_rotations
+from eigenshape.matching.fitting import LARGEST_GAP, NORMAL_LENGTH, Fit, FitPlan
+from eigenshape.matching.spectral_refinement import places_in_faces
+
+N_ROLLS = 12  # about the long axis, each also with the ends exchanged
+N_ROLLED = 80  # samples by which rolls are compared
+N_ROLL_STEPS, N_STEPS = 6, 10  # of nearest points; a roll of 15 degrees settles in six
+# Mean distance from the surface up to which a turn is the whole answer, in roots of the part's area. Copies
+# with other triangles have 1e-4 to 1e-3; other poses, other bones and mirror images have 7e-3 and more.
+RIGID = 0.003
+# Mean distance, in units, up to which rolls are tried: two metacarpals have 0.014, two poses of an animal 0.03.
+NEARLY_RIGID = 0.025
+# Two turns differ if they place samples this far apart on average, in units.
+APART = 0.06
+
+
+@record
+class Turn:
+    """A rigid motion x ↦ R x + t of a part, and how far it leaves points from the surface, in units.
+
+    `nearest` is the vertex of the whole that is nearest to each of these points, by normals, too.
+    """
+
+    rotation: Float[np.ndarray, "3 3"]
+    shift: Float[np.ndarray, " 3"]
+    nearest: Int[np.ndarray, " v"]
+    gap: float = np.inf
+
+    def move(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """Return where points go."""
+        return points @ self.rotation.T + self.shift
+
+
+def settle(
+    plan: FitPlan, ends: Float[np.ndarray, "v 3"], vertices: Int[np.ndarray, " v"], steps: int
+) -> Turn:
+    """Turn vertices of a part to given places, then by nearest points that face the same way.
+
+    That is Kabsch 1976 in each step of Besl and McKay 1992.
+    """
+    part, whole = plan.part, plan.whole.mesh
+    starts, weights = part.mesh.vertices[vertices], part.areas[vertices]
+    weights = weights / weights.sum()
+    middle = weights @ starts
+    for step in range(steps):
+        target = weights @ ends
+        products = ((ends - target) * weights[:, None]).T @ (starts - middle)
+        rotation = nearest_rotations(products[None])[0]
+        points = target + (starts - middle) @ rotation.T
+        normals = part.normals[vertices] @ rotation.T
+        nearest = plan.tree.query(np.hstack([points, NORMAL_LENGTH * normals]))[1]
+        ends = whole.vertices[nearest]
+        # Vertices show the way; on a coarse whole, the surface between them ends it.
+        if 2 * step + 1 >= steps:
+            faces, shares = places_in_faces(whole, whole.vertices, points, nearest)
+            ends = np.einsum("vc,vcd->vd", shares, whole.vertices[whole.faces[faces]])
+    gap = float(weights @ np.linalg.norm(points - ends, axis=1))
+    return Turn(rotation, target - rotation @ middle, nearest, gap)
+
+
+def settle_map(plan: FitPlan, places: Int[np.ndarray, " n"]) -> Turn:
+    """Return the turn in which a map settles."""
+    ends = plan.whole.mesh.vertices[places[plan.samples]]
+    return settle(plan, ends, plan.samples, N_STEPS)
+
+
+def is_rigid(plan: FitPlan, turn: Turn) -> bool:
+    """Return whether a turn alone places the part as well as can be expected."""
+    return turn.gap < RIGID * float(np.sqrt(plan.part.area))
+
+
+def turned_fit(plan: FitPlan, turn: Turn) -> Fit:
+    """Return a turn of all vertices as a fit without strain, whose misfit is the gap."""
+    vertices = np.arange(plan.part.mesh.n_vertices)
+    final = settle(plan, turn.move(plan.part.mesh.vertices), vertices, 1)
+    points = final.move(plan.part.mesh.vertices)
+    gaps = np.linalg.norm(points - plan.whole.mesh.vertices[final.nearest], axis=1)
+    return Fit(points, final.nearest, np.minimum(gaps, LARGEST_GAP), final.gap)
+
+
+def rolled_turns(plan: FitPlan, turn: Turn) -> list[Turn]:
+    """Return turns that differ, settled from rolls of one about the long axis, the best first."""
+    vertices = plan.samples[:: max(len(plan.samples) // N_ROLLED, 1)]
+    points = plan.part.mesh.vertices[vertices]
+    middle = points.mean(axis=0)
+    axes = np.linalg.svd(points - middle, full_matrices=False)[2]
+    found = []
+    for flip in (0.0, np.pi):
+        for angle in 2 * np.pi * np.arange(N_ROLLS) / N_ROLLS:
+            roll = Rotation.from_rotvec(flip * axes[1]) * Rotation.from_rotvec(angle * axes[0])
+            rolled = middle + (points - middle) @ roll.as_matrix().T
+            found.append(settle(plan, turn.move(rolled), vertices, N_ROLL_STEPS))
+    kept: list[Turn] = []
+    for one in sorted(found, key=lambda one: one.gap):
+        moved = one.move(points)
+        away = [np.linalg.norm(moved - other.move(points), axis=1).mean() for other in kept]
+        if min(away, default=np.inf) > APART:
+            kept.append(one)
+    return kept

@@ -1,0 +1,98 @@
+"""Rigid turns decide between rolls of a long bone and places of an irregular stone."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import eigenshape as es
+from certeig.kit.errors import InvalidParameterError
+from eigenshape.matching.fitting import plan_fit
+from eigenshape.matching.match import match_shapes
+from eigenshape.matching.surface import describe_surface
+from eigenshape.matching.turns import is_rigid, rolled_turns, settle_map
+
+TURN = Rotation.from_rotvec([0.4, 1.0, 2.0]).as_matrix()
+
+
+def stone(n_vertices, *, length=1.0):
+    """Return a ball with bumps, stretched along x."""
+    ball = es.shapes.fibonacci_sphere(n_vertices)
+    rng = np.random.default_rng(3)
+    heights = np.ones(n_vertices)
+    for waves in (2, 2, 3, 4, 5):
+        direction, phase = rng.standard_normal(3), rng.uniform(0, 6)
+        heights += 0.12 * np.sin(waves * ball.vertices @ direction + phase)
+    return es.TriangleMesh(ball.vertices * heights[:, None] * [length, 1, 1], ball.faces)
+
+
+def turned(mesh):
+    return es.TriangleMesh(mesh.vertices @ TURN.T + 2.0, mesh.faces)
+
+
+def gaps(match, whole, truth):
+    unit = np.sqrt(es.geometry.surface_area(whole))
+    return np.linalg.norm(match.pull(whole.vertices) - truth, axis=1) / unit
+
+
+def plan_of(part, whole):
+    unit = 1.2 * float(np.sqrt(es.geometry.surface_area(whole)))
+    return plan_fit(describe_surface(part, unit, 100), describe_surface(whole, unit, 100))
+
+
+def test_a_map_of_a_copy_settles_in_the_turn_that_made_it():
+    whole = stone(600)
+    plan = plan_of(turned(whole), whole)
+    turn = settle_map(plan, np.arange(600))
+    assert np.allclose(turn.rotation, TURN.T, atol=1e-6)
+    assert turn.gap < 1e-6
+    assert is_rigid(plan, turn)
+
+
+def test_the_best_roll_of_a_wrong_one_is_the_true_turn():
+    whole = stone(600, length=3.0)
+    wrong = whole.vertices @ Rotation.from_rotvec([2.0, 0, 0]).as_matrix()
+    plan = plan_of(es.TriangleMesh(wrong, whole.faces), whole)
+    rolled = rolled_turns(plan, settle_map(plan, np.arange(600)))
+    assert np.degrees(Rotation.from_matrix(rolled[0].rotation).magnitude()) == pytest.approx(
+        np.degrees(2.0), abs=3
+    )
+    assert rolled[0].gap < 0.5 * rolled[1].gap
+
+
+@pytest.mark.long
+def test_a_fragment_of_an_irregular_stone_has_one_place():
+    whole, other = stone(1500), stone(1300)
+    part = es.scans.cut_by_planes(other, [[0, 1, 0, -0.1]]).mesh
+    match = match_shapes(turned(part), whole)
+    assert (gaps(match, whole, part.vertices) < 0.05).all()
+    assert match.n_equally_good == 1
+    assert match.confidence.mean() > 0.9
+
+
+@pytest.mark.long
+def test_the_upper_part_of_a_capped_bone_is_not_enlarged():
+    whole = stone(1200, length=5.0)
+    part = es.scans.cut_by_planes(whole, [[1, 0, 0, -1.7]]).mesh
+    match = match_shapes(turned(part), whole)
+    assert match.scale == 1.0
+    assert (gaps(match, whole, part.vertices) < 0.05).mean() > 0.95
+
+
+@pytest.mark.long
+def test_a_left_hand_is_matched_to_a_right_one_as_its_mirror_image():
+    right = es.make_creature("hand", 1, n_vertices=800)
+    left = es.TriangleMesh(right.vertices * [-1, 1, 1], right.faces[:, ::-1])
+    match = match_shapes(turned(left), right)
+    assert match.mirrored
+    assert match.report[-1].startswith("the part was matched as its mirror image")
+    assert (gaps(match, right, right.vertices) < 0.05).mean() > 0.95
+    never = match_shapes(turned(left), right, mirrored=False)
+    assert not never.mirrored
+    assert never.confidence.mean() < match.confidence.mean()
+    always = match_shapes(turned(left), right, mirrored=True)
+    assert np.array_equal(always.vertices, match.vertices)
+
+
+def test_a_wrong_word_for_mirrored_is_refused():
+    with pytest.raises(InvalidParameterError, match='mirrored must be "auto", True or False'):
+        match_shapes(es.icosphere(1), es.icosphere(1), mirrored="maybe")
