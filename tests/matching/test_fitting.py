@@ -13,6 +13,7 @@ from eigenshape.matching.pairs import patch_differences
 from eigenshape.matching.spectral_refinement import lowest_modes, modes_of_part, smooth_places
 from eigenshape.matching.surface import describe_surface
 from eigenshape.matching.target import N_VIEWS, describe_views
+from eigenshape.matching.turns import is_rigid
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +170,9 @@ def test_the_best_map_is_smoothed_and_slides(grown):
     plan, differences, maps = grown
     modes = lowest_modes(plan.whole.mesh)
     ours = modes_of_part(plan.part.mesh, modes)
-    found = find_maps(plan, differences, ours, modes)
+    found, turn = find_maps(plan, differences, ours, modes)
+    assert turn is not None
+    assert not is_rigid(plan, turn)
     assert len(found) == len(maps)
     assert found[0].fit.misfit <= maps[0].fit.misfit
     assert not np.array_equal(found[0].fit.places, maps[0].fit.places)

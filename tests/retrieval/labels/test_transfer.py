@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._errors import InvalidShapeError
 from eigenshape.features.parts import find_parts
 from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
@@ -144,6 +145,24 @@ def test_votes_and_labels_are_checked(votes, labels, message):
 def test_at_least_one_labeled_shape_is_required():
     with pytest.raises(InvalidParameterError, match="labeled must hold at least one labeled shape"):
         transfer_labels([], icosphere(1))
+
+
+def test_a_labeled_shape_with_a_face_without_area_is_left_out_by_its_number():
+    fish = make_creature("fish", n_vertices=500)
+    a, b, _ = fish.faces[0]
+    corner = len(fish.vertices)
+    middle = fish.vertices[[a, b]].mean(axis=0)
+    torn = TriangleMesh(np.vstack([fish.vertices, middle]), [*fish.faces, [a, b, corner]])
+    broken = LabeledShape(torn, np.append(named(fish), 7))
+    sound = LabeledShape(fish, named(fish))
+    with pytest.warns(UserWarning, match=r"labeled\[1\] was left out: Faces must have area"):
+        found = transfer_labels([sound, broken], fish)
+    alone = transfer_labels(sound, fish)
+    assert found.weights.tolist() == [1, 0]
+    assert np.array_equal(found.labels, alone.labels)
+    assert np.array_equal(found.confidence, alone.confidence)
+    with pytest.raises(InvalidShapeError, match="Faces must have area"):
+        transfer_labels([broken, broken], fish)
 
 
 def test_one_label_a_face_is_required():

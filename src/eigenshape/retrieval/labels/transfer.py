@@ -1,5 +1,6 @@
 """Transfer labels from labeled shapes to another shape (thesis 7)."""
 
+import warnings
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -14,6 +15,7 @@ from certeig.kit.progress import Progress
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions
+from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.facet_lists import label_components
@@ -66,7 +68,8 @@ class LabelTransfer(ReadOnly):
     part_vertices : (m,) int
         A vertex of each part, where the votes for its label are clearest.
     weights : (s,) float
-        Weight of each labeled shape; they sum to 1. A shape that is more alike weighs more.
+        Weight of each labeled shape; they sum to 1. A shape that is more alike weighs more, and one
+        that was left out 0.
 
     See Also
     --------
@@ -110,7 +113,8 @@ def transfer_labels(
     Parameters
     ----------
     labeled : LabeledShape or sequence of LabeledShape
-        Shapes of the same kind as the target. Equal labels must mean the same on all of them.
+        Shapes of the same kind as the target. Equal labels must mean the same on all of them. One
+        of several whose mesh is refused is left out, and a warning says which and why.
     target : MeshLike
         The mesh to label.
     progress : callable, optional
@@ -125,8 +129,8 @@ def transfer_labels(
     InvalidParameterError
         If there is no labeled shape.
     InvalidShapeError
-        If a face of a mesh has no area or occurs twice, a vertex has no face, or neighboring faces
-        are oriented against each other.
+        If a face of the target, or of each labeled mesh, has no area or occurs twice, a vertex has
+        no face, or neighboring faces are oriented against each other.
 
     See Also
     --------
@@ -154,19 +158,32 @@ def transfer_labels(
     n_steps = len(sources) + 2
     points = _target_points(target)
     votes, costs = [], []
+    failures: dict[int, InvalidShapeError] = {}
     for number, source in enumerate(sources):
         if progress:
             progress((1 + number) / n_steps, f"matching labeled shape {number + 1}")
-        shares, cost = transport_points(points, source.points)
+        try:
+            described = source.points
+        except InvalidShapeError as error:
+            # One broken shape of many must not keep the others from voting.
+            failures[number] = error
+            votes.append(np.zeros((len(points.vertices), len(vocabulary))))
+            costs.append(np.inf)
+            continue
+        shares, cost = transport_points(points, described)
         # The share of each label in the area of the faces around each point of the source
         columns = np.searchsorted(vocabulary, source.labels)
         around = np.zeros((source.mesh.n_vertices, len(vocabulary)))
         areas = face_areas(source.mesh)
         for corner in source.mesh.faces.T:
             np.add.at(around, (corner, columns), areas / areas.max())
-        chosen = around[source.points.vertices]
+        chosen = around[described.vertices]
         votes.append(shares @ (chosen / chosen.sum(axis=1, keepdims=True)))
         costs.append(cost)
+    if len(failures) == len(sources):
+        raise failures[0]
+    for number, error in failures.items():
+        warnings.warn(f"labeled[{number}] was left out: {error}", stacklevel=3)
     weights = np.exp((min(costs) - np.array(costs)) / COST_SCALE)
     weights /= weights.sum()
 
@@ -291,7 +308,7 @@ def _settle(
     # Confidence: the calibrated share of the votes for the label of each face.
     rows = np.arange(target.n_faces)
     share = np.clip(face_shares[rows, chosen], LEAST_SHARE, 1 - LEAST_SHARE)
-    offset, slope = CURVE_OF_ONE if len(weights) == 1 else CURVE_OF_SEVERAL
+    offset, slope = CURVE_OF_ONE if np.count_nonzero(weights) == 1 else CURVE_OF_SEVERAL
     confidence = 1 / (1 + np.exp(-offset - slope * np.log(share / (1 - share))))
 
     parts = _pieces(target, chosen)
