@@ -96,10 +96,14 @@ def public_names() -> dict[str, dict[str, str]]:
     return found
 
 
-# What every group may use: checks of arguments and arrays, errors, threads, kernels, files, workers
+# What every group may use: checks of arguments, arrays and matrices, errors, threads, kernels, files,
+# workers, extras
 TOOLKIT = (
     "certeig.kit.",
-    *(f"eigenshape._{name}" for name in ("arrays", "errors", "sealed", "typing", "workers")),
+    *(
+        f"eigenshape._{name}"
+        for name in ("arrays", "errors", "extras", "sealed", "typing", "workers")
+    ),
 )
 
 
@@ -114,7 +118,8 @@ def private_across_walls() -> list[str]:
         {
             f"{group} {other} {each.origin}:{each.name}"
             for group, other, each in imports_across_walls()
-            if (each.origin, each.name) not in public and not each.origin.startswith(TOOLKIT)
+            if (each.origin, each.name) not in public
+            and not f"{each.origin}.{each.name}".startswith(TOOLKIT)
         }
     )
 
