@@ -5,7 +5,7 @@ import scipy.sparse as sp
 from jaxtyping import Complex, Float, Int
 from scipy.sparse.linalg import spsolve
 
-from certeig.kit.arrays import real_numbers
+from certeig.kit.arrays import EPS, real_numbers
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
@@ -46,7 +46,7 @@ ROUND = 0.3
 # head of 10,540 faces needs two.
 MOST_ROUNDS = 8
 # Height of a triangle on the unit sphere, below which rounding decides how it lies.
-ROUNDING = 4 * np.finfo(np.float64).eps
+ROUNDING = 4 * EPS
 
 
 def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:

@@ -5,9 +5,9 @@ import scipy.sparse as sp
 
 from certeig.kit.arrays import finite_number, positive_number
 from certeig.kit.errors import InvalidParameterError
+from certeig.kit.matrices import require_points
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
-from certeig.matrices import require_points
 from eigenshape._arrays import step_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.linear_solver import factor_definite

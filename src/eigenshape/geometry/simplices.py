@@ -6,6 +6,7 @@ from math import factorial
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from certeig.kit.arrays import EPS
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplicial import Mesh
@@ -15,7 +16,7 @@ from eigenshape.geometry.simplicial import Mesh
 THINNEST = 1e-14
 # Points of size 1 nearer than this to a line or plane lie in it, up to rounding: some tens of
 # roundings of one coordinate.
-SPAN_ROUNDING = 64 * float(np.finfo(np.float64).eps)
+SPAN_ROUNDING = 64 * EPS
 # Names of flats by dimension, for messages.
 FLATS = {1: "on a line", 2: "in a plane"}
 # Areas and volumes are returned if their scale is within 2^-1000..2^1000. Beyond, sums would

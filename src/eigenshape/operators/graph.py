@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from certeig.kit.arguments import require_choice
 from certeig.kit.errors import InvalidParameterError
-from certeig.matrices import require_square
+from certeig.kit.matrices import require_square
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.homology import edges_of
