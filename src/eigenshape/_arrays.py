@@ -1,9 +1,12 @@
-"""Checks of arrays that belong to a shape: rows of coordinates and of indices, values of vertices and faces."""
+"""Arrays that belong to a shape: checks of coordinates, indices and values; their size, and their components."""
 
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from certeig.kit.arrays import all_finite, as_array, real_numbers, whole_number
 from certeig.kit.errors import InvalidParameterError
@@ -153,3 +156,31 @@ def require_finite_rows(rows: NDArray[np.float64], name: str, noun: str) -> None
 def step_number(value: Integer, name: str) -> int:
     """Return `value` as an int from 1 to a million, the number of steps of a loop."""
     return whole_number(value, name, 1, MOST_STEPS, "no shape needs more steps")
+
+
+def size_of(coordinates: Float[np.ndarray, "..."]) -> float:
+    """Return the power of two at or below the largest absolute value; 1 if all are zero."""
+    largest = max(coordinates.max(initial=0.0), -coordinates.min(initial=0.0))
+    # One less than the exponent of frexp, so that the power exists for the largest float too.
+    return float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
+
+
+def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "..."], float]:
+    """Return coordinates divided by a power of two that brings the largest to size 1, and it."""
+    scale = size_of(coordinates)
+    return coordinates / scale, scale
+
+
+def unit_vectors(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
+    """Give vectors the length 1, and make zeros of those without one."""
+    norms = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms > 0)
+
+
+def label_components(
+    n: int, one: Int[np.ndarray, " k"], two: Int[np.ndarray, " k"]
+) -> tuple[int, Int[np.ndarray, " n"]]:
+    """Count the groups of n things of which k pairs are linked, and return the group of each."""
+    graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(n, n))
+    count, labels = connected_components(graph, directed=False)
+    return int(count), labels.astype(np.int64)

@@ -8,12 +8,11 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.matrices import require_points
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
-from eigenshape._arrays import step_number
+from eigenshape._arrays import size_one, step_number
 from eigenshape._errors import InvalidShapeError
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import boundary_vertices
 from eigenshape.operators.cotangent import cotangent_laplacian

@@ -3,8 +3,9 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
+from eigenshape._arrays import unit_vectors
 from eigenshape.geometry.facets import corner_fans
-from eigenshape.geometry.measure import area_vectors, unit_vectors
+from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import edge_table, face_pairs

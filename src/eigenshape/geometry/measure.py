@@ -6,11 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._arrays import size_one, unit_vectors
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
-from eigenshape.geometry.simplices import at_points, in_length, scaled_corners, size_one
+from eigenshape.geometry.simplices import at_points, in_length, scaled_corners
 from eigenshape.geometry.topology import edge_table
 
 # How much the rotation of points follows a given one, as a share of their moments: a rotation about
@@ -200,12 +201,6 @@ def mean_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
     vectors = area_vectors(scaled_corners(mesh)[0])
     sums = [at_points(mesh, vectors[:, axis]) for axis in range(3)]
     return unit_vectors(np.column_stack(sums))
-
-
-def unit_vectors(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
-    """Give vectors the length 1, and make zeros of those without one."""
-    norms = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms > 0)
 
 
 def edge_lengths(mesh: MeshLike) -> Float[np.ndarray, " e"]:

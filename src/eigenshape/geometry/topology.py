@@ -6,9 +6,10 @@ from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._arrays import label_components
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
-from eigenshape.geometry.facet_lists import label_components, shared_facets
+from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.facets import boundary_facets, corner_fans, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh

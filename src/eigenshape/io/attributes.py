@@ -10,7 +10,8 @@ from scipy.sparse import csr_array, eye_array
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.text import html_repr
-from eigenshape.geometry.measure import area_vectors, unit_vectors
+from eigenshape._arrays import unit_vectors
+from eigenshape.geometry.measure import area_vectors
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import number_places
 from eigenshape.io.opening import SourceFile

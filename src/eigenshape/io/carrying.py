@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.sparse import csr_array
 
+from eigenshape._arrays import size_one, unit_vectors
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.distances.closest_loops import nearest_around
-from eigenshape.geometry.measure import area_vectors, mean_normals, unit_vectors
+from eigenshape.geometry.measure import area_vectors, mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import disjoint_union, join_places, number_places, sorted_rows
 from eigenshape.io.attributes import MeshAttributes, plain_attributes
 

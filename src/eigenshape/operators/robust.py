@@ -5,6 +5,7 @@ import scipy.sparse as sp
 
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
+from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
@@ -14,7 +15,6 @@ from eigenshape.geometry.simplices import (
     in_length,
     require_span,
     require_volumes,
-    size_one,
 )
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops

@@ -6,6 +6,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_shape
@@ -31,7 +32,7 @@ from eigenshape.geometry.repairs.repair_steps import (
     weld,
     weld_seams,
 )
-from eigenshape.geometry.simplices import scaled_corners, size_one
+from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import boundary_loops, vertex_components
 
 # Shares of the area of a surface up to which `suggest_repairs` takes something for a fault of the

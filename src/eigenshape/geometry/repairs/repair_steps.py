@@ -7,8 +7,8 @@ from jaxtyping import Bool, Int
 from scipy.spatial import cKDTree
 
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._arrays import label_components, size_one
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import (
@@ -24,7 +24,6 @@ from eigenshape.geometry.simplices import (
     degenerate_simplices,
     scaled_corners,
     side_lengths,
-    size_one,
 )
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (

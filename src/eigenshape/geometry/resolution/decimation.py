@@ -6,6 +6,7 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import ReadOnly, as_array, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -17,7 +18,6 @@ from eigenshape.geometry.repairs.repair_report import count_nouns
 from eigenshape.geometry.repairs.repair_steps import drop_unreferenced
 from eigenshape.geometry.requirements import require_oriented, require_sound
 from eigenshape.geometry.samples.surface_points import SurfacePoints
-from eigenshape.geometry.simplices import size_one
 from eigenshape.geometry.topology import edge_table, non_manifold_vertices
 
 FEWEST_FACES = 4  # of a closed surface

@@ -9,6 +9,7 @@ from threading import Lock
 import numpy as np
 
 from certeig.kit.arrays import positive_number
+from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -19,7 +20,7 @@ from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
-from eigenshape.geometry.simplices import simplex_volumes, size_one
+from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import edge_table, number_places
 

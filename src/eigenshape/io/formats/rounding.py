@@ -4,10 +4,10 @@ import numpy as np
 from jaxtyping import Float
 
 from certeig.kit.errors import FileFormatError
+from eigenshape._arrays import size_one
 from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import count_nouns
-from eigenshape.geometry.simplices import size_one
 
 # Largest share of the shortest side of a face by which its corners may move without a word, and
 # shares of the size and the area by which corners and the whole may change at all.

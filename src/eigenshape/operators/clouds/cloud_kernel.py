@@ -7,9 +7,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from certeig.kit.arguments import require_type
+from eigenshape._arrays import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
-from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.clouds.kernel import (
     EDGE_FACTOR,

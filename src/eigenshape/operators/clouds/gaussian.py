@@ -11,9 +11,10 @@ from certeig.kit.arguments import require_choice, require_type
 from certeig.kit.arrays import positive_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._arrays import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
-from eigenshape.geometry.simplices import mean_side_length, require_span, size_one
+from eigenshape.geometry.simplices import mean_side_length, require_span
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components
 from eigenshape.operators.choices import Correction, Distance, Form
