@@ -24,7 +24,7 @@ from eigenshape.operators.anisotropic import anisotropic_laplacian, curvature_te
 from eigenshape.operators.catalog import OPERATORS
 from eigenshape.operators.clouds.cloud_kernel import point_cloud_laplacian
 from eigenshape.operators.clouds.gaussian import gaussian_laplacian, mesh_laplacian
-from eigenshape.operators.clouds.kernel import neighbor_distance
+from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.fem import fem_boundary_nodes, fem_laplacian

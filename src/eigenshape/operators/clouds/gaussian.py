@@ -14,6 +14,7 @@ from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
+from eigenshape.geometry.samples.spacing import neighbor_distance
 from eigenshape.geometry.simplices import mean_side_length, require_span
 from eigenshape.geometry.simplicial import SimplicialMesh
 from eigenshape.geometry.topology import vertex_components
@@ -23,7 +24,6 @@ from eigenshape.operators.clouds.kernel import (
     KernelOptions,
     choose_kernel,
     kernel_laplacian,
-    neighbor_distance,
     require_whole,
     warn_of_few,
     warn_of_narrow,
