@@ -1,10 +1,10 @@
-"""Arrays that belong to a shape: checks of coordinates, indices and values; their size, and their components."""
+"""Arrays that belong to a shape: checks of coordinates, indices and values; equal rows, and linked ones."""
 
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
@@ -158,25 +158,6 @@ def step_number(value: Integer, name: str) -> int:
     return whole_number(value, name, 1, MOST_STEPS, "no shape needs more steps")
 
 
-def size_of(coordinates: Float[np.ndarray, "..."]) -> float:
-    """Return the power of two at or below the largest absolute value; 1 if all are zero."""
-    largest = max(coordinates.max(initial=0.0), -coordinates.min(initial=0.0))
-    # One less than the exponent of frexp, so that the power exists for the largest float too.
-    return float(2.0 ** (np.frexp(largest)[1] - 1)) if largest > 0 else 1.0
-
-
-def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "..."], float]:
-    """Return coordinates divided by a power of two that brings the largest to size 1, and it."""
-    scale = size_of(coordinates)
-    return coordinates / scale, scale
-
-
-def unit_vectors(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
-    """Give vectors the length 1, and make zeros of those without one."""
-    norms = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, norms, out=np.zeros_like(vectors), where=norms > 0)
-
-
 def label_components(
     n: int, one: Int[np.ndarray, " k"], two: Int[np.ndarray, " k"]
 ) -> tuple[int, Int[np.ndarray, " n"]]:
@@ -184,3 +165,21 @@ def label_components(
     graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(n, n))
     count, labels = connected_components(graph, directed=False)
     return int(count), labels.astype(np.int64)
+
+
+def sorted_rows(
+    rows: Int[np.ndarray, "r c"],
+) -> tuple[Int[np.ndarray, " r"], Int[np.ndarray, "r c"], Bool[np.ndarray, " r"]]:
+    """Sort rows: return the stable order, the sorted rows, and which repeat the row before."""
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    repeats = np.zeros(len(rows), dtype=bool)
+    repeats[1:] = (ordered[1:] == ordered[:-1]).all(axis=1)
+    return order, ordered, repeats
+
+
+def number_places(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
+    """Return for each point the number of its place; equal points have the same place."""
+    # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
+    _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
+    return place.ravel().astype(np.int64)

@@ -96,15 +96,15 @@ def public_names() -> dict[str, dict[str, str]]:
     return found
 
 
-# What every group may use: checks of arguments, arrays, matrices and meshes, errors, threads, kernels,
-# files, workers, extras
+# What every group may use: checks of arguments, arrays, matrices and meshes, vectors,
+# errors, threads, kernels, files, workers, extras
 TOOLKIT = (
     "certeig.kit.",
     "eigenshape.geometry.conversion.",
     "eigenshape.geometry.requirements.",
     *(
         f"eigenshape._{name}"
-        for name in ("arrays", "errors", "extras", "sealed", "typing", "workers")
+        for name in ("arrays", "errors", "extras", "sealed", "typing", "vectors", "workers")
     ),
 )
 

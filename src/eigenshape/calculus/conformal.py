@@ -9,11 +9,12 @@ from certeig.kit.arrays import EPS, real_numbers
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
-from eigenshape._arrays import require_finite_rows, size_one, step_number
+from eigenshape._arrays import require_finite_rows, step_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import face_areas, scale_to_unit, triangle_areas
+from eigenshape.geometry.measure import face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
 from eigenshape.geometry.simplices import scaled_corners, triangular_sides

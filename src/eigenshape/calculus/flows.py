@@ -8,8 +8,9 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.matrices import require_points
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
-from eigenshape._arrays import size_one, step_number
+from eigenshape._arrays import step_number
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.calculus.linear_solver import factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.mesh import TriangleMesh

@@ -9,7 +9,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from certeig.sparse.symmetric_factor import SymmetricFactor
-from eigenshape._arrays import size_one
+from eigenshape._vectors import size_one
 from eigenshape.calculus.linear_solver import (
     GroundedFactor,
     factorize_definite,

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
-from eigenshape._arrays import size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import in_length

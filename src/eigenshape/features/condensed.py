@@ -7,7 +7,8 @@ from certeig.kit.arrays import ReadOnly, real_numbers, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape._arrays import label_components, require_finite_rows, size_one
+from eigenshape._arrays import label_components, require_finite_rows
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.simplices import dual_volumes

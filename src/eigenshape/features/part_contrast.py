@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
 from certeig.kit.arrays import record
-from eigenshape._arrays import unit_vectors
+from eigenshape._vectors import unit_vectors
 from eigenshape.features.contrast import FINE_CONTRAST, PART_CONTRAST
 from eigenshape.features.part_merging import (
     PART_TIME,

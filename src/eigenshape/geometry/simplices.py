@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import EPS
-from eigenshape._arrays import size_of, size_one
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._vectors import size_of, size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplicial import Mesh
 

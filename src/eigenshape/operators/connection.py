@@ -4,8 +4,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Complex, Float
 
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh

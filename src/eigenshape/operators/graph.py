@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from certeig.kit.arguments import require_choice
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.matrices import require_square
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.homology import edges_of
 from eigenshape.geometry.simplices import in_length

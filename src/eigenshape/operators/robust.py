@@ -5,8 +5,8 @@ import scipy.sparse as sp
 
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
 from eigenshape.geometry.requirements import require_different_simplices

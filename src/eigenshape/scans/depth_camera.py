@@ -10,8 +10,8 @@ from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import html_repr
 from certeig.kit.typing import ArrayLike
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh

@@ -4,9 +4,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import Delaunay
 
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.measure import area_vectors
+from eigenshape._vectors import area_vectors, size_one
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.topology import submesh

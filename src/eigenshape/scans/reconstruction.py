@@ -9,10 +9,9 @@ from scipy import fft, ndimage
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import area_vectors, size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.measure import area_vectors, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
 from eigenshape.geometry.simplices import cut_tetrahedra

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, positive_values, record, whole_number
 from certeig.kit.errors import InvalidParameterError
-from eigenshape._arrays import size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.distances.closest import squared_distances
 from eigenshape.geometry.distances.geodesic import farthest_first, unchecked_waves

@@ -7,8 +7,9 @@ from jaxtyping import Float
 
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
-from eigenshape._arrays import finite_rows, size_one
+from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest_loops import nearest_faces, windings
 from eigenshape.geometry.distances.crossing_loops import box_tree, curve_places, face_boxes

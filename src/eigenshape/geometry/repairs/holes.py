@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Int
 
 from certeig.kit.errors import InvalidParameterError
-from eigenshape._arrays import size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.hole_loops import triangulate
 from eigenshape.geometry.repairs.repair_report import RepairedMesh, count_nouns

@@ -6,11 +6,10 @@ from typing import Any, overload
 
 import numpy as np
 
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud, Shape
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_shape
-from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.holes import fill_holes
 from eigenshape.geometry.repairs.one_sided import cut_one_sided

@@ -7,9 +7,9 @@ from jaxtyping import Bool, Int
 from scipy.spatial import cKDTree
 
 from certeig.kit.errors import InvalidParameterError
-from eigenshape._arrays import label_components, size_one
+from eigenshape._arrays import label_components, number_places
+from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud
-from eigenshape.geometry.measure import triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import (
     MeshT,
@@ -28,7 +28,6 @@ from eigenshape.geometry.simplices import (
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     edge_table,
-    number_places,
     repeated_simplices,
     require_simplices_everywhere,
     submesh,

@@ -6,9 +6,9 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import ReadOnly, as_array, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
 from eigenshape._extras import import_extra
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.face_turns import orient_consistently

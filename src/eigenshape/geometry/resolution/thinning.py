@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Int
 
-from eigenshape._arrays import size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.resolution.thinning_loops import (

@@ -7,8 +7,9 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError, cKDTree
 from certeig.kit.arrays import ReadOnly, freeze, positive_values, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
-from eigenshape._arrays import finite_rows, size_one
+from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import ShapeLike, as_shape
 from eigenshape.geometry.requirements import require_sound

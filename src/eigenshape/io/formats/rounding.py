@@ -4,8 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from certeig.kit.errors import FileFormatError
-from eigenshape._arrays import size_one
-from eigenshape.geometry.measure import triangle_areas
+from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_report import count_nouns
 

@@ -7,7 +7,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from certeig.kit.arguments import require_type
-from eigenshape._arrays import size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.geometry.samples.spacing import neighbor_distance

@@ -8,8 +8,8 @@ from certeig.kit.arguments import require_type
 from certeig.kit.arrays import whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import require_different_points
 from eigenshape.geometry.simplices import require_span

@@ -11,7 +11,7 @@ from certeig.kit.arguments import require_choice, require_type
 from certeig.kit.arrays import positive_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
-from eigenshape._arrays import size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.samples.quadrature import Quadrature, shape_quadrature
 from eigenshape.geometry.samples.spacing import neighbor_distance

@@ -16,8 +16,8 @@ from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import positive_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.memory import require_memory
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.distances.geodesic import geodesic_balls
 from eigenshape.geometry.samples.quadrature import Quadrature
 from eigenshape.geometry.simplices import LARGEST_EXPONENT

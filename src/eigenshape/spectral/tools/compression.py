@@ -15,7 +15,7 @@ from certeig.kit.memory import available_memory
 from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import Integer
-from eigenshape._arrays import size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.spectral.tools.connectivity import OTHER, read_faces, write_faces

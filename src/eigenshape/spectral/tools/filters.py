@@ -12,8 +12,9 @@ from certeig.kit.arrays import real_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape._arrays import point_functions, require_finite_rows, size_one
+from eigenshape._arrays import point_functions, require_finite_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh

@@ -14,8 +14,8 @@ from certeig.kit.arrays import positive_number, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.text import html_repr
 from certeig.kit.typing import Integer
-from eigenshape._arrays import size_one
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import vertex_components
