@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._arrays import label_components, number_places
+from eigenshape._errors import count_nouns
 from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.mesh import TriangleMesh
@@ -15,7 +16,6 @@ from eigenshape.geometry.repairs.repair_report import (
     MeshT,
     RepairedCloud,
     RepairedMesh,
-    count_nouns,
     simplex_noun,
 )
 from eigenshape.geometry.seams import seams
