@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from certeig.kit.arrays import record
-from eigenshape.geometry.measure import nearest_rotations
+from eigenshape._vectors import nearest_rotations
 from eigenshape.matching.fitting import LARGEST_GAP, NORMAL_LENGTH, Fit, FitPlan
 from eigenshape.matching.spectral_refinement import places_in_faces
 
