@@ -2,12 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import eigenshape as es
 from certeig.kit.errors import InvalidParameterError
-from eigenshape.matching.fitting import plan_fit
+from eigenshape.matching.evidence import FittedMap
+from eigenshape.matching.fitting import Fit, plan_fit
+from eigenshape.matching.growth import most_rigid_first
 from eigenshape.matching.match import match_shapes
+from eigenshape.matching.pairs import Pairs
 from eigenshape.matching.surface import describe_surface
 from eigenshape.matching.turns import is_rigid, rolled_turns, settle_map
 
@@ -57,6 +61,20 @@ def test_the_best_roll_of_a_wrong_one_is_the_true_turn():
         np.degrees(2.0), abs=3
     )
     assert rolled[0].gap < 0.5 * rolled[1].gap
+
+
+@pytest.mark.parametrize(("misfit", "first"), [(0.0105, 1), (0.012, 0)])
+def test_of_maps_that_bend_as_well_the_one_nearest_to_a_turn_comes_first(misfit, first):
+    whole = stone(600, length=3.0)
+    plan = plan_of(turned(whole), whole)
+    back_to_front = whole.vertices * [-1, -1, 1]
+    wrong = cKDTree(whole.vertices).query(back_to_front)[1]
+    pairs = Pairs(np.arange(3), np.arange(3), np.ones(3))
+    maps = [
+        FittedMap(pairs, Fit(whole.vertices[places], places, np.zeros(600), each))
+        for places, each in ((wrong, 0.01), (np.arange(600), misfit))
+    ]
+    assert most_rigid_first(plan, maps)[0] is maps[first]
 
 
 @pytest.mark.long

@@ -33,10 +33,12 @@ from eigenshape.matching.spectral_refinement import Modes, smooth_places
 from eigenshape.matching.surface import Surface
 from eigenshape.matching.turns import (
     APART,
+    N_STEPS,
     NEARLY_RIGID,
     Turn,
     is_rigid,
     rolled_turns,
+    settle,
     settle_map,
     turned_fit,
 )
@@ -51,6 +53,9 @@ N_TRIED = 10
 # Modes that make a map smooth before the part is bent again: 30 and 100 lower the misfit less.
 N_LOW_MODES = 60
 N_BENT_ROLLS = 2  # rolls of a nearly rigid part from which it is bent
+# Of maps with up to so many times the least misfit, that one comes first whose turn leaves less than this
+# share of the gap: on a right place a foot has 1.03 times the misfit of a wrong one, and an eighth of its gap.
+ABOUT_AS_GOOD, NEARER = 1.1, 0.5
 MOST_SMOOTHINGS = 2  # it ends earlier if a bend is no better
 # Misfit up to which a map is as good as any, and the same in mean edges of the whole, which is more
 # on coarse meshes. The best rivals of 24 balls, ellipsoids, rings, cylinders and boxes, turned into
@@ -130,8 +135,10 @@ def find_maps(
     # The new map takes the place of the one that it was made from, and keeps its pairs.
     turn = settle_map(plan, maps[0].fit.places)
     if not is_rigid(plan, turn) and turn.gap < NEARLY_RIGID:
-        # Bending forgives a roll about a long axis, so that starts that are rolled are missing.
+        # Bending forgives a roll about a long axis, so that starts that are rolled are missing, and
+        # another limb, on which a foot bends as well as on its own.
         maps = _best_first(maps + _rolled_maps(plan, differences, maps[0], turn))
+        maps = most_rigid_first(plan, maps)
         turn = settle_map(plan, maps[0].fit.places)
     if is_rigid(plan, turn):
         return [FittedMap(maps[0].pairs, turned_fit(plan, turn)), *maps[1:]], turn
@@ -149,9 +156,10 @@ def _rolled_maps(
     plan: FitPlan, differences: Float[np.ndarray, "m k"], best: FittedMap, turn: Turn
 ) -> list[FittedMap]:
     """Return maps that are bent from rolls of the turn of the best map, to other places than that."""
+    samples = plan.part.mesh.vertices[plan.samples]
     maps = []
     for rolled in rolled_turns(plan, turn)[:N_BENT_ROLLS]:
-        start = turned_fit(plan, rolled)
+        start = turned_fit(plan, settle(plan, rolled.move(samples), plan.samples, N_STEPS))
         # Where the best map lies already, nearest points only add mistakes, as those of fingers on
         # the next finger. Bones that it rolls are 0.08 away from the best roll, hands 0.03.
         away = np.linalg.norm(start.points - best.fit.points, axis=1)
@@ -161,6 +169,16 @@ def _rolled_maps(
         if pairs:
             maps.append(FittedMap(pairs[0], fit_part(plan, start.places[plan.frames])))
     return maps
+
+
+def most_rigid_first(plan: FitPlan, maps: list[FittedMap]) -> list[FittedMap]:
+    """Put first, of maps that fit about as well as the best, one that is much nearer to a turn."""
+    near = [one for one in maps if one.fit.misfit < ABOUT_AS_GOOD * maps[0].fit.misfit]
+    gaps = [settle_map(plan, one.fit.places).gap for one in near]
+    chosen = int(np.argmin(gaps))
+    if gaps[chosen] > NEARER * gaps[0]:
+        return maps
+    return [maps[chosen], *maps[:chosen], *maps[chosen + 1 :]]
 
 
 def grow_maps(

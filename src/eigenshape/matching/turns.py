@@ -15,7 +15,8 @@ from eigenshape.matching.spectral_refinement import places_in_faces
 
 N_ROLLS = 12  # about the long axis, each also with the ends exchanged
 N_ROLLED = 80  # samples by which rolls are compared
-N_ROLL_STEPS, N_STEPS = 6, 10  # of nearest points; a roll of 15 degrees settles in six
+# Steps of nearest points: a roll of 15 degrees settles in six, a slip along a bone in 20.
+N_ROLL_STEPS, N_STEPS = 6, 20
 # Mean distance from the surface up to which a turn is the whole answer, in roots of the part's area. Copies
 # with other triangles have 1e-4 to 1e-3; other poses, other bones and mirror images have 7e-3 and more.
 RIGID = 0.003
