@@ -7,7 +7,8 @@ from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.typing import Integer
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.simplices import require_volumes, scaled_corners, volumes
+from eigenshape.geometry.requirements import require_volumes
+from eigenshape.geometry.simplices import scaled_corners, volumes
 from eigenshape.geometry.simplicial import Mesh
 
 # More points would take many gigabytes: a point on a surface takes 56 bytes, and twice that while
