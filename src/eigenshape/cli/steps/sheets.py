@@ -10,12 +10,12 @@ from certeig.kit.arrays import record
 from certeig.kit.errors import CerteigError
 from certeig.kit.text import literal
 from eigenshape._errors import StoreError
+from eigenshape._vectors import nearest_rotations, size_one
 from eigenshape.cli.console import err, escape_text, progress_bar
 from eigenshape.cli.steps.writing import Side
 from eigenshape.geometry.distances.geodesic import geodesic_distances
-from eigenshape.geometry.measure import nearest_rotations, surface_area
+from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.io.surface_files import read_surface
 from eigenshape.plot.camera import aim_camera
 from eigenshape.plot.sheet import Panel, figure_contact_sheet
