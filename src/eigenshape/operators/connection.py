@@ -5,10 +5,10 @@ import scipy.sparse as sp
 from jaxtyping import Complex, Float
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.choices import Mass
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import half_cotangents, vertex_directions
