@@ -312,9 +312,9 @@ def test_a_kernel_has_a_frame_of_less_than_a_page(tmp_path):
     source.write_text(
         '#include "kernels.h"\n'
         "KERNEL void reverse(int64_t *numbers) {\n"
-        "    volatile int64_t all[512];\n"
-        "    for (int i = 0; i < 512; i++) all[i] = numbers[i];\n"
-        "    for (int i = 0; i < 512; i++) numbers[i] = all[511 - i];\n}\n"
+        "    volatile int64_t all[513];\n"
+        "    for (int i = 0; i < 513; i++) all[i] = numbers[i];\n"
+        "    for (int i = 0; i < 513; i++) numbers[i] = all[512 - i];\n}\n"
     )
     target = hatch_build.TARGETS[hatch_build.target_name()]
     with pytest.raises(SystemExit, match="kernels cannot be compiled"):
