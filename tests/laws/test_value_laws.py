@@ -93,6 +93,7 @@ MADE: dict[str, Callable[[Shared], Any]] = {
     "Panel": lambda v: es.plot.Panel(v.ball, "a", np.zeros(v.ball.n_faces, int), np.arange(3)),
     "Parcellation": lambda v: v.halves,
     "PartDecomposition": lambda v: es.find_parts(v.animal),
+    "Scaling": lambda v: es.deformation.Scaling([0.5, 0, 0], [2, 1, 0.5]),
     "SpectralClusterer": lambda v: es.spectral.SpectralClusterer(3),
     "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3),
     "StabilityPlan": lambda v: es.stability.StabilityPlan(k=5),
