@@ -140,6 +140,8 @@ def compile_library(
 ) -> None:
     """Compile one library of the kernels of some packages."""
     flags = [*FLAGS, *options, "-target", target.zig, f"-mcpu={target.processors[level]}"]
+    if "macos" in target.zig:  # otherwise the library names the folder in which it was linked
+        flags.append(f"-Wl,-install_name,{library.name}")
     folders = [f"-I{folder}" for folder in (KIT, *packages)]
     command = [sys.executable, "-m", "ziglang", "cc", *flags, *folders, "-o"]
     kernels = sorted({*COMMON, *(path for package in packages for path in package.rglob("*.c"))})
