@@ -213,8 +213,8 @@ def carry_landmarks(collection: Collection, labelled: Mapping[str, Landmarks]) -
     carried = np.full_like(given, np.nan)  # to each labelled specimen, from all others
     for row, name in enumerate(collection.names):
         surface = collection.read_specimen(name)  # one at a time: together they may fill the memory
-        there = _carry(collection, row, surface, places)
-        points[row] = space_curves(there, curves, surface, name)
+        on_surface = _carry(collection, row, surface, places)
+        points[row] = space_curves(on_surface, curves, surface, name)
         if row in rows and len(rows) > 1:
             others = np.delete(on_mean, rows.index(row), axis=0)
             seen = np.isfinite(others).all(axis=2).any(axis=0)
