@@ -1,3 +1,4 @@
+import inspect
 import itertools
 
 import numpy as np
@@ -245,6 +246,11 @@ def test_points_of_another_mesh_are_refused():
                 InvalidParameterError, match=f"{name.strip()} must be one point; there are 2"
             ):
                 call(two)
+    with pytest.raises(
+        InvalidParameterError,
+        match=r"start must be a vertex or a SurfacePoints; the value is a list",
+    ):
+        inspect.unwrap(geodesic_path)(ball, [0, 0, 1.0], 0)
     solver = es.calculus.prepare_vector_heat(ball)
     with pytest.raises(InvalidParameterError, match=r"The face of source must lie in 0..319"):
         es.calculus.logarithmic_map(solver, outside)

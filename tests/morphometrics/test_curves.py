@@ -104,7 +104,8 @@ def test_wrong_curves_and_numbers_are_refused():
             resample(Landmarks(curve.names, points, curves=curve.curves), 5)
     ball = es.icosphere(3)
     with pytest.raises(
-        es.InvalidParameterError, match=r"A curve must lie on the surface; curves\[0\] lies 0.497 from it"
+        es.InvalidParameterError,
+        match=r"A curve must lie on the surface; curves\[0\] lies 0.497 from it",
     ):
         resample(drawn(2), 5, mesh=ball)
     with pytest.raises(es.InvalidParameterError, match=r"lies 9 from it"):

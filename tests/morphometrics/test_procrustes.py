@@ -146,7 +146,7 @@ def test_semilandmarks_slide_until_nothing_but_an_affine_map_is_left():
 def test_semilandmarks_stay_on_their_tangents_and_landmarks_where_they_are():
     specimens, curves, normals = scene()
     sliders, across = procrustes._sliders(specimens, curves, [], normals)
-    assert sliders.along.tolist() == [5, 6, 7, 8]
+    assert sliders.rows.tolist() == [5, 6, 7, 8, *np.repeat(range(9, 14), 2).tolist()]
     assert sliders.patch.tolist() == list(range(9, 14))
     bending = splines.bending_matrix(specimens[1])
     slid = sliders.slide(specimens[0], across[0], specimens[1], bending)

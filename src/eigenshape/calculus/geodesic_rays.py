@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from certeig.kit.arrays import finite_values, whole_number
+from certeig.kit.arrays import finite_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape.calculus.unfolding import (
@@ -23,7 +23,7 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.samples.insertion import require_on, require_one
+from eigenshape.geometry.samples.insertion import require_on, require_one, vertex_number
 from eigenshape.geometry.samples.surface_points import SurfacePoints
 from eigenshape.operators.directions import require_oriented_manifold, vertex_directions
 
@@ -82,7 +82,7 @@ def trace_geodesic(
         require_on(mesh, start, "start")
         path = [start.points[0]]
     else:
-        path = [mesh.vertices[whole_number(start, "start", 0, mesh.n_vertices - 1)]]
+        path = [mesh.vertices[vertex_number(mesh.n_vertices, start, "start")]]
     given = finite_values(vector, "vector")
     if len(given) != 2:
         raise InvalidParameterError(

@@ -23,7 +23,7 @@ from eigenshape.calculus.vector_heat import (
     side_vectors,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.samples.insertion import require_on, require_one
+from eigenshape.geometry.samples.insertion import require_on, require_one, vertex_number
 from eigenshape.geometry.samples.surface_points import SurfacePoints
 from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.directions import corner_products
@@ -91,7 +91,7 @@ def logarithmic_map(
     if isinstance(source, SurfacePoints):
         return _map_at(mesh, source, method)
     solver = as_mesh_heat(mesh)
-    start = whole_number(source, "source", 0, solver.n_points - 1)
+    start = vertex_number(solver.n_points, source, "source")
     require_source_everywhere(solver, np.array([start]))
     weight = scalar_impulse(solver, start)
     impulse = np.zeros(solver.n_points, dtype=complex)

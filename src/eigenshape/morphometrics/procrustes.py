@@ -162,7 +162,7 @@ def fit_procrustes(
     length = np.sum(mean**2)
     for number in range(MOST_ROUNDS):
         last, last_length = mean, length
-        if sliders.n_steps:
+        if len(sliders.rows):
             weights = bending_matrix(mean) if minimize == "bending" else np.eye(len(mean))
             pairs = zip(shapes, normals, strict=True)
             shapes = np.stack([sliders.slide(*pair, mean, weights) for pair in pairs])
@@ -170,7 +170,7 @@ def fit_procrustes(
         shapes, normals = _turn(shapes, normals, mean)
         mean = shapes.mean(axis=0)
         mean /= np.linalg.norm(mean - mean.mean(axis=0))
-        if sliders.n_steps:
+        if len(sliders.rows):
             change = len(shapes) * abs(length - last_length)
             rests = number + 1 == MOST_SLIDES or change <= LEAST_CHANGE
         else:
@@ -202,16 +202,12 @@ def _turn(
 
 
 class _Sliders(NamedTuple):
-    """Rows of semilandmarks: `along` a curve from one neighbor to the next, or in a `patch`."""
+    """Rows of semilandmarks: first those of curves, between two neighbors, then twice each of a patch."""
 
+    rows: Int[np.ndarray, " s"]
     before: Int[np.ndarray, " t"]
-    along: Int[np.ndarray, " t"]
     after: Int[np.ndarray, " t"]
     patch: Int[np.ndarray, " u"]
-
-    @property
-    def n_steps(self) -> int:
-        return len(self.along) + 2 * len(self.patch)
 
     def slide(
         self,
@@ -225,7 +221,7 @@ class _Sliders(NamedTuple):
         B is the bending matrix of the mean M, or for the Procrustes distance the identity (Gunz,
         Mitteroecker and Bookstein 2005).
         """
-        rows = np.concatenate([self.along, np.repeat(self.patch, 2)])
+        rows = self.rows
         chords = shape[self.after] - shape[self.before]
         lengths = np.linalg.norm(chords, axis=1, keepdims=True)
         tangents = chords / np.where(lengths > 0, lengths, 1)
@@ -269,11 +265,12 @@ def _sliders(
                 f"normals must have the shape of the specimens, {points.shape}; it is {across.shape}."
             )
     is_known = np.isfinite(across).all(axis=(0, 2))
-    rows = np.union1d(patch, np.flatnonzero(is_known)).astype(np.int64)
+    patch = np.union1d(patch, np.flatnonzero(is_known)).astype(np.int64)
     threes = [
         three
         for curve in as_curves(curves, n_points)
         for three in zip(curve[:-2], curve[1:-1], curve[2:], strict=True)
     ]
     before, along, after = np.reshape(threes, (-1, 3)).astype(np.int64).T
-    return _Sliders(before, along, after, rows), across[:, rows]
+    rows = np.concatenate([along, np.repeat(patch, 2)])
+    return _Sliders(rows, before, after, patch), across[:, patch]

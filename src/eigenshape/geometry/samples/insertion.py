@@ -1,14 +1,17 @@
 """Points on a mesh: whether they lie on it, and how they become vertices of it."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
+from certeig.kit.arguments import describe_value
 from certeig.kit.arrays import whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
+from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.samples.surface_points import SurfacePoints
+from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.geometry.simplicial import Mesh
 
 # A point with a smaller weight at a corner is moved to the opposite side: slivers have no angles.
@@ -29,18 +32,14 @@ def insert_stops(
     vertices = []
     for name, stop in stops.items():
         if not isinstance(stop, SurfacePoints):
-            vertices.append(whole_number(stop, name, 0, mesh.n_vertices - 1))
+            vertices.append(vertex_number(mesh.n_vertices, stop, name))
             continue
         require_one(stop, name)
         require_on(mesh, stop, name)
         # The point before may have split the face: look in each piece.
-        pieces = np.flatnonzero(origin == stop.simplices[0])
-        spots = points[faces[pieces]]
-        sides = spots[:, 1:] - spots[:, :1]
-        rest = np.linalg.pinv(sides.swapaxes(1, 2)) @ (stop.points - spots[:, 0])[:, :, None]
-        weights = np.concatenate([1 - rest.sum(axis=1), rest[:, :, 0]], axis=1)
-        piece = int(np.argmax(weights.min(axis=1)))
-        corners = faces[pieces[piece]][weights[piece] > ON_SIDE]
+        pieces = faces[origin == stop.simplices[0]]
+        there = closest_points(TriangleMesh(points, pieces), stop.points)
+        corners = pieces[there.simplices[0], there.weights[0] > ON_SIDE]
         if len(corners) == 1:
             vertices.append(int(corners[0]))
             continue
@@ -55,6 +54,16 @@ def insert_stops(
     return TriangleMesh(points, faces), vertices
 
 
+def vertex_number(n_vertices: int, vertex: Any, name: str) -> int:
+    """Return a vertex that was given where a SurfacePoints could be; raise an error if it is none."""
+    if not hasattr(vertex, "__index__"):
+        raise InvalidParameterError(
+            f"{name} must be a vertex or a SurfacePoints; the value is {describe_value(vertex)}. Find a "
+            "point from coordinates by closest_points(mesh, [point])."
+        )
+    return whole_number(vertex, name, 0, n_vertices - 1)
+
+
 def require_one(place: SurfacePoints, name: str) -> None:
     """Raise an error if an argument has more points than one."""
     if place.n_points != 1:
@@ -63,15 +72,13 @@ def require_one(place: SurfacePoints, name: str) -> None:
 
 def require_on(mesh: Mesh, places: SurfacePoints, name: str) -> None:
     """Raise an error if points do not lie on a mesh; `name` is that of the argument."""
-    known = (places.simplices >= 0) & (places.simplices < len(mesh.simplices))
-    corners = mesh.points[mesh.simplices[np.where(known, places.simplices, 0)]]
-    if (places.weights.shape[1], places.points.shape[1]) == corners.shape[1:]:
-        away = np.abs(np.einsum("pc,pcd->pd", places.weights, corners) - places.points).max(axis=1)
-        known &= away <= ELSEWHERE * np.ptp(mesh.points, axis=0).max()
-    else:
-        known[:] = False
-    if not known.all():
-        place = int(np.argmin(known))
+    try:
+        there = place_points(mesh, places.simplices, places.weights).points
+        away = np.abs(there - places.points).max(axis=1)
+    except (IndexError, ValueError):  # no such faces, or no such numbers of weights
+        away = np.full(places.n_points, np.inf)
+    if (away > ELSEWHERE * np.ptp(mesh.points, axis=0).max()).any():
+        place = int(np.argmax(away))
         raise InvalidParameterError(
             f"{name} must lie on this mesh; point {place} at {places.points[place].tolist()} in face "
             f"{places.simplices[place]} does not. Try closest_points(mesh, {name}.points)."
