@@ -64,6 +64,8 @@ RELEASE = [
     *["-O3", "-s"],
     "-fno-sanitize=undefined",  # which zig turns on by itself
     "-nostdlib",  # otherwise zig builds parts of the C library first, for eight seconds
+    # A larger frame calls that library on Windows, so that no kernel may have one anywhere.
+    "-Wframe-larger-than=4095",  # bytes: a page
 ]
 # With checks that end the process, and name the line
 UNDEFINED = [

@@ -296,6 +296,33 @@ def test_a_new_kernel_is_compiled_declared_and_called(tmp_path, monkeypatch):
     np.testing.assert_allclose(sums, rows.sum(axis=0) / 2)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("name", hatch_build.TARGETS)
+def test_the_kernels_compile_for_every_platform(name, tmp_path):
+    pytest.importorskip("ziglang")
+    target = hatch_build.TARGETS[name]
+    library = tmp_path / "kernels.so"
+    hatch_build.compile_library(target, min(target.processors), library, hatch_build.PACKAGES)
+    assert library.stat().st_size > 10_000
+
+
+def test_a_kernel_has_a_frame_of_less_than_a_page(tmp_path):
+    pytest.importorskip("ziglang")
+    source = tmp_path / "large_loops.c"
+    source.write_text(
+        '#include "kernels.h"\n'
+        "KERNEL void reverse(int64_t *numbers) {\n"
+        "    volatile int64_t all[512];\n"
+        "    for (int i = 0; i < 512; i++) all[i] = numbers[i];\n"
+        "    for (int i = 0; i < 512; i++) numbers[i] = all[511 - i];\n}\n"
+    )
+    target = hatch_build.TARGETS[hatch_build.target_name()]
+    with pytest.raises(SystemExit, match="kernels cannot be compiled"):
+        hatch_build.compile_library(
+            target, min(target.processors), tmp_path / "large.so", [tmp_path]
+        )
+
+
 def test_sources_have_one_layout():
     clang_format = pytest.importorskip("clang_format")
     root = Path(hatch_build.__file__).parents[1]

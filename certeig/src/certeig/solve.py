@@ -9,10 +9,10 @@ from jaxtyping import Float, Int
 from certeig.certificate import Certificate
 from certeig.kit.arrays import finite_number, freeze, whole_number
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
+from certeig.kit.matrices import as_symmetric, on_all_rows, require_points
 from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
-from certeig.matrices import as_symmetric, on_all_rows, require_points
 from certeig.solver.certified import certified_pairs
 from certeig.solver.certify import certify_pairs, in_user_units
 from certeig.solver.inertia import count_below_shift

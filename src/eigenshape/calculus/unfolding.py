@@ -4,9 +4,10 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._vectors import size_one
 from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.directions import side_twins
 from eigenshape.operators.tufted import side_ends
 

@@ -10,6 +10,7 @@ from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape._arrays import require_finite_rows
+from eigenshape._vectors import size_one
 from eigenshape.calculus.heat_distance import require_heat, require_sources
 from eigenshape.calculus.linear_solver import (
     GroundedFactor,
@@ -20,7 +21,7 @@ from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import edge_lengths, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import Directions, half_cotangents, vertex_directions

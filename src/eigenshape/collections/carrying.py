@@ -11,9 +11,9 @@ from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.files import as_path, replace_file
 from certeig.kit.threads import one_blas_thread
+from eigenshape._vectors import mean_radius
 from eigenshape.collections.collection import Collection
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.measure import mean_radius
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.morphometrics.curves import space_curves

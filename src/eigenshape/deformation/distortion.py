@@ -5,11 +5,11 @@ from jaxtyping import Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._vectors import area_vectors, size_one
 from eigenshape.deformation.rigidity import edge_weights, fit_turns
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import area_vectors, bounding_box, edge_lengths
+from eigenshape.geometry.measure import bounding_box, edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.cotangent import cotangent_laplacian
 
 

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from typing_extensions import TypeAliasType
 
 from certeig.kit.arguments import require_each, require_type
-from certeig.kit.arrays import ReadOnly, finite_number, finite_values, freeze, record
+from certeig.kit.arrays import EPS, ReadOnly, finite_number, finite_values, freeze, record
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 
@@ -56,7 +56,7 @@ class Rotation(ReadOnly):
             raise InvalidParameterError("axis must have a direction; it is [0, 0, 0].")
         length = largest * np.linalg.norm(direction / largest)
         # An axis of length 1 keeps its last digits.
-        if abs(length - 1) > 4 * np.finfo(float).eps:
+        if abs(length - 1) > 4 * EPS:
             direction = direction / largest
             direction = direction / np.linalg.norm(direction)
         vars(self).update(

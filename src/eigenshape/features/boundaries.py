@@ -7,9 +7,9 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import positive_values, record
+from eigenshape._arrays import label_components
 from eigenshape.features.segmentation import Segmentation, adjacent_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.facet_lists import label_components
 from eigenshape.geometry.measure import face_areas, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import adjacency_matrix, edge_table, face_pairs

@@ -8,8 +8,9 @@ from jaxtyping import Float
 from scipy.spatial import cKDTree
 
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._vectors import mean_radius
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.measure import edge_lengths, mean_radius
+from eigenshape.geometry.measure import edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.morphometrics.landmarks import Landmarks
 

@@ -14,7 +14,7 @@ from certeig.kit.arrays import ReadOnly, real_numbers, record, whole_numbers
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape.geometry.measure import nearest_rotations, rotations_and_stretches
+from eigenshape._vectors import nearest_rotations, rotations_and_stretches
 from eigenshape.morphometrics.landmarks import Specimens, as_curves, complete_points
 from eigenshape.morphometrics.splines import bending_matrix
 

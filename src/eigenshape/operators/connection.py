@@ -5,11 +5,11 @@ import scipy.sparse as sp
 from jaxtyping import Complex, Float
 
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import face_areas, vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.choices import Mass
 from eigenshape.operators.clouds.cloud_triangles import cloud_normals
 from eigenshape.operators.cotangent import cotangent_laplacian

@@ -6,6 +6,7 @@ import scipy.sparse as sp
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
 from eigenshape.geometry.requirements import require_different_simplices
@@ -14,7 +15,6 @@ from eigenshape.geometry.simplices import (
     in_length,
     require_span,
     require_volumes,
-    size_one,
 )
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops

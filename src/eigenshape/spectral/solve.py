@@ -11,17 +11,17 @@ import certeig
 from certeig.kit.arguments import require_choice, require_type
 from certeig.kit.arrays import freeze, positive_number, whole_number
 from certeig.kit.errors import InvalidParameterError
-from certeig.kit.files import as_path
+from certeig.kit.files import as_path, require_writable
+from certeig.kit.matrices import on_all_rows
 from certeig.kit.progress import Progress, silent
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
-from certeig.matrices import on_all_rows
 from certeig.solver.certified import certified_pairs
 from certeig.solver.certify import in_user_units
 from certeig.solver.eigenpairs import Pairs
 from certeig.solver.pencil import Pencil, to_user_vectors
 from eigenshape.operators.laplacian import Laplacian, dirichlet_laplacian
-from eigenshape.spectral.cache import content_key, keep, load_kept, require_writable
+from eigenshape.spectral.cache import content_key, keep, load_kept
 from eigenshape.spectral.kernel_values import (
     from_pencil,
     require_readable,

@@ -7,11 +7,11 @@ from scipy.spatial import cKDTree
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, positive_values, record, whole_number
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.distances.closest import squared_distances
 from eigenshape.geometry.distances.geodesic import farthest_first, unchecked_waves
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
-from eigenshape.geometry.simplices import size_one
 from eigenshape.operators.crouzeix_raviart import longest_edges
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
 

@@ -9,7 +9,7 @@ import pytest
 import eigenshape as es
 from eigenshape import InvalidParameterError
 from eigenshape.geometry import mask_surface, unmask
-from eigenshape.geometry.repairs.masks import hemisphere_of
+from eigenshape.io.hemispheres import hemisphere_of
 
 CORTICES = Path(str(resources.files("neuromodes") / "data"))
 GRID = es.shapes.grid(4, 2)  # 5 by 3 vertices

@@ -15,6 +15,7 @@ from certeig.kit.memory import require_memory
 from certeig.kit.text import Shown
 from certeig.kit.typing import ArrayLike, Integer
 
+EPS = float(np.finfo(np.float64).eps)  # rounding of a number near 1, relative
 # Share of the memory of the machine that one array may take while it is checked and copied. A
 # larger share would leave too little for the computation.
 SHARE_OF_ARRAYS = 0.5

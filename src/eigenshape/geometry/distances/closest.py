@@ -9,6 +9,7 @@ from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest_loops import nearest_faces, windings
 from eigenshape.geometry.distances.crossing_loops import box_tree, curve_places, face_boxes
@@ -18,7 +19,7 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
-from eigenshape.geometry.simplices import in_length, size_one
+from eigenshape.geometry.simplices import in_length
 from eigenshape.geometry.topology import is_closed
 
 # Points may be this many sizes of the mesh away: products of three distances stay below 1e200, and

@@ -9,9 +9,10 @@ from certeig.kit.arrays import whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.samples.quadrature import require_different_points
-from eigenshape.geometry.simplices import require_span, size_one
+from eigenshape.geometry.simplices import require_span
 from eigenshape.operators.clouds.pair_loops import local_rings
 from eigenshape.operators.tufted import (
     MOLLIFY,

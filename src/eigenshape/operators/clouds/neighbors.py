@@ -9,7 +9,7 @@ from certeig.kit.arrays import positive_number, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import finite_rows
-from eigenshape.geometry.simplices import size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.topology import adjacency_matrix, unique_edges
 
 SPARE = 8  # neighbors requested beyond those wanted, so that most ties are found in one query
