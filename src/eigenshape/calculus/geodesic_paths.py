@@ -1,6 +1,7 @@
 """Geodesic paths: locally shortest between two vertices."""
 
 from cmath import phase
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -23,11 +24,16 @@ from eigenshape.calculus.unfolding import (
     walkable_sides,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
+from eigenshape.geometry.distances.closest import closest_points
 from eigenshape.geometry.measure import edge_lengths, scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.samples.insertion import insert_stops
-from eigenshape.geometry.samples.surface_points import SurfacePoints
+from eigenshape.geometry.samples.surface_points import (
+    SurfacePoints,
+    require_on,
+    require_one,
+    vertex_number,
+)
 from eigenshape.geometry.topology import edge_table
 from eigenshape.operators.directions import (
     require_oriented_manifold,
@@ -35,6 +41,9 @@ from eigenshape.operators.directions import (
 
 # Rounds in which pivots are passed on their other side; a path of k edges takes about √k.
 ROUNDS = 10_000
+
+# A point with a smaller weight at a corner is moved to the opposite side: slivers have no angles.
+ON_SIDE = 1e-6
 
 # The left and the right end of each edge that a strip of faces crosses, in the plane.
 Portals = list[tuple[complex, complex]]
@@ -108,7 +117,7 @@ def geodesic_path(
     require_oriented_manifold(mesh)
     last = mesh.n_vertices - 1
     between = whole_numbers(via, "A vertex of via", 0, last).tolist() if np.size(via) else []
-    mesh, (first, final) = insert_stops(mesh, {"start": start, "end": end})
+    mesh, (first, final) = _insert_stops(mesh, {"start": start, "end": end})
     stops = [first, *between, final]
     # The shortest path along edges through all stops.
     graph = sp.coo_array(
@@ -163,6 +172,40 @@ def geodesic_path(
         if stop < len(portals) - 1:
             points.append(point_on_side(mesh, sides, strip[stop - 1], 1.0 - last_end))
     return as_path(np.array([*points, mesh.vertices[final]]))
+
+
+def _insert_stops(
+    mesh: TriangleMesh, stops: Mapping[str, Integer | SurfacePoints]
+) -> tuple[TriangleMesh, list[int]]:
+    """Return the vertex of each stop, a vertex or one point on the mesh, which becomes a vertex.
+
+    The faces at a point are split, and the vertices of the mesh stay the first ones. Raise
+    InvalidParameterError if a stop is not on the mesh; its name is that of the argument.
+    """
+    points, faces, origin = mesh.vertices, mesh.faces, np.arange(mesh.n_faces)
+    vertices = []
+    for name, stop in stops.items():
+        if not isinstance(stop, SurfacePoints):
+            vertices.append(vertex_number(mesh.n_vertices, stop, name))
+            continue
+        require_one(stop, name)
+        require_on(mesh, stop, name)
+        # The point before may have split the face: look in each piece.
+        pieces = faces[origin == stop.simplices[0]]
+        there = closest_points(TriangleMesh(points, pieces), stop.points)
+        corners = pieces[there.simplices[0], there.weights[0] > ON_SIDE]
+        if len(corners) == 1:
+            vertices.append(int(corners[0]))
+            continue
+        # Each face at that side becomes one for each corner of the side, with the point instead.
+        split = np.flatnonzero(np.isin(faces, corners).sum(axis=1) == len(corners))
+        whole = faces[split]
+        new = [np.where(whole == corner, len(points), whole) for corner in corners]
+        faces = np.concatenate([np.delete(faces, split, axis=0), *new])
+        origin = np.concatenate([np.delete(origin, split), np.tile(origin[split], len(corners))])
+        vertices.append(len(points))
+        points = np.append(points, stop.points, axis=0)
+    return TriangleMesh(points, faces), vertices
 
 
 def _strip_along(sides: Sides, path: list[int]) -> list[int]:

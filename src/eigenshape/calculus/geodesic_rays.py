@@ -23,8 +23,12 @@ from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.samples.insertion import require_on, require_one, vertex_number
-from eigenshape.geometry.samples.surface_points import SurfacePoints
+from eigenshape.geometry.samples.surface_points import (
+    SurfacePoints,
+    require_on,
+    require_one,
+    vertex_number,
+)
 from eigenshape.operators.directions import require_oriented_manifold, vertex_directions
 
 

@@ -23,8 +23,12 @@ from eigenshape.calculus.vector_heat import (
     side_vectors,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.samples.insertion import require_on, require_one, vertex_number
-from eigenshape.geometry.samples.surface_points import SurfacePoints
+from eigenshape.geometry.samples.surface_points import (
+    SurfacePoints,
+    require_on,
+    require_one,
+    vertex_number,
+)
 from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.directions import corner_products
 from eigenshape.operators.tufted import side_ends

@@ -15,8 +15,7 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.distances.geodesic_loops import spread_wave, spread_waves
 from eigenshape.geometry.requirements import require_describable
-from eigenshape.geometry.samples.insertion import require_on
-from eigenshape.geometry.samples.surface_points import SurfacePoints
+from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
 from eigenshape.geometry.simplices import dual_volumes, in_length, scaled_corners
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import vertex_components
