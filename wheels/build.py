@@ -45,11 +45,14 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if any(folder.iterdir()):
         raise SystemExit(f"The files of a release go to an empty folder; {folder} is not empty.")
+    # Of one commit, whatever is committed meanwhile
+    commit = ["git", "archive", "--format=tar", "HEAD"]
+    archive = subprocess.run(commit, cwd=ROOT, check=True, capture_output=True).stdout
     with tempfile.TemporaryDirectory() as work:
         again = Path(work) / "again"
         # A path that gets into a file makes the two differ.
-        build_packages(Path(work) / "one", folder)
-        build_packages(Path(work) / "the other", again)
+        build_packages(archive, Path(work) / "one", folder)
+        build_packages(archive, Path(work) / "the other", again)
         names = sorted(path.name for path in folder.iterdir())
         _, changed, missing = filecmp.cmpfiles(folder, again, names, shallow=False)
     faults = [f"{name}: the second build differs from the first" for name in changed + missing]
@@ -62,11 +65,10 @@ def main() -> None:
     print(f"{len(names)} files, built twice with equal bytes")
 
 
-def build_packages(sources: Path, output: Path) -> None:
-    """Export the last commit into a folder, and build everything there."""
+def build_packages(archive: bytes, sources: Path, output: Path) -> None:
+    """Unpack an archive of all sources into a folder, and build everything there."""
     sources.mkdir()
-    archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, capture_output=True)
-    subprocess.run(["tar", "-x"], cwd=sources, input=archive.stdout, check=True)
+    subprocess.run(["tar", "-x"], cwd=sources, input=archive, check=True)
     temporary = sources.with_name(f"{sources.name} temporary")
     temporary.mkdir()
     hatchling = [sys.executable, "-m", "hatchling", "build", "-d", str(output)]

@@ -34,7 +34,7 @@ def answers() -> dict[str, list[float]]:
     """Return the numbers of a spectrum, a merge tree, parts and a search by name."""
     biped = make("biped", 0)
     spectrum = es.solve_spectrum(es.cotangent_laplacian(biped), k=N_EIGENPAIRS)
-    tree = es.merge_tree(biped, biped.vertices[:, 1])
+    tree = es.merge_tree(biped, (biped.vertices**2).sum(axis=1))  # limbs end at its maxima
     parts = es.find_parts(biped).parts
     with tempfile.TemporaryDirectory() as folder:
         index = es.ShapeIndex.create(Path(folder) / "index")
