@@ -98,10 +98,10 @@ def fragment(suffix: str) -> dict[str, object]:
     return right(es.match_shapes(part, whole), whole, truth)
 
 
-def coarser(name: str, n_vertices: int) -> dict[str, object]:
-    """Map a shape with fewer vertices on itself."""
+def coarser(name: str, n_faces: int) -> dict[str, object]:
+    """Map a shape with fewer faces on itself."""
     whole = read(name)
-    part = es.geometry.decimate(whole, n_vertices).mesh
+    part = es.geometry.decimate(whole, n_faces).mesh
     turn = Rotation.from_rotvec([0.4, 1.0, 2.0]).as_matrix()
     moved = es.TriangleMesh(part.vertices @ turn.T, part.faces)
     return right(es.match_shapes(moved, whole), whole, part.vertices)

@@ -88,8 +88,11 @@ def remesh(mesh: es.TriangleMesh, n_vertices: int, rng: np.random.Generator) -> 
     points = es.geometry.closest_points(mesh, moved).points
     n_faces = 2 * n_vertices
     found = igl.decimate(np.array(points), np.array(fine.faces), n_faces)
-    points, faces = found[:2] if isinstance(found[0], np.ndarray) else found[1:3]
-    coarse = es.repair(es.TriangleMesh(points, faces), ["drop_unreferenced"]).mesh
+    less, faces = found[:2] if isinstance(found[0], np.ndarray) else found[1:3]
+    if len(faces):
+        coarse = es.repair(es.TriangleMesh(less, faces), ["drop_unreferenced"]).mesh
+    else:  # libigl refuses edges of three faces, which some bones and plates have
+        coarse = es.geometry.decimate(es.TriangleMesh(points, fine.faces), n_faces).mesh
     on_surface = es.geometry.closest_points(mesh, coarse.vertices).points
     coarse = es.TriangleMesh(on_surface, coarse.faces)
     return es.repair(coarse, ["drop_degenerate", "largest_component"]).mesh
