@@ -181,8 +181,8 @@ def transfer_labels(
         costs.append(cost)
     if len(failures) == len(sources):
         raise failures[0]
-    for number, error in failures.items():
-        warnings.warn(f"labeled[{number}] was left out: {error}", stacklevel=3)
+    for number, failure in failures.items():
+        warnings.warn(f"labeled[{number}] was left out: {failure}", stacklevel=3)
     weights = np.exp((min(costs) - np.array(costs)) / COST_SCALE)
     weights /= weights.sum()
 
