@@ -18,8 +18,7 @@ from scipy.spatial import cKDTree
 from certeig.kit.arrays import record
 from eigenshape.geometry.measure import nearest_rotations
 from eigenshape.matching.fitting_loops import (
-    add_pulls,
-    add_tensions,
+    add_forces,
     carry_vertices,
     fill_stiffness,
     turn_frames,
@@ -208,8 +207,8 @@ def _fit(
         weight = stiffness * 2 / len(plan.one)  # as in `graph`
         for _ in range(N_FIRST if step == 0 else N_NEXT):
             right = np.zeros(places.shape)
-            add_pulls(turns, carriers, portions, plan.arms, pull, targets, right)
-            add_tensions(turns, plan.one, plan.two, plan.links, weight, right)
+            edges = plan.one, plan.two, plan.links, weight
+            add_forces(turns, carriers, portions, plan.arms, pull, targets, *edges, right)
             # LAPACK itself: the checks of `cho_solve` take as long as the solve.
             places = np.ascontiguousarray(dpotrs(factor, right)[0])
             turn_frames(places, plan.one, plan.two, plan.links, *FREE_SIZES, turns)

@@ -42,9 +42,11 @@ KERNEL void fill_stiffness(const int64_t *carriers, const double *portions, cons
     }
 }
 
-KERNEL void add_pulls(const double (*turns)[3][3], const int64_t *carriers, const double *portions,
-                      const double (*arms)[3], const double *pull, const double (*targets)[3],
-                      double (*right)[3], int64_t n_samples, int64_t n_carriers) {
+KERNEL void add_forces(const double (*turns)[3][3], const int64_t *carriers, const double *portions,
+                       const double (*arms)[3], const double *pull, const double (*targets)[3],
+                       const int64_t *one, const int64_t *two, const double (*links)[3],
+                       double weight, double (*right)[3], int64_t n_samples, int64_t n_carriers,
+                       int64_t n_edges) {
     for (int64_t s = 0; s < n_samples; s++) {
         double rest[3] = {targets[s][0], targets[s][1], targets[s][2]};
         int64_t first = s * n_carriers, end = first + n_carriers;
@@ -55,17 +57,12 @@ KERNEL void add_pulls(const double (*turns)[3][3], const int64_t *carriers, cons
         for (int64_t c = first; c < end; c++)
             for (int d = 0; d < 3; d++) right[carriers[c]][d] += pull[s] * portions[c] * rest[d];
     }
-}
-
-KERNEL void add_tensions(const double (*turns)[3][3], const int64_t *one, const int64_t *two,
-                         const double (*arms)[3], double weight, double (*right)[3],
-                         int64_t n_edges) {
     for (int64_t edge = 0; edge < n_edges; edge++) {
         const double (*first)[3] = turns[one[edge]], (*second)[3] = turns[two[edge]];
         for (int d = 0; d < 3; d++) {
             double turned = 0;
             for (int e = 0; e < 3; e++)
-                turned += 0.5 * (first[d][e] + second[d][e]) * arms[edge][e];
+                turned += 0.5 * (first[d][e] + second[d][e]) * links[edge][e];
             right[one[edge]][d] -= weight * turned;
         }
     }

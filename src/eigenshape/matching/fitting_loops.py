@@ -49,33 +49,26 @@ def carry_vertices(
     """
 
 
-@kernel("n_samples", "n_carriers")
-def add_pulls(
+@kernel("n_samples", "n_carriers", "n_edges")
+def add_forces(
     turns: Float64[np.ndarray, "n_frames 3 3"],
     carriers: Int64[np.ndarray, "n_samples n_carriers"],
     portions: Float64[np.ndarray, "n_samples n_carriers"],
     arms: Float64[np.ndarray, "n_samples n_carriers 3"],
     pull: Float64[np.ndarray, " n_samples"],
     targets: Float64[np.ndarray, "n_samples 3"],
-    right: Out[Float64[np.ndarray, "n_frames 3"]],
-) -> None:
-    """Add the pull of samples on the frames that carry them, in the current turns of the frames.
-
-    Sample s lies at `arms[s, c]` from frame `carriers[s, c]`, which carries the share
-    `portions[s, c]` of it.
-    """
-
-
-@kernel("n_edges")
-def add_tensions(
-    turns: Float64[np.ndarray, "n_frames 3 3"],
     one: Int64[np.ndarray, " n_edges"],
     two: Int64[np.ndarray, " n_edges"],
-    arms: Float64[np.ndarray, "n_edges 3"],
+    links: Float64[np.ndarray, "n_edges 3"],
     weight: float,
     right: Out[Float64[np.ndarray, "n_frames 3"]],
 ) -> None:
-    """Add what edges between frames demand: minus `weight` times the arm in the mean turn."""
+    """Add what pulls on frames, in their current turns: the samples that they carry, and edges.
+
+    Sample s lies at `arms[s, c]` from frame `carriers[s, c]`, which carries the share
+    `portions[s, c]` of it. An edge demands minus `weight` times its link in the mean turn of its
+    frames.
+    """
 
 
 def turn_frames(
