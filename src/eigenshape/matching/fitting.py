@@ -16,7 +16,7 @@ from scipy.linalg.lapack import dpotrs
 from scipy.spatial import cKDTree
 
 from certeig.kit.arrays import record
-from eigenshape.geometry.measure import nearest_rotations
+from eigenshape._vectors import nearest_rotations
 from eigenshape.matching.fitting_loops import (
     add_forces,
     carry_vertices,

@@ -15,6 +15,7 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.distances.geodesic_loops import choose_farthest, fill_rows, spread_waves
 from eigenshape.geometry.requirements import require_describable
+from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
 from eigenshape.geometry.simplices import dual_volumes, in_length, scaled_corners
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import vertex_components
@@ -33,6 +34,7 @@ N_BASES = 150
 # Where the triangles at each vertex start, their other two corners, and three lengths of each.
 Fans = tuple[Int[np.ndarray, " n1"], Int32[np.ndarray, "k 2"], Float[np.ndarray, "k 3"]]
 Wave = Callable[..., Float[np.ndarray, " n"]]
+Rows = Callable[..., Float[np.ndarray, "k n"]]
 
 
 def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
@@ -108,9 +110,9 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
 
 
 def geodesic_distances(
-    mesh: MeshLike, sources: ArrayLike, *, reach: float = np.inf
+    mesh: MeshLike, sources: ArrayLike | SurfacePoints, *, reach: float = np.inf
 ) -> Float[np.ndarray, "k n"]:
-    """Compute the geodesic distances from some vertices, or sets of vertices, to all vertices.
+    """Compute the geodesic distances from some vertices, sets of vertices, or points, to all vertices.
 
     The method is that of `geodesic_balls`, in the direction from the sources only. From a set of
     vertices one wave starts at all of them at once; an edge between two of them is a source along
@@ -120,8 +122,9 @@ def geodesic_distances(
     ----------
     mesh : MeshLike
         A surface, in any R^d.
-    sources : (k,) int, or k lists of int
-        Vertices. The distance from a list of vertices is that to the nearest of them.
+    sources : (k,) int, k lists of int, or SurfacePoints
+        Vertices, or points inside faces. The distance from a list of vertices is that to the nearest
+        of them.
     reach : float
         Largest distance that is needed, in length. A smaller reach takes less time.
 
@@ -136,7 +139,7 @@ def geodesic_distances(
     InvalidShapeError
         If the mesh does not have dimension 2.
     InvalidParameterError
-        If a source is not a vertex, or the reach is negative or no number.
+        If a source is not a vertex or a point of this mesh, or the reach is negative or no number.
 
     See Also
     --------
@@ -153,13 +156,48 @@ def geodesic_distances(
     [[0.0, 1.0, 2.0, 1.0, 1.4142, 2.2361, 2.0, 2.2361, 2.8284]]
     >>> es.geometry.geodesic_distances(grid, [[0, 1, 2]]).round(6).tolist()
     [[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]]
+
+    From a point inside a face:
+
+    >>> place = es.geometry.closest_points(grid, [[0.5, 0.25, 0]])
+    >>> es.geometry.geodesic_distances(grid, place).round(4)[0, :3].tolist()
+    [0.559, 0.559, 1.5207]
     """
     mesh = as_simplicial(mesh)
     rows_of, radius = unchecked_rows(mesh), number_from_zero(reach, "reach")
+    if isinstance(sources, SurfacePoints):
+        require_on(mesh, sources, "sources")
+        pairs = zip(sources.points, sources.simplices, strict=True)
+        return np.stack([_distances_from(mesh, rows_of, *pair, radius) for pair in pairs])
     wanted = source_sets(sources, mesh.n_points)
     ends = np.cumsum([len(source) for source in wanted], dtype=np.int64)
     flat = np.concatenate([*wanted, np.empty(0, dtype=np.int64)])
     return rows_of(flat, ends, radius)
+
+
+def _distances_from(
+    mesh: Mesh, rows_of: Rows, place: Float[np.ndarray, " d"], simplex: Integer, reach: float
+) -> Float[np.ndarray, " n"]:
+    """Return the distances from a point of a face, of those from its corners.
+
+    The plane of the face is laid out beyond each side, as far as the other point, which two corners
+    place there: the rule by which waves cross triangles.
+    """
+    corners = mesh.simplices[simplex]
+    spots = mesh.points[corners]
+    spokes = np.linalg.norm(spots - place, axis=1)
+    rows = rows_of(corners, np.arange(1, 4), reach + spokes.max())
+    found = (rows + spokes[:, None]).min(axis=0)
+    for one, two in ((0, 1), (1, 2), (2, 0)):
+        side = np.linalg.norm(spots[[two]] - spots[one], axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):  # infinite distances place nothing
+            along, beyond = _place(np.repeat(side, mesh.n_points), rows[one], rows[two])
+            own, above = _place(side, spokes[[one]], spokes[[two]])
+            crossing = along + (own - along) * beyond / (beyond + above)
+            straight = np.hypot(own - along, above + beyond)
+            is_nearer = (crossing >= 0) & (crossing <= side) & (straight < found)
+        found = np.where(is_nearer, straight, found)
+    return np.where(found <= reach, found, np.inf)
 
 
 def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]]:
@@ -236,7 +274,7 @@ def unchecked_waves(mesh: Mesh) -> Wave:
     return wave
 
 
-def unchecked_rows(mesh: Mesh) -> Callable[..., Float[np.ndarray, "k n"]]:
+def unchecked_rows(mesh: Mesh) -> Rows:
     """Return a function of sources, the ends of sets of these, and a reach from zero on.
 
     It returns the distances of all vertices from each set, whose vertices ascend.
@@ -429,3 +467,16 @@ def _fans(mesh: Mesh) -> tuple[Fans, float]:
     order = np.argsort(triples[:, 0], kind="stable")
     starts = np.searchsorted(triples[order, 0], np.arange(mesh.n_points + 1))
     return (starts, triples[order, 1:].astype(np.int32), lengths[order]), scale
+
+
+def _place(
+    edge: Float[np.ndarray, " f"], left: Float[np.ndarray, " f"], right: Float[np.ndarray, " f"]
+) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, " f"]]:
+    """Return where the third corners of triangles are, along an edge and away from it.
+
+    `left` and `right` are the distances of the corner from the first and the other end of the edge.
+    Where an edge has no length, no wave passes through it, and the place is not used.
+    """
+    length = np.where(edge > 0, edge, 1)
+    along = (left * left - right * right + edge * edge) / (2 * length)
+    return along, np.sqrt(np.maximum(left * left - along * along, 0))
