@@ -183,3 +183,9 @@ def number_places(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
     # np.unique compares bytes; adding 0.0 turns -0.0 into 0.0.
     _, place = np.unique(points + 0.0, axis=0, return_inverse=True)
     return place.ravel().astype(np.int64)
+
+
+def adjacency_matrix(edges: Int[np.ndarray, "e 2"], values: np.ndarray, n: int) -> sp.csr_array:
+    """Return the symmetric matrix of weighted edges, each given once."""
+    both = np.concatenate([edges, edges[:, ::-1]]).T
+    return sp.coo_array((np.tile(values, 2), both), shape=(n, n)).tocsr()

@@ -47,14 +47,14 @@ def mean_radius(points: Float[np.ndarray, "n 3"]) -> float:
     return float(np.sqrt(np.mean(np.sum((points - points.mean(axis=0)) ** 2, axis=1))))
 
 
-def nearest_rotations(matrices: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k 3 3"]:
+def nearest_rotations(matrices: Float[np.ndarray, "k d d"]) -> Float[np.ndarray, "k d d"]:
     """Return the rotation nearest to each matrix in the Frobenius norm (Kabsch 1976)."""
     return rotations_and_stretches(matrices)[0]
 
 
 def rotations_and_stretches(
-    matrices: Float[np.ndarray, "*k 3 3"],
-) -> tuple[Float[np.ndarray, "*k 3 3"], Float[np.ndarray, "*k 3"]]:
+    matrices: Float[np.ndarray, "*k d d"],
+) -> tuple[Float[np.ndarray, "*k d d"], Float[np.ndarray, "*k d"]]:
     """Return the rotation R nearest to each matrix M, and signed stretches, whose sum is trace(RᵀM).
 
     They are the singular values; the smallest is negative if M reflects.
@@ -62,8 +62,8 @@ def rotations_and_stretches(
     left, stretches, right = np.linalg.svd(matrices)
     # A reflection becomes a rotation by a change of sign along the smallest singular value.
     signs = np.sign(np.linalg.det(left @ right))
-    left[..., 2] *= signs[..., None]
-    stretches[..., 2] *= signs
+    left[..., -1] *= signs[..., None]
+    stretches[..., -1] *= signs
     return left @ right, stretches
 
 

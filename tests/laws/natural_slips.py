@@ -344,6 +344,7 @@ NAMED: dict[str, Callable[[], Any]] = {
         "one": es.morphometrics.Landmarks(["tip"], body().vertices[:1])
     },
     "carry_attributes.attributes": written_attributes,
+    "resample_curves.n_points": lambda: 5,
     "decimate.n_faces": lambda: 100,
     "write_fields.fields": lambda: {"height": height()},
     "write_fields.path": lambda: FOLDER / "written.vtu",
@@ -479,7 +480,6 @@ NAMED: dict[str, Callable[[], Any]] = {
     "Parcellation.labels": lambda: [0, 1, -1],
     "Parcellation.names": lambda: ["low", "high"],
     "unmask.values": lambda: [1.0, 2.0, 3.0],
-    "unparcellate.values": lambda: [1.0, 2.0],
     "write_parcellation.path": lambda: FOLDER / "written.annot",
     "write_edits.path": lambda: FOLDER / "edits.json",
     "write_landmarks.path": lambda: FOLDER / "written.csv",

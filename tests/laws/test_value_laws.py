@@ -97,6 +97,7 @@ MADE: dict[str, Callable[[Shared], Any]] = {
     "SpectralClusterer": lambda v: es.spectral.SpectralClusterer(3),
     "SpectralEmbedder": lambda v: es.spectral.SpectralEmbedder(3),
     "StabilityPlan": lambda v: es.stability.StabilityPlan(k=5),
+    "VectorHeat": lambda v: es.calculus.prepare_vector_heat(es.PointCloud(v.ball.vertices, dim=2)),
     "Workers": lambda v: es.retrieval.Workers(2),
 }
 # What may change inside values.

@@ -7,6 +7,7 @@ from certeig.kit.errors import CerteigError, InvalidParameterError
 from eigenshape.collections.collection import read_specimen
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.io.folders import find_items
+from eigenshape.morphometrics.curves import resample_curves
 from eigenshape.morphometrics.landmark_files import read_folder, read_specimens
 from eigenshape.morphometrics.landmarks import Landmarks
 from eigenshape.morphometrics.placement import require_on_surfaces
@@ -15,12 +16,13 @@ MOST_NAMED = 5  # specimens that a sentence names
 
 
 def find_landmarks(
-    folder: Path, landmarks: Path | None, output: Path, unit: str
+    folder: Path, landmarks: Path | None, output: Path, unit: str, curve_points: int | None
 ) -> dict[str, Landmarks]:
     """Read the landmarks that are given: from a table, or from files beside meshes or in a folder.
 
-    Raise InvalidParameterError if one is of no specimen of the folder, since its name may be
-    misspelled, or does not lie on its surface.
+    Points of curves are replaced by that many, spaced evenly, if a number is given. Raise
+    InvalidParameterError if one is of no specimen of the folder, since its name may be misspelled, or
+    does not lie on its surface.
     """
     found = (
         read_folder(folder, unit, output)
@@ -36,7 +38,12 @@ def find_landmarks(
             f"{', ...' if len(paths) > MOST_NAMED else ''}"
         )
     require_on_surfaces(_readable(found, paths))
-    return found
+    if curve_points is None:
+        return found
+    return {
+        name: resample_curves(own, curve_points, mesh=mesh)
+        for name, mesh, own in _readable(found, paths)
+    }
 
 
 def _readable(

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import EPS
-from eigenshape._errors import InvalidShapeError, try_auto
+from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_of, size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplicial import Mesh
@@ -278,27 +278,3 @@ def cut_tetrahedra(
         (2, [(0, 2), (1, 3), (1, 2)]),
     ]
     return np.concatenate([ordered[n_inside == count][:, cut] for count, cut in cuts])
-
-
-def require_volumes(mesh: Mesh) -> None:
-    """Raise an error if a simplex has no volume.
-
-    If the points of the mesh lie in a flat, simplices have volume by rounding only, and are
-    refused, too.
-    """
-    flat = degenerate_simplices(mesh)
-    plural, singular, measure = MEASURES.get(mesh.dim, ("Simplices", "simplex", "volume"))
-    if flat.size == len(mesh.simplices):
-        raise InvalidShapeError(
-            f"{plural} must have {measure}; all {flat.size} have none: their points are equal or "
-            f"{'on a line' if mesh.dim == 2 else 'in a flat of lower dimension'}."
-        )
-    if flat.size:
-        corners = mesh.simplices[flat[0]]
-        raise InvalidShapeError(
-            f"{plural} must have {measure}; {singular} {flat[0]} is {corners.tolist()} "
-            f"with corners {mesh.points[corners].tolist()} ({flat.size} such). {try_auto()}"
-        )
-    used = np.zeros(mesh.n_points, dtype=bool)
-    used[mesh.simplices] = True
-    require_span(mesh.points[used], mesh.dim, "The points of a mesh")

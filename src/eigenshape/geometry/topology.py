@@ -6,7 +6,7 @@ from jaxtyping import Bool, Int
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
-from eigenshape._arrays import label_components, number_places, sorted_rows
+from eigenshape._arrays import adjacency_matrix, label_components, number_places, sorted_rows
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.facet_lists import shared_facets
@@ -91,12 +91,6 @@ def neighbor_links(mesh: TriangleMesh) -> sp.csr_array:
     """Return the symmetric matrix with a 1 for each two vertices that an edge connects."""
     edges = edge_table(mesh).edges
     return adjacency_matrix(edges, np.ones(len(edges)), mesh.n_vertices)
-
-
-def adjacency_matrix(edges: Int[np.ndarray, "e 2"], values: np.ndarray, n: int) -> sp.csr_array:
-    """Return the symmetric matrix of weighted edges, each given once."""
-    both = np.concatenate([edges, edges[:, ::-1]]).T
-    return sp.coo_array((np.tile(values, 2), both), shape=(n, n)).tocsr()
 
 
 def unique_edges(

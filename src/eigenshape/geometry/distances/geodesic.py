@@ -15,6 +15,7 @@ from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.distances.geodesic_loops import spread_wave, spread_waves
 from eigenshape.geometry.requirements import require_describable
+from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
 from eigenshape.geometry.simplices import dual_volumes, in_length, scaled_corners
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import vertex_components
@@ -108,9 +109,9 @@ def geodesic_balls(mesh: MeshLike, radius: float) -> sp.csr_array:
 
 
 def geodesic_distances(
-    mesh: MeshLike, sources: ArrayLike, *, reach: float = np.inf
+    mesh: MeshLike, sources: ArrayLike | SurfacePoints, *, reach: float = np.inf
 ) -> Float[np.ndarray, "k n"]:
-    """Compute the geodesic distances from some vertices, or sets of vertices, to all vertices.
+    """Compute the geodesic distances from some vertices, sets of vertices, or points, to all vertices.
 
     The method is that of `geodesic_balls`, in the direction from the sources only. From a set of
     vertices one wave starts at all of them at once; an edge between two of them is a source along
@@ -120,8 +121,9 @@ def geodesic_distances(
     ----------
     mesh : MeshLike
         A surface, in any R^d.
-    sources : (k,) int, or k lists of int
-        Vertices. The distance from a list of vertices is that to the nearest of them.
+    sources : (k,) int, k lists of int, or SurfacePoints
+        Vertices, or points inside faces. The distance from a list of vertices is that to the nearest
+        of them.
     reach : float
         Largest distance that is needed, in length. A smaller reach takes less time.
 
@@ -136,7 +138,7 @@ def geodesic_distances(
     InvalidShapeError
         If the mesh does not have dimension 2.
     InvalidParameterError
-        If a source is not a vertex, or the reach is negative or no number.
+        If a source is not a vertex or a point of this mesh, or the reach is negative or no number.
 
     See Also
     --------
@@ -153,11 +155,46 @@ def geodesic_distances(
     [[0.0, 1.0, 2.0, 1.0, 1.4142, 2.2361, 2.0, 2.2361, 2.8284]]
     >>> es.geometry.geodesic_distances(grid, [[0, 1, 2]]).round(6).tolist()
     [[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]]
+
+    From a point inside a face:
+
+    >>> place = es.geometry.closest_points(grid, [[0.5, 0.25, 0]])
+    >>> es.geometry.geodesic_distances(grid, place).round(4)[0, :3].tolist()
+    [0.559, 0.559, 1.5207]
     """
     mesh = as_simplicial(mesh)
     wave, radius = unchecked_waves(mesh), number_from_zero(reach, "reach")
+    if isinstance(sources, SurfacePoints):
+        require_on(mesh, sources, "sources")
+        pairs = zip(sources.points, sources.simplices, strict=True)
+        return np.stack([_distances_from(mesh, wave, *pair, radius) for pair in pairs])
     wanted = source_sets(sources, mesh.n_points)
     return np.array([wave(source, radius) for source in wanted]).reshape(-1, mesh.n_points)
+
+
+def _distances_from(
+    mesh: Mesh, wave: Wave, place: Float[np.ndarray, " d"], simplex: Integer, reach: float
+) -> Float[np.ndarray, " n"]:
+    """Return the distances from a point of a face, of those from its corners.
+
+    The plane of the face is laid out beyond each side, as far as the other point, which two corners
+    place there: the rule by which waves cross triangles.
+    """
+    corners = mesh.simplices[simplex]
+    spots = mesh.points[corners]
+    spokes = np.linalg.norm(spots - place, axis=1)
+    rows = np.stack([wave(corners[[i]], reach + spokes.max()) for i in range(3)])
+    found = (rows + spokes[:, None]).min(axis=0)
+    for one, two in ((0, 1), (1, 2), (2, 0)):
+        side = np.linalg.norm(spots[[two]] - spots[one], axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):  # infinite distances place nothing
+            along, beyond = _place(np.repeat(side, mesh.n_points), rows[one], rows[two])
+            own, above = _place(side, spokes[[one]], spokes[[two]])
+            crossing = along + (own - along) * beyond / (beyond + above)
+            straight = np.hypot(own - along, above + beyond)
+            is_nearer = (crossing >= 0) & (crossing <= side) & (straight < found)
+        found = np.where(is_nearer, straight, found)
+    return np.where(found <= reach, found, np.inf)
 
 
 def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]]:
