@@ -161,7 +161,7 @@ def geodesic_distances(
 
     >>> place = es.geometry.closest_points(grid, [[0.5, 0.25, 0]])
     >>> es.geometry.geodesic_distances(grid, place).round(4)[0, :3].tolist()
-    [0.559, 0.559, 1.5207]
+    [0.559, 0.9014, 1.82]
     """
     mesh = as_simplicial(mesh)
     rows_of, radius = unchecked_rows(mesh), number_from_zero(reach, "reach")
