@@ -386,10 +386,7 @@ def test_a_wrong_file_is_refused_with_what_is_wrong(name, tmp_path):
         es.morphometrics.read_specimens(path)
 
 
-OF_POINTS = [each for each in WRITERS if each != ".sliders.csv"]  # which holds no places
-
-
-@pytest.mark.parametrize("suffix", OF_POINTS)
+@pytest.mark.parametrize("suffix", HOLD_POINTS)
 def test_a_file_that_is_cut_is_refused_or_holds_the_specimens_that_are_whole(suffix, tmp_path):
     given = {"only": specimen()} if suffix in OF_ONE else {"one": specimen(), "two": specimen(1)}
     whole = {name: kept(each, suffix) for name, each in given.items()}
