@@ -14,9 +14,9 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.morphometrics.landmarks import Landmarks
 from eigenshape.morphometrics.placement import farthest_place
 
-MOST_POINTS = 10_000  # on a curve; hundreds are the most that people use
+MOST_ON_CURVE = 10_000  # points; hundreds are the most that people use
 # Places per step along a curve by which its length is measured: gaps are even to about 1e-4.
-N_STEPS = 64
+N_PLACES = 64
 
 
 def resample_curves(
@@ -71,7 +71,7 @@ def resample_curves(
     require_type(landmarks, Landmarks, "landmarks")
     surface = None if mesh is None else as_mesh(mesh)
     curves = landmarks.curves
-    given = whole_numbers(n_points, "n_points", 2, MOST_POINTS)
+    given = whole_numbers(n_points, "n_points", 2, MOST_ON_CURVE)
     if len(given) not in (1, len(curves)):
         raise InvalidParameterError(
             f"n_points must be one number, or one for each curve; there are {len(given)} numbers and "
@@ -136,7 +136,7 @@ def _space_evenly(
     is_closed = len(knots) > 3 and (points[0] == points[-1]).all()
     boundary = "periodic" if is_closed else "not-a-knot"
     spline = CubicSpline(knots, points[moved], bc_type=boundary)
-    shares = np.linspace(0, 1, N_STEPS, endpoint=False)
+    shares = np.linspace(0, 1, N_PLACES, endpoint=False)
     fine = np.append((knots[:-1, None] + np.diff(knots)[:, None] * shares).ravel(), knots[-1])
     line = spline(fine)
     if surface is not None:

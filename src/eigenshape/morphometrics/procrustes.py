@@ -23,10 +23,9 @@ TOLERANCE, MOST_ROUNDS = 1e-10, 200  # 31 skulls of mice rest after 6 rounds
 # changes by less, or for as many rounds: with more they would all drift along their curves together,
 # which changes shapes no more. Both are the defaults of `gpagen` in geomorph 4.0 (`tol`, `max.iter`).
 LEAST_CHANGE, MOST_SLIDES = 1e-4, 9
-N_NEAREST = 5  # points that span the plane in which one of them slides, itself among them; `gpagen`
-FENCE = (
-    1.5  # interquartile ranges above the upper quartile, beyond which Tukey calls a value far out
-)
+N_SPANNING = 5  # points that span the plane in which one of them slides, itself among them; `gpagen`
+# Interquartile ranges above the upper quartile, beyond which Tukey calls a value far out
+FENCE = 1.5
 
 
 @record
@@ -240,7 +239,7 @@ class _Sliders(NamedTuple):
     ) -> Float[np.ndarray, "v 3"]:
         """Return two directions for each point of a patch: across its normal if it is known."""
         order = np.argsort(cdist(shape[self.patch], shape), axis=1, kind="stable")
-        nearest = shape[order[:, :N_NEAREST]]
+        nearest = shape[order[:, :N_SPANNING]]
         spokes = nearest - nearest.mean(axis=1, keepdims=True)
         guessed = np.linalg.svd(spokes)[2][:, 2]
         across = np.where(np.isfinite(normals), normals, guessed)

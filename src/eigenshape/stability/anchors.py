@@ -11,7 +11,7 @@ from certeig.kit.arrays import ReadOnly, positive_values, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
-from eigenshape.geometry.distances.geodesic import farthest_first, unchecked_waves
+from eigenshape.geometry.distances.geodesic import unchecked_waves
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
 from eigenshape.operators.crouzeix_raviart import longest_edges
 from eigenshape.stability.perturbation import OUTSIDE, Perturbation
@@ -91,13 +91,13 @@ def anchor_nodes(mesh: MeshLike, delta: float, *, start: int = 0) -> AnchorNodes
     """
     mesh = as_simplicial(mesh)
     positive_values(delta, "delta")
-    least, chosen = np.full(mesh.n_points, np.inf), []
-    first = whole_number(start, "start", 0, mesh.n_points - 1)
-    for vertex, row in farthest_first(unchecked_waves(mesh), mesh.n_points, first):
-        if least[vertex] < delta:
-            break
+    wave, least, chosen = unchecked_waves(mesh), np.full(mesh.n_points, np.inf), []
+    vertex = whole_number(start, "start", 0, mesh.n_points - 1)
+    while least[vertex] >= delta:
         chosen.append(vertex)
-        np.minimum(least, row, out=least)
+        # The wave need not go farther than it comes nearest.
+        np.minimum(least, wave(np.array([vertex]), least.max()), out=least)
+        vertex = int(least.argmax())
     reached = float(least.max())
     return AnchorNodes(
         vertices=np.array(chosen),
