@@ -91,19 +91,7 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     wait_until(page, "eigenshape.panels.find(({ id }) => id === 'compare').map !== null")
     wait_until_still(page)
 
-    # One camera follows the other, in both directions.
-    laid = np.reshape(page.evaluate("eigenshape.state.beside.similarity"), (3, 4))
-    for side in (0, 1):
-        page.locator('[data-test="canvas"]').nth(side).press("ArrowLeft")
-        page.locator('[data-test="canvas"]').nth(side).press("ArrowUp")
-        ours, theirs = np.array(page.evaluate(EYES))
-        np.testing.assert_allclose(theirs, laid[:, :3] @ ours + laid[:, 3], atol=1e-5)
-    page.keyboard.press("3")
-    assert page.evaluate(f"[{', '.join(BOTH)}].map(({{ camera }}) => camera.fov)") == [0.1, 0.1]
-    ours, theirs = np.array(page.evaluate(EYES))
-    np.testing.assert_allclose(theirs, laid[:, :3] @ ours + laid[:, 3], rtol=1e-5)
-    page.keyboard.press("5")
-    page.keyboard.press("Home")
+    check_that_cameras_follow_each_other(page)
 
     # Equal colors correspond; what is not sure is gray.
     partners, back = (np.array(page.evaluate(f"Array.from({MAP}.partners[{i}])")) for i in (0, 1))
@@ -154,6 +142,22 @@ def test_a_second_shape_is_mapped_corrected_and_takes_over_what_is_painted(page,
     find(page, "close-match").click()
     wait_until(page, "eigenshape.second === null")
     assert page.locator('[data-test="canvas"]').count() == 1
+
+
+def check_that_cameras_follow_each_other(page):
+    """Each follows the other in both directions, also along an axis."""
+    laid = np.reshape(page.evaluate("eigenshape.state.beside.similarity"), (3, 4))
+    for side in (0, 1):
+        page.locator('[data-test="canvas"]').nth(side).press("ArrowLeft")
+        page.locator('[data-test="canvas"]').nth(side).press("ArrowUp")
+        ours, theirs = np.array(page.evaluate(EYES))
+        np.testing.assert_allclose(theirs, laid[:, :3] @ ours + laid[:, 3], atol=1e-5)
+    page.keyboard.press("3")
+    assert page.evaluate(f"[{', '.join(BOTH)}].map(({{ camera }}) => camera.fov)") == [0.1, 0.1]
+    ours, theirs = np.array(page.evaluate(EYES))
+    np.testing.assert_allclose(theirs, laid[:, :3] @ ours + laid[:, 3], rtol=1e-5)
+    page.keyboard.press("5")
+    page.keyboard.press("Home")
 
 
 def check_that_the_map_stays(page):

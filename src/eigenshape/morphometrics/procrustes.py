@@ -23,7 +23,8 @@ TOLERANCE, MOST_ROUNDS = 1e-10, 200  # 31 skulls of mice rest after 6 rounds
 # changes by less, or for as many rounds: with more they would all drift along their curves together,
 # which changes shapes no more. Both are the defaults of `gpagen` in geomorph 4.0 (`tol`, `max.iter`).
 LEAST_CHANGE, MOST_SLIDES = 1e-4, 9
-N_SPANNING = 5  # points that span the plane in which one of them slides, itself among them; `gpagen`
+# Points that span the plane in which one of them slides, itself among them; `gpagen`
+N_SPANNING = 5
 # Interquartile ranges above the upper quartile, beyond which Tukey calls a value far out
 FENCE = 1.5
 
