@@ -11,7 +11,8 @@ typedef double matrix[3][3];
 
 /* Vertices and normals of a part, its frames, and which of these carry each vertex how far. */
 struct carried {
-    const double (*vertices)[3], (*normals)[3];
+    const double (*vertices)[3];
+    const double (*normals)[3];
     const int64_t *frames, *carriers;
     const double *portions;
 };
