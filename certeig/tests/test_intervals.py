@@ -61,7 +61,9 @@ def test_an_empty_interval_is_named_by_the_users_values(matrix, origin, above, b
         ({"below": np.inf}, r"below must be finite"),
         ({"k": 10}, r"k must lie in 1\.\.9; it is 10"),
         ({"k": 0}, r"k must lie in 1\.\.9; it is 0"),
-        ({"k": 1.5}, r"k must be a whole number; it is 1\.5"),
+        pytest.param(
+            {"k": 1.5}, r"k must be a whole number; it is 1\.5", marks=pytest.mark.wrong_type
+        ),
         ({"k": 1, "fixed": [9]}, r"fixed must hold rows 0\.\.8; entry 0 is 9"),
         ({"k": 1, "fixed": [True] * 9}, r"a list of row numbers; .* Pass np\.flatnonzero\(mask\)"),
         ({"k": 1, "fixed": range(9)}, r"At least one unknown must be free; all 9 are fixed"),
@@ -101,7 +103,15 @@ def test_an_eigenvalue_at_the_value_is_not_counted_by_chance(value):
     ) + (2 if value == 2 else 1)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, "a", [1.0, 2.0]])
+@pytest.mark.parametrize(
+    "value",
+    [
+        np.nan,
+        np.inf,
+        pytest.param("a", marks=pytest.mark.wrong_type),
+        pytest.param([1.0, 2.0], marks=pytest.mark.wrong_type),
+    ],
+)
 def test_a_value_that_is_none(value):
     with pytest.raises(InvalidParameterError, match=r"value must be"):
         certeig.count_below(GRID, value=value)

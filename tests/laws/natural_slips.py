@@ -28,6 +28,7 @@ from public_names import public_things
 
 import eigenshape as es
 from eigenshape.plot import render
+from eigenshape.retrieval.search.options import QueryOptions
 
 FOLDER = Path(tempfile.mkdtemp())
 
@@ -315,6 +316,7 @@ VALUES: dict[Any, Callable[[], Any]] = {
     es.spectral.SpectrumComparison: lambda: es.spectral.compare_spectra(spectrum(), spectrum()),
     es.ShapeIndex: shelf,
     es.retrieval.IndexReader: lambda: shelf().reader(),
+    QueryOptions: QueryOptions,
     es.calculus.LinearSolver: lambda: es.calculus.factor_equations(
         es.cotangent_laplacian(body()).stiffness
     ),
@@ -437,6 +439,7 @@ NAMED: dict[str, Callable[[], Any]] = {
     "read_shape.path": written_scene,
     "read_surface.path": written_scene,
     "read_volume.path": written_volume,
+    "transfer.source": worn_attributes,
     "structure_surfaces.labels": lambda: np.full((3, 3, 3), 11),
     "structure_surfaces.structures": lambda: {"caudate": 11},
     "to_space": lambda: np.diag([FORM.unit, FORM.unit, FORM.unit, 1.0]),

@@ -200,6 +200,7 @@ class IndexReader:
         state : IndexState, optional
             By default the latest.
         """
+        require_type(options, QueryOptions, "options")
         if state is None:
             state = self.state
         choice = options.choose(state)  # before a mesh is described, which takes seconds
