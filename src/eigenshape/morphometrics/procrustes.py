@@ -256,7 +256,7 @@ def _sliders(
 ) -> tuple[_Sliders, Float[np.ndarray, "n u 3"]]:
     """Return what slides, and the normals of points in patches, NaN where they are not known."""
     n_points = points.shape[1]
-    patch = whole_numbers(surfaces, "surfaces", 0, n_points - 1)
+    patch = whole_numbers(np.asarray(surfaces), "surfaces", 0, n_points - 1)
     across = np.full(points.shape, np.nan)
     if normals is not None:
         across = real_numbers(normals, "normals").astype(np.float64)

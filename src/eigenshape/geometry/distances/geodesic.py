@@ -207,7 +207,7 @@ def source_sets(sources: ArrayLike, n_points: int) -> list[Int[np.ndarray, " s"]
     """
     try:
         entries: list[Any] = list(sources)  # type: ignore[arg-type]
-    except TypeError:  # one number
+    except (TypeError, KeyError):  # one number, or an object that is read by names
         entries = [sources]
     return [source_points(entry, n_points) for entry in entries]
 
