@@ -23,7 +23,7 @@ from real_shapes import DATA, require_data
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 N_HOLES, HOLE = 5, 0.05  # holes of a part, and their radius in roots of the area
 LEFT_OUT = 0.2  # share of the vertices of a part that a plane removes
-REMEDY = re.compile(r"--repair (\w+)")  # as messages name it
+REMEDY = re.compile(r"--repair (?:auto,)?(\w+)")  # as messages name it
 GAP = 0.55, 0.58  # the share of the vertices below the two planes between which a part is torn
 
 
