@@ -25,6 +25,17 @@ def size_one(coordinates: Float[np.ndarray, "..."]) -> tuple[Float[np.ndarray, "
     return coordinates / scale, scale
 
 
+def scale_to_unit(points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "n 3"], float]:
+    """Return points relative to their mean, scaled to size 1, and the scale.
+
+    The scale is a power of two, so dividing by it is exact. Squares and cubes of the scaled
+    coordinates neither overflow nor underflow, whatever their unit.
+    """
+    points, scale = size_one(points)
+    points, inner_scale = size_one(points - points.mean(axis=0))
+    return points, scale * inner_scale
+
+
 def unit_vectors(vectors: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
     """Give vectors the length 1, and make zeros of those without one."""
     norms = np.linalg.norm(vectors, axis=1, keepdims=True)

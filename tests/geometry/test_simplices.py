@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from eigenshape._corners import in_length
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.requirements import require_volumes
 from eigenshape.geometry.simplices import (
     degenerate_simplices,
     dual_volumes,
-    in_length,
     mean_side_length,
     simplex_volumes,
 )

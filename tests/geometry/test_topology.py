@@ -3,6 +3,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from eigenshape._corners import half_edges
 from eigenshape.geometry.face_turns import inconsistent_edges
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import (
@@ -11,7 +12,6 @@ from eigenshape.geometry.topology import (
     disjoint_union,
     edge_table,
     euler_characteristic,
-    half_edges,
     is_closed,
     is_manifold,
     non_manifold_edges,
@@ -54,7 +54,7 @@ def test_edges_of_a_square():
 
 
 def test_half_edges_run_with_their_faces():
-    assert half_edges(mesh_of((0, 1, 2))).tolist() == [[1, 2], [2, 0], [0, 1]]
+    assert half_edges(mesh_of((0, 1, 2)).faces).tolist() == [[1, 2], [2, 0], [0, 1]]
 
 
 def test_a_square_has_one_boundary_loop():
@@ -86,7 +86,7 @@ def test_a_ring_of_bow_ties_comes_apart_into_simple_loops():
     mesh = mesh_of((2, 3, 4), (0, 1, 2), (4, 5, 6), (6, 7, 0), (2, 8, 9))
     loops = boundary_loops(mesh)
     chained = sorted(sides_of(loops))
-    assert chained == sorted(map(tuple, half_edges(mesh).tolist()))
+    assert chained == sorted(map(tuple, half_edges(mesh.faces).tolist()))
     assert all(len(set(loop.tolist())) == len(loop) for loop in loops)
 
 
@@ -193,14 +193,16 @@ def test_fans_and_loops_of_any_faces(seed):
     assert non_manifold_vertices(mesh).tolist() == [
         v for v in range(n) if has_several_fans(faces, v)
     ]
-    counts = Counter(tuple(sorted(side)) for side in half_edges(mesh).tolist())
+    counts = Counter(tuple(sorted(side)) for side in half_edges(mesh.faces).tolist())
     assert (
         dict(
             zip(map(tuple, edge_table(mesh).edges.tolist()), edge_table(mesh).n_faces, strict=True)
         )
         == counts
     )
-    alone = [tuple(side) for side in half_edges(mesh).tolist() if counts[tuple(sorted(side))] == 1]
+    alone = [
+        tuple(side) for side in half_edges(mesh.faces).tolist() if counts[tuple(sorted(side))] == 1
+    ]
     loops = boundary_loops(mesh)
     assert all(len(set(loop.tolist())) == len(loop) for loop in loops)
     within = [pair for loop in loops for pair in sides_of([loop])[:-1]]

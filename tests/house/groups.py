@@ -96,7 +96,7 @@ def public_names() -> dict[str, dict[str, str]]:
     return found
 
 
-# What every group may use: checks of arguments, arrays, matrices and meshes, vectors,
+# What every group may use: checks of arguments, arrays, matrices and meshes, vectors, corners,
 # errors, threads, kernels, files, workers, extras
 TOOLKIT = (
     "certeig.kit.",
@@ -104,7 +104,16 @@ TOOLKIT = (
     "eigenshape.geometry.requirements.",
     *(
         f"eigenshape._{name}"
-        for name in ("arrays", "errors", "extras", "sealed", "typing", "vectors", "workers")
+        for name in (
+            "arrays",
+            "corners",
+            "errors",
+            "extras",
+            "sealed",
+            "typing",
+            "vectors",
+            "workers",
+        )
     ),
 )
 

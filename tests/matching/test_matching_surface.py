@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 
 import eigenshape as es
-from eigenshape.geometry.measure import mean_normals
+from eigenshape._corners import mean_normals
 from eigenshape.matching.surface import _directions, describe_surface, turn_over
 
 

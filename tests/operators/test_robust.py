@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from certeig.kit.errors import CerteigError, ConvergenceError, InvalidParameterError
+from eigenshape._corners import edge_keys, side_ends
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.measure import surface_area
 from eigenshape.geometry.mesh import TriangleMesh
@@ -16,10 +17,8 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.robust import robust_laplacian
 from eigenshape.operators.tufted import (
     Triangulation,
-    edge_keys,
     flip_to_delaunay,
     mollify_lengths,
-    side_ends,
     tufted_cover,
 )
 from eigenshape.shapes.surfaces import grid, icosphere, torus

@@ -10,14 +10,14 @@ from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike, Integer
 from eigenshape._arrays import require_finite_rows, step_number
+from eigenshape._corners import scaled_corners, triangular_sides
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import size_one, triangle_areas
+from eigenshape._vectors import scale_to_unit, size_one, triangle_areas
 from eigenshape.calculus.linear_solver import LinearSolver, factor_definite
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import face_areas, scale_to_unit
+from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
-from eigenshape.geometry.simplices import scaled_corners, triangular_sides
 from eigenshape.geometry.topology import (
     boundary_edges,
     euler_characteristic,
@@ -106,7 +106,7 @@ def flatten_conformally(mesh: MeshLike) -> Float[np.ndarray, "n 2"]:
             f"{n_components} components and {len(rim)} boundary edges. Cut a closed surface open, "
             "or use map_to_sphere."
         )
-    points, scale = scale_to_unit(mesh)
+    points, scale = scale_to_unit(mesh.vertices)
     unit = TriangleMesh(points, mesh.faces)
     laplacian = cotangent_laplacian(unit)
     # The Hermitian M with zᴴMz the signed area of z, from the boundary edges:
@@ -213,7 +213,7 @@ def map_to_sphere(
             f"{'is closed' if is_closed(mesh) else 'has a boundary'}, has {n_components} "
             f"components and Euler characteristic {euler} (a sphere has 2)."
         )
-    points, _ = scale_to_unit(mesh)
+    points, _ = scale_to_unit(mesh.vertices)
     stiffness = robust_laplacian(TriangleMesh(points, mesh.faces), mollify=0.0).stiffness
     sphere, least, n_idle = points, np.inf, 0
     report_progress = progress or silent

@@ -10,18 +10,13 @@ from certeig.kit.arrays import real_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import point_functions, require_finite_rows, simplex_vectors
+from eigenshape._corners import barycentric_gradients, in_length, scaled_corners, volumes_of
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
-from eigenshape.geometry.simplices import (
-    barycentric_gradients,
-    in_length,
-    scaled_corners,
-    simplex_volumes,
-    volumes_of,
-)
+from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import Mesh
 
 

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from certeig.kit.arrays import whole_numbers
 from certeig.kit.errors import ConvergenceError, InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._vectors import scale_to_unit
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,
@@ -25,7 +26,7 @@ from eigenshape.calculus.unfolding import (
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.closest import closest_points
-from eigenshape.geometry.measure import edge_lengths, scale_to_unit
+from eigenshape.geometry.measure import edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.samples.surface_points import (
@@ -140,7 +141,7 @@ def geodesic_path(
         while back[-1] != one:
             back.append(int(before[back[-1]]))
         path += back[-2::-1]
-    unit = TriangleMesh(scale_to_unit(mesh)[0], mesh.faces)
+    unit = TriangleMesh(scale_to_unit(mesh.vertices)[0], mesh.faces)
     sides = walkable_sides(unit)
     strip = _strip_along(sides, path)
     for _ in range(ROUNDS):

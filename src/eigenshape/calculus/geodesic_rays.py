@@ -6,6 +6,7 @@ from jaxtyping import Float
 from certeig.kit.arrays import finite_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._vectors import scale_to_unit
 from eigenshape.calculus.unfolding import (
     STRAIGHT,
     GeodesicPath,
@@ -20,7 +21,6 @@ from eigenshape.calculus.unfolding import (
     walkable_sides,
 )
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
 from eigenshape.geometry.samples.surface_points import (
@@ -92,7 +92,7 @@ def trace_geodesic(
         raise InvalidParameterError(
             f"vector must hold two coordinates in the tangent frame; it holds {len(given)}."
         )
-    points, scale = scale_to_unit(mesh)
+    points, scale = scale_to_unit(mesh.vertices)
     length = float(np.hypot(*given)) / scale
     if not length > 0:
         return as_path(np.array(path))

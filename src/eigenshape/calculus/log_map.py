@@ -8,6 +8,7 @@ from jaxtyping import Complex, Float
 from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import whole_number
 from certeig.kit.typing import Integer
+from eigenshape._corners import in_length, side_ends
 from eigenshape.calculus.unfolding import flat_corners
 from eigenshape.calculus.vector_heat import (
     MeshVectorHeat,
@@ -29,9 +30,7 @@ from eigenshape.geometry.samples.surface_points import (
     require_one,
     vertex_number,
 )
-from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.directions import corner_products
-from eigenshape.operators.tufted import side_ends
 
 LogMethod = Literal["affine", "adaptive", "radial"]
 

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from certeig.kit.arrays import whole_numbers
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
+from eigenshape._corners import in_length, side_ends
 from eigenshape.calculus.vector_heat import (
     VectorHeat,
     as_mesh_heat,
@@ -17,8 +18,6 @@ from eigenshape.calculus.vector_heat import (
     normalize,
 )
 from eigenshape.geometry.conversion import MeshLike
-from eigenshape.geometry.simplices import in_length
-from eigenshape.operators.tufted import side_ends
 
 
 def signed_heat_distance(

@@ -4,12 +4,11 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._corners import in_length, side_ends
 from eigenshape._vectors import size_one
 from eigenshape.geometry.curvature import face_angles
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.directions import side_twins
-from eigenshape.operators.tufted import side_ends
 
 # An angle counts as less than π if it is by more than this: rounding of unfolded strips is 1e-13.
 STRAIGHT = 1e-10

@@ -10,7 +10,8 @@ from certeig.kit.progress import Progress, silent
 from certeig.kit.typing import ArrayLike
 from certeig.sparse.symmetric_factor import SymmetricFactor
 from eigenshape._arrays import require_finite_rows
-from eigenshape._vectors import size_one
+from eigenshape._corners import in_length, side_ends
+from eigenshape._vectors import scale_to_unit, size_one
 from eigenshape.calculus.heat_distance import require_heat, require_sources
 from eigenshape.calculus.linear_solver import (
     GroundedFactor,
@@ -19,14 +20,12 @@ from eigenshape.calculus.linear_solver import (
 )
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import edge_lengths, scale_to_unit
+from eigenshape.geometry.measure import edge_lengths
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import in_length
 from eigenshape.operators.connection import connection_laplacian
 from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import Directions, half_cotangents, vertex_directions
 from eigenshape.operators.robust import robust_laplacian
-from eigenshape.operators.tufted import side_ends
 
 
 @record
@@ -138,7 +137,7 @@ def prepare_vector_heat(
         lengths = np.linalg.norm(points[one] - points[two], axis=1)
     else:
         mesh = as_mesh(mesh)
-        points, scale = scale_to_unit(mesh)
+        points, scale = scale_to_unit(mesh.vertices)
         unit = TriangleMesh(points, mesh.faces)
         scalar, connection = cotangent_laplacian(unit), connection_laplacian(unit)
         lengths = edge_lengths(unit)

@@ -6,10 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from eigenshape._arrays import label_components
+from eigenshape._corners import half_edges
 from eigenshape.deformation.region import Region, region_boundary, region_mask, require_boundary
 from eigenshape.geometry.distances.geodesic import geodesic_distances, unchecked_waves
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import half_edges, vertex_components
+from eigenshape.geometry.topology import vertex_components
 
 # Share of the depth of a patch, or of the rest if that is less deep, up to which vertices on
 # either side of the boundary are free. Of 0.3, 0.5 and 0.7, on scenes of experiments/ch6_deformation
@@ -57,7 +58,7 @@ def split_region(
     distances : (n,) float
         Geodesic distance of each vertex to the boundary of the region.
     """
-    one, two = half_edges(mesh).T
+    one, two = half_edges(mesh.faces).T
     inside = mask[one] & mask[two]
     _, labels = label_components(len(mask), one[inside], two[inside])
     depths = np.zeros(len(mask))

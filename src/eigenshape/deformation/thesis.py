@@ -9,10 +9,10 @@ from jaxtyping import Bool, Float, Int
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.threads import one_blas_thread
+from eigenshape._corners import mean_normals
 from eigenshape.deformation.binding import Binding
 from eigenshape.deformation.handles import Handle, affine_offset, require_handles
 from eigenshape.deformation.rig import eigen_skeleton, project_on_modes
-from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table
 

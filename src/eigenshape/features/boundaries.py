@@ -8,9 +8,10 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from certeig.kit.arguments import require_type
 from certeig.kit.arrays import positive_values, record
 from eigenshape._arrays import adjacency_matrix, label_components
+from eigenshape._vectors import scale_to_unit
 from eigenshape.features.segmentation import Segmentation, adjacent_parts
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import face_areas, scale_to_unit
+from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 from eigenshape.operators.anisotropic import curvature_tensors
@@ -136,7 +137,7 @@ class _Network:
 
 def build_network(mesh: TriangleMesh, tensors: Float[np.ndarray, "f 3 3"]) -> _Network:
     """Measure the graph of the faces, with the cost of a cut along each inner edge."""
-    points, _ = scale_to_unit(mesh)
+    points, _ = scale_to_unit(mesh.vertices)
     unit = TriangleMesh(points, mesh.faces)
     table = edge_table(mesh)  # which this mesh has listed already
     pairs, edges = face_pairs(table)

@@ -7,13 +7,12 @@ from jaxtyping import Bool, Float, Int
 
 from certeig.kit.arrays import record
 from eigenshape._arrays import label_components
-from eigenshape._vectors import area_vectors, unit_vectors
+from eigenshape._vectors import area_vectors, scale_to_unit, unit_vectors
 from eigenshape.features.contrast import FINE_CONTRAST
 from eigenshape.features.part_merging import tree_of_merges
 from eigenshape.features.region_tree import PartTree
 from eigenshape.features.segmentation import FeaturePoints, Segmentation
 from eigenshape.geometry.creases import smooth_pairs
-from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 
@@ -116,7 +115,7 @@ def crease_tree(mesh: TriangleMesh, heat: Float[np.ndarray, " n"]) -> PartTree:
 
 def _measure(mesh: TriangleMesh) -> _Measures:
     """Scale a surface to area 1, and measure its faces and edges."""
-    points, _ = scale_to_unit(mesh)
+    points, _ = scale_to_unit(mesh.vertices)
     vectors = area_vectors(points[mesh.faces])
     areas = np.linalg.norm(vectors, axis=1)
     begin, end = points[edge_table(mesh).edges].transpose(1, 0, 2)

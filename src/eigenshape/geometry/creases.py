@@ -3,11 +3,11 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
+from eigenshape._corners import scaled_corners
 from eigenshape._vectors import area_vectors, unit_vectors
 from eigenshape.geometry.facets import corner_fans
 from eigenshape.geometry.measure import face_normals
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import edge_table, face_pairs
 
 # A crease is an edge at which the surface turns by more than this angle, in degrees ...

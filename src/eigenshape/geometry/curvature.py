@@ -5,12 +5,14 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._corners import in_length, scaled_corners
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import scale_to_unit, vertex_normals
+from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import dual_volumes, in_length, scaled_corners
+from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.topology import edge_table, neighbor_links
 
 # Vertices whose polynomials are fitted together: the products of monomials of 19 neighbors each
@@ -179,7 +181,7 @@ def principal_curvatures(mesh: MeshLike) -> PrincipalCurvatures:
             f"A vertex must have a normal; those of the faces at vertex {flat[0]} at "
             f"{mesh.vertices[flat[0]].tolist()} cancel ({flat.size} such)."
         )
-    points, scale = scale_to_unit(mesh)
+    points, scale = scale_to_unit(mesh.vertices)
     # Frames whose first axis is any unit vector orthogonal to the normal
     first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
     first = first / np.linalg.norm(first, axis=1, keepdims=True)

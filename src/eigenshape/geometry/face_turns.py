@@ -6,9 +6,9 @@ from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import connected_components
 
 from certeig.kit.arrays import record
-from eigenshape.geometry.facet_lists import shared_facets
+from eigenshape._corners import half_edges, shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
-from eigenshape.geometry.topology import edge_table, half_edges
+from eigenshape.geometry.topology import edge_table
 
 
 def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
@@ -16,7 +16,7 @@ def inconsistent_edges(mesh: TriangleMesh) -> Int[np.ndarray, "k 2"]:
 
     One of the two faces is turned over.
     """
-    sides = half_edges(mesh)
+    sides = half_edges(mesh.faces)
     directed = np.sort(sides[:, 0] * mesh.n_vertices + sides[:, 1])
     # The usual case; this check takes a third of the time of an edge table.
     if (directed[1:] != directed[:-1]).all():
@@ -95,7 +95,7 @@ def face_neighbors(mesh: TriangleMesh) -> Neighbors:
     one, two = shared_facets(table.face_edges)
     is_pair = table.n_faces[at_edge[one]] == 2
     one, two = one[is_pair], two[is_pair]
-    sides = half_edges(mesh).reshape(3, mesh.n_faces, 2).transpose(1, 0, 2).reshape(-1, 2)
+    sides = half_edges(mesh.faces).reshape(3, mesh.n_faces, 2).transpose(1, 0, 2).reshape(-1, 2)
     return Neighbors(at_edge[one], one // 3, two // 3, sides[one, 0] == sides[two, 1])
 
 

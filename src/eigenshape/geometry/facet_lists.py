@@ -74,16 +74,3 @@ def state_without_facets(mesh: object) -> dict[str, Any]:
     Facets would make a pickle three times as large; the next process lists them again.
     """
     return {name: value for name, value in vars(mesh).items() if name != "facets"}
-
-
-def shared_facets(
-    simplex_facets: Int[np.ndarray, "..."],
-) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-    """Return pairs of sides that lie on one facet; they chain all sides of the facet.
-
-    Side (m+1)·s + a is the one of simplex s opposite to its corner a.
-    """
-    facets = simplex_facets.ravel()
-    order = np.argsort(facets, kind="stable")
-    same = facets[order][1:] == facets[order][:-1]
-    return order[:-1][same], order[1:][same]

@@ -3,24 +3,12 @@
 import numpy as np
 from jaxtyping import Float
 
+from eigenshape._corners import in_length, mean_normals, scaled_corners
 from eigenshape._vectors import area_vectors, size_one, triangle_areas, unit_vectors
 from eigenshape.geometry.cloud import Shape
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
-from eigenshape.geometry.simplices import at_points, in_length, scaled_corners
 from eigenshape.geometry.topology import edge_table
-
-
-def scale_to_unit(mesh: TriangleMesh) -> tuple[Float[np.ndarray, "n 3"], float]:
-    """Return the vertices relative to their mean, scaled to size 1, and the scale.
-
-    The scale is a power of two, so dividing by it is exact. Squares and cubes of the scaled
-    coordinates neither overflow nor underflow, whatever the unit of the mesh.
-    """
-    points, scale = size_one(mesh.vertices)
-    points, inner_scale = size_one(points - points.mean(axis=0))
-    return points, scale * inner_scale
 
 
 def face_areas(mesh: MeshLike) -> Float[np.ndarray, " f"]:
@@ -175,13 +163,6 @@ def vertex_normals(mesh: MeshLike) -> Float[np.ndarray, "n 3"]:
     mesh = as_mesh(mesh)
     require_oriented(mesh)
     return mean_normals(mesh)
-
-
-def mean_normals(mesh: TriangleMesh) -> Float[np.ndarray, "n 3"]:
-    """Return `vertex_normals` of any mesh; normals of neighbors that disagree cancel in part."""
-    vectors = area_vectors(scaled_corners(mesh)[0])
-    sums = [at_points(mesh, vectors[:, axis]) for axis in range(3)]
-    return unit_vectors(np.column_stack(sums))
 
 
 def edge_lengths(mesh: MeshLike) -> Float[np.ndarray, " e"]:

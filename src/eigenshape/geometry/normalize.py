@@ -8,9 +8,8 @@ from scipy.spatial.distance import cdist
 
 from certeig.kit.arguments import require_choice
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import triangle_areas
+from eigenshape._vectors import scale_to_unit, triangle_areas
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import degenerate_simplices
 
@@ -52,7 +51,7 @@ def normalize_mesh(mesh: MeshLike, measure: Measure) -> TriangleMesh:
     """
     mesh = as_mesh(mesh)
     require_choice(measure, Measure, "measure")
-    points, _ = scale_to_unit(mesh)
+    points, _ = scale_to_unit(mesh.vertices)
     if measure == "box":
         size = float(np.ptp(points, axis=0).max())
     elif measure == "area":

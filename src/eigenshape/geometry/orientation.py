@@ -4,10 +4,11 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from certeig.kit.threads import one_blas_thread
-from eigenshape._vectors import triangle_areas
+from eigenshape._corners import mean_normals
+from eigenshape._vectors import scale_to_unit, triangle_areas
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import turn_faces
-from eigenshape.geometry.measure import enclosed_volume, mean_normals, scale_to_unit
+from eigenshape.geometry.measure import enclosed_volume
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.topology import is_closed
@@ -62,7 +63,7 @@ def orient_outward(mesh: MeshLike) -> TriangleMesh:
 
 def outward_vote(mesh: TriangleMesh) -> float:
     """Return how far normals agree with those of the convex hull, -1 to 1; 0 for a flat surface."""
-    points, _ = scale_to_unit(mesh)
+    points, _ = scale_to_unit(mesh.vertices)
     try:
         hull = ConvexHull(points)
     except QhullError:

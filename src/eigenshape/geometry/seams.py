@@ -7,9 +7,9 @@ import scipy  # which loads scipy.spatial where it is used: it takes 0.1 s
 from jaxtyping import Float, Int
 
 from eigenshape._arrays import label_components, number_places, sorted_rows
+from eigenshape._corners import side_lengths
 from eigenshape._vectors import size_one
 from eigenshape.geometry.facets import boundary_facets
-from eigenshape.geometry.simplices import side_lengths
 from eigenshape.geometry.simplicial import Mesh
 
 # How far both sides of a seam are apart when each was computed for itself, in roundings of the size

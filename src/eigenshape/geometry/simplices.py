@@ -4,11 +4,12 @@ from itertools import combinations
 from math import factorial
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from certeig.kit.arrays import EPS
+from eigenshape._corners import at_points, in_length, scaled_corners, side_lengths, volumes
 from eigenshape._errors import InvalidShapeError
-from eigenshape._vectors import size_of, size_one
+from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.simplicial import Mesh
 
@@ -20,111 +21,12 @@ THINNEST = 1e-14
 SPAN_ROUNDING = 64 * EPS
 # Names of flats by dimension, for messages.
 FLATS = {1: "on a line", 2: "in a plane"}
-# Areas and volumes are returned if their scale is within 2^-1000..2^1000. Beyond, sums would
-# overflow, or small simplices would lose digits (floats end at 2^1024 and 2^-1074).
-LARGEST_EXPONENT = 1000
 # Plural, singular and measure of simplices, by dimension, for messages.
 MEASURES = {
     1: ("Segments", "segment", "length"),
     2: ("Faces", "face", "area"),
     3: ("Tetrahedra", "tetrahedron", "volume"),
 }
-
-
-def scaled_corners(mesh: Mesh) -> tuple[Float[np.ndarray, "s corners d"], float]:
-    """Return the corners of each simplex, scaled to size 1, and the scale, a power of two.
-
-    The corners are not translated. So measurements between them depend on these corners only, to
-    the last digit, and not on the order of the vertices or on unreferenced ones.
-    """
-    corners = np.take(mesh.points, mesh.simplices, axis=0)
-    scale = size_of(corners)
-    corners /= scale
-    return corners, scale
-
-
-def in_length(
-    values: Float[np.ndarray, "..."], scale: float, power: int
-) -> Float[np.ndarray, "..."]:
-    """Return values times `scale` to the given power; `scale` is a power of two.
-
-    Raise InvalidShapeError if floats cannot represent them.
-    """
-    exponent = power * (int(np.frexp(scale)[1]) - 1)
-    if abs(exponent) > LARGEST_EXPONENT:
-        noun = {-2: "eigenvalues", -1: "gradients", 1: "lengths", 2: "areas", 3: "volumes"}.get(
-            power, f"{power}-volumes"
-        )
-        most = 301 // abs(power)
-        raise InvalidShapeError(
-            f"To measure {noun} the largest coordinate must lie within 1e-{most}..1e{most}; "
-            f"it is about {scale:.0e}. Choose another unit, as "
-            'normalize_mesh(mesh, "box") does for surfaces.'
-        )
-    return np.ldexp(values, exponent)
-
-
-def triangular_sides(
-    corners: Float[np.ndarray, "s corners d"],
-) -> tuple[Float[np.ndarray, "s d m"], Float[np.ndarray, "s m m"]]:
-    """Factor the sides of each simplex: an orthonormal basis and an upper triangular matrix R.
-
-    Column i of R is the side from corner 0 to corner i + 1 in that basis. RᵀR is the Gram matrix of
-    the sides; R keeps digits that forming the Gram matrix would lose. The method is modified
-    Gram-Schmidt on all simplices at once. A degenerate simplex has zeros on the diagonal of R and
-    in its basis.
-    """
-    sides = np.ascontiguousarray((corners[:, 1:] - corners[:, :1]).transpose(1, 2, 0))
-    dim, _, n = sides.shape
-    triangles = np.zeros((dim, dim, n))
-    for i in range(dim):
-        length = np.sqrt(np.einsum("as,as->s", sides[i], sides[i]), out=triangles[i, i])
-        sides[i] /= np.where(length > 0, length, 1.0)
-        for j in range(i + 1, dim):
-            np.einsum("as,as->s", sides[i], sides[j], out=triangles[i, j])
-            sides[j] -= triangles[i, j] * sides[i]
-    return sides.transpose(2, 1, 0), triangles.transpose(2, 0, 1)
-
-
-def barycentric_gradients(
-    corners: Float[np.ndarray, "s corners d"],
-) -> tuple[
-    Float[np.ndarray, "s d m"], Float[np.ndarray, "s m m"], Float[np.ndarray, "s corners m"]
-]:
-    """Return the two factors of `triangular_sides`, and the gradients of barycentric coordinates.
-
-    Row a holds the gradient of the coordinate of corner a, in the orthonormal basis of the simplex.
-    The gradients are computed from the triangular factor, because the Gram matrix of the sides
-    would have the squared condition number.
-    """
-    basis, triangles = triangular_sides(corners)
-    inner = _inverse_triangles(triangles)
-    gradients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
-    return basis, triangles, gradients
-
-
-def _inverse_triangles(triangles: Float[np.ndarray, "s m m"]) -> Float[np.ndarray, "s m m"]:
-    """Invert upper triangular matrices by back substitution, all at once."""
-    inverses = np.zeros_like(triangles)
-    for column in range(triangles.shape[1]):
-        inverses[:, column, column] = 1 / triangles[:, column, column]
-        for row in range(column - 1, -1, -1):
-            rest = sum(
-                triangles[:, row, i] * inverses[:, i, column] for i in range(row + 1, column + 1)
-            )
-            inverses[:, row, column] = -rest * inverses[:, row, row]
-    return inverses
-
-
-def volumes(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, " s"]:
-    """Return the m-volume of each simplex, √det(Gram matrix of its sides) / m!."""
-    _, triangles = triangular_sides(corners)
-    return volumes_of(triangles)
-
-
-def volumes_of(triangles: Float[np.ndarray, "s m m"]) -> Float[np.ndarray, " s"]:
-    """Return the m-volume of each simplex from its triangular factor."""
-    return np.einsum("sii->si", triangles).prod(axis=1) / factorial(triangles.shape[1])
 
 
 def simplex_volumes(mesh: MeshLike) -> Float[np.ndarray, " s"]:
@@ -184,14 +86,6 @@ def dual_volumes(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     return at_points(mesh, simplex_volumes(mesh) / (mesh.dim + 1))
 
 
-def at_points(mesh: Mesh, values: Float[np.ndarray, " s"]) -> Float[np.ndarray, " n"]:
-    """Return for each point the sum of the values of its simplices."""
-    corners = mesh.simplices.shape[1]
-    return np.bincount(
-        mesh.simplices.ravel(), weights=np.repeat(values, corners), minlength=mesh.n_points
-    )
-
-
 def mean_side_length(mesh: MeshLike) -> float:
     """Compute the mean length e of the sides of all simplices.
 
@@ -221,12 +115,6 @@ def mean_side_length(mesh: MeshLike) -> float:
     corners, scale = scaled_corners(mesh)
     lengths = side_lengths(corners)
     return float(in_length(lengths.mean(keepdims=True), scale, 1)[0, 0])
-
-
-def side_lengths(corners: Float[np.ndarray, "s corners d"]) -> Float[np.ndarray, "s sides"]:
-    """Return the lengths of the sides of each simplex, in the order of `np.triu_indices`."""
-    first, second = np.triu_indices(corners.shape[1], 1)
-    return np.linalg.norm(corners[:, first] - corners[:, second], axis=2)
 
 
 def degenerate_simplices(mesh: Mesh) -> Int[np.ndarray, " k"]:
@@ -259,22 +147,3 @@ def require_span(points: Float[np.ndarray, "n d"], dim: int, noun: str) -> None:
                 f"{noun} must span {dim} dimensions; "
                 f"all {len(points)} lie {flat} through point 0, {points[0].tolist()}."
             )
-
-
-def cut_tetrahedra(
-    corners: Int[np.ndarray, "t 4"], inside: Bool[np.ndarray, "t 4"]
-) -> Int[np.ndarray, "q 3 2"]:
-    """Return the triangles that part the inner corners of tetrahedra from the others.
-
-    Each corner of a triangle is given by the edge that it lies on, the inner end first. A lone
-    corner is cut off by a triangle; two and two are parted by a quadrilateral, cut along a diagonal.
-    """
-    order = np.argsort(~inside, axis=1, kind="stable")
-    ordered, n_inside = np.take_along_axis(corners, order, axis=1), inside.sum(axis=1)
-    cuts = [
-        (1, [(0, 1), (0, 2), (0, 3)]),
-        (3, [(0, 3), (1, 3), (2, 3)]),
-        (2, [(0, 2), (0, 3), (1, 3)]),
-        (2, [(0, 2), (1, 3), (1, 2)]),
-    ]
-    return np.concatenate([ordered[n_inside == count][:, cut] for count, cut in cuts])

@@ -7,9 +7,9 @@ from jaxtyping import Bool, Int
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._arrays import adjacency_matrix, label_components, number_places, sorted_rows
+from eigenshape._corners import half_edges, shared_facets
 from eigenshape._errors import InvalidShapeError, try_auto
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
-from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.facets import boundary_facets, corner_fans, facet_table
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplicial import Mesh
@@ -100,12 +100,6 @@ def unique_edges(
     # np.unique hashes integers, which takes several times as long as sorting them.
     keys = np.sort((np.minimum(one, two) * n + np.maximum(one, two)).ravel())
     return np.column_stack(np.divmod(keys[np.diff(keys, prepend=-1) > 0], n))
-
-
-def half_edges(mesh: TriangleMesh) -> Int[np.ndarray, "s 2"]:
-    """Return the directed edges of all faces: those opposite to corner 0 first, then 1, then 2."""
-    a, b, c = mesh.faces.T
-    return np.concatenate([np.column_stack(side) for side in ((b, c), (c, a), (a, b))])
 
 
 def vertex_components(mesh: MeshLike) -> tuple[int, Int[np.ndarray, " n"]]:
@@ -239,7 +233,7 @@ def boundary_edges(mesh: MeshLike) -> Int[np.ndarray, "b 2"]:
     mesh = as_mesh(mesh)
     table = edge_table(mesh)
     on_boundary = table.n_faces[table.face_edges.T.ravel()] == 1
-    return half_edges(mesh)[on_boundary]
+    return half_edges(mesh.faces)[on_boundary]
 
 
 def boundary_loops(mesh: MeshLike) -> list[Int[np.ndarray, " k"]]:

@@ -9,9 +9,9 @@ from jaxtyping import Float, Int
 from scipy.special import expit
 
 from certeig.kit.arrays import record
+from eigenshape._corners import at_points
 from eigenshape._vectors import area_vectors, triangle_areas
 from eigenshape.geometry.measure import edge_lengths, face_areas
-from eigenshape.geometry.simplices import at_points
 from eigenshape.geometry.topology import edge_table, neighbor_links
 from eigenshape.matching.fitting import Fit
 from eigenshape.matching.pairs import Pairs, couplings, place_points

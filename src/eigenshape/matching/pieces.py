@@ -10,9 +10,10 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._corners import mean_normals
 from eigenshape._errors import count_nouns
 from eigenshape.geometry.face_turns import inconsistent_edges
-from eigenshape.geometry.measure import edge_lengths, face_areas, mean_normals, surface_area
+from eigenshape.geometry.measure import edge_lengths, face_areas, surface_area
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.repairs.repair import repair

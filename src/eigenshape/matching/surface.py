@@ -7,8 +7,8 @@ from jaxtyping import Complex64, Float, Float32, Int
 
 from certeig.kit.arrays import ReadOnly, record
 from certeig.kit.threads import map_in_threads
+from eigenshape._corners import mean_normals
 from eigenshape.geometry.distances.geodesic import farthest_points
-from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.simplices import dual_volumes

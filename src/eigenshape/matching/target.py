@@ -8,9 +8,9 @@ from jaxtyping import Int
 from certeig.kit.arrays import record
 from certeig.kit.text import html_repr
 from certeig.kit.threads import map_in_threads, one_blas_thread
+from eigenshape._corners import mean_normals
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.geodesic import unchecked_rows
-from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_describable, require_oriented
 from eigenshape.geometry.simplices import dual_volumes

@@ -4,6 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Complex, Float
 
+from eigenshape._corners import edge_keys, side_ends
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
@@ -16,7 +17,6 @@ from eigenshape.operators.cotangent import cotangent_laplacian
 from eigenshape.operators.directions import half_cotangents, vertex_directions
 from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.robust import robust_laplacian
-from eigenshape.operators.tufted import edge_keys, side_ends
 
 # Entry of the mass matrix for two corners of a face, as a share of the area of the face.
 MASS_SHARES = {"lumped": 0.0, "consistent": 1 / 12, "averaged": 1 / 24}

@@ -8,11 +8,13 @@ from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import positive_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
+from eigenshape._corners import in_length
+from eigenshape._vectors import scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
-from eigenshape.geometry.measure import scale_to_unit, vertex_normals
+from eigenshape.geometry.measure import vertex_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import dual_volumes, in_length
+from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
 from eigenshape.operators.choices import Mass
@@ -141,7 +143,7 @@ def mean_curvature(mesh: MeshLike) -> Float[np.ndarray, " n"]:
     0.5
     """
     mesh = as_mesh(mesh)
-    points, scale = scale_to_unit(mesh)
+    points, scale = scale_to_unit(mesh.vertices)
     operator = cotangent_laplacian(TriangleMesh(points, mesh.faces))
     pull = (operator.stiffness @ points) / operator.mass.diagonal()[:, None]
     return in_length(np.einsum("ij,ij->i", pull, vertex_normals(mesh)) / 2, scale, -1)

@@ -10,17 +10,12 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from eigenshape._corners import in_length, scaled_corners, side_lengths, triangular_sides
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.facet_lists import FacetTable
 from eigenshape.geometry.facets import facet_table
 from eigenshape.geometry.requirements import require_sound
-from eigenshape.geometry.simplices import (
-    in_length,
-    scaled_corners,
-    side_lengths,
-    simplex_volumes,
-    triangular_sides,
-)
+from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators import elements
 from eigenshape.operators.laplacian import Laplacian

@@ -4,16 +4,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from certeig.kit.arrays import ReadOnly, record
+from eigenshape._corners import edge_keys, scaled_corners, shared_facets, side_ends
 from eigenshape._errors import InvalidShapeError
-from eigenshape.geometry.facet_lists import shared_facets
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.requirements import require_oriented, require_sound
-from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import (
     non_manifold_edges,
     non_manifold_vertices,
 )
-from eigenshape.operators.tufted import edge_keys, side_ends
 
 
 @record

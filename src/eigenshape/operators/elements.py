@@ -16,13 +16,8 @@ from jaxtyping import Float, Int
 
 from certeig.kit.arrays import freeze
 from certeig.kit.threads import one_blas_thread
-from eigenshape.geometry.simplices import (
-    barycentric_gradients,
-    in_length,
-    scaled_corners,
-    simplex_volumes,
-    volumes_of,
-)
+from eigenshape._corners import barycentric_gradients, in_length, scaled_corners, volumes_of
+from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import Mesh
 
 

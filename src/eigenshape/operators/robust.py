@@ -5,12 +5,13 @@ import scipy.sparse as sp
 
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
+from eigenshape._corners import edge_keys, in_length, side_ends
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh
 from eigenshape.geometry.requirements import require_different_simplices, require_volumes
-from eigenshape.geometry.simplices import degenerate_simplices, in_length, require_span
+from eigenshape.geometry.simplices import degenerate_simplices, require_span
 from eigenshape.geometry.topology import require_simplices_everywhere
 from eigenshape.operators import flip_loops
 from eigenshape.operators.clouds.cloud_triangles import cloud_cover
@@ -19,10 +20,8 @@ from eigenshape.operators.laplacian import Laplacian
 from eigenshape.operators.tufted import (
     MOLLIFY,
     Triangulation,
-    edge_keys,
     flip_to_delaunay,
     mollify_lengths,
-    side_ends,
     tufted_cover,
 )
 

@@ -5,6 +5,7 @@ from jaxtyping import Float, Int
 
 from certeig.kit.arrays import record
 from certeig.kit.errors import ConvergenceError
+from eigenshape._corners import edge_keys, side_ends
 from eigenshape._vectors import unit_vectors
 from eigenshape.operators import flip_loops
 
@@ -109,22 +110,6 @@ def tufted_cover(
     twins[up[order]] = down[following]
     twins[down[following]] = up[order]
     return Triangulation(tails, twins, np.concatenate([lengths, of_back]))
-
-
-def side_ends(
-    faces: Int[np.ndarray, "f 3"],
-) -> tuple[Int[np.ndarray, " h"], Int[np.ndarray, " h"]]:
-    """Return the vertex at which each side starts, and that at which it ends.
-
-    Side 3f + s runs from corner s of face f to the next.
-    """
-    return faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-
-
-def edge_keys(faces: Int[np.ndarray, "f 3"], n: int) -> Int[np.ndarray, " h"]:
-    """Return for each side, the first from corner 0 to corner 1, a number that sides with the same ends share."""
-    tails, heads = side_ends(faces)
-    return np.minimum(tails, heads) * n + np.maximum(tails, heads)
 
 
 def flip_to_delaunay(cover: Triangulation, tolerance: float = TOLERANCE) -> Triangulation:

@@ -12,9 +12,8 @@ from certeig.kit.arrays import ReadOnly, real_numbers, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike
-from eigenshape._vectors import area_vectors, triangle_areas
+from eigenshape._vectors import area_vectors, scale_to_unit, triangle_areas
 from eigenshape.geometry.conversion import MeshLike, as_mesh
-from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.topology import edge_table, face_pairs
 
@@ -171,7 +170,7 @@ def upward_direction(mesh: TriangleMesh, up: Up) -> Float[np.ndarray, "3"]:
     Raise InvalidParameterError if `up` is neither a name nor a direction.
     """
     if isinstance(up, str) and up == "auto":
-        points = scale_to_unit(mesh)[0]
+        points = scale_to_unit(mesh.vertices)[0]
         areas = triangle_areas(points[mesh.faces])
         weights = areas / max(areas.sum(), np.finfo(np.float64).tiny)
         points = points - weights @ points[mesh.faces].mean(axis=1)
@@ -236,7 +235,7 @@ def _guess_front(
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """Return the level direction of the front, and the direction to the viewer of the usual view."""
     # An open surface that mostly faces one way is a scan, and its front is where the scanner stood.
-    points = scale_to_unit(mesh)[0]
+    points = scale_to_unit(mesh.vertices)[0]
     vectors = area_vectors(points[mesh.faces])
     areas, tiny = np.linalg.norm(vectors, axis=1), np.finfo(np.float64).tiny
     facing = vectors.sum(axis=0) / max(areas.sum(), tiny)
@@ -271,7 +270,7 @@ def _guess_front(
 
 def in_picture(mesh: TriangleMesh, camera: Camera) -> Float[np.ndarray, "n 3"]:
     """Return the vertices in pixels: right, down, and towards the viewer; the shape fills the picture."""
-    points = scale_to_unit(mesh)[0] @ camera.rotation.T
+    points = scale_to_unit(mesh.vertices)[0] @ camera.rotation.T
     low, high = points.min(axis=0), points.max(axis=0)
     span = max(float((high - low)[:2].max()), np.finfo(np.float64).tiny)
     scale = camera.size * (1 - 2 * FREE_BORDER) / span

@@ -10,9 +10,8 @@ from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from certeig.kit.arguments import require_type
 from certeig.kit.errors import InvalidParameterError
-from eigenshape._vectors import nearest_rotations
+from eigenshape._vectors import nearest_rotations, scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, ShapeLike, as_mesh, as_shape
-from eigenshape.geometry.measure import scale_to_unit
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.matching.shape_match import ShapeMatch
@@ -103,8 +102,8 @@ def _rotation_of_map(
     part: TriangleMesh, whole: TriangleMesh, match: ShapeMatch
 ) -> Float[np.ndarray, "3 3"]:
     """Return the rotation that takes the part best to where the map sends it (Kabsch 1976)."""
-    points, _ = scale_to_unit(part)
-    images = match.pull(scale_to_unit(whole)[0])
+    points, _ = scale_to_unit(part.vertices)
+    images = match.pull(scale_to_unit(whole.vertices)[0])
     weights = (match.confidence * dual_volumes(part))[:, None]
     weights = weights / (weights.sum() or 1.0)
     arms = points - (weights * points).sum(axis=0)

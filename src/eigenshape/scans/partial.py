@@ -8,10 +8,12 @@ from certeig.kit.arrays import ReadOnly, real_numbers, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.threads import one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._corners import mean_normals
 from eigenshape._errors import InvalidShapeError
+from eigenshape._vectors import scale_to_unit
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.face_turns import orient_consistently
-from eigenshape.geometry.measure import face_areas, mean_normals, scale_to_unit
+from eigenshape.geometry.measure import face_areas
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.repair_steps import faces_of_largest
 from eigenshape.geometry.topology import is_closed, submesh
@@ -123,7 +125,7 @@ def visible_part(
     all_pieces: bool = False,
 ) -> MeshPart:
     """Keep what is visible of a mesh from a unit direction, as `partial_scan` does."""
-    points = scale_to_unit(mesh)[0] @ rotation_towards(direction).T
+    points = scale_to_unit(mesh.vertices)[0] @ rotation_towards(direction).T
     low = points.min(axis=0)
     span = float((points.max(axis=0) - low)[:2].max())
     if not span > 0:

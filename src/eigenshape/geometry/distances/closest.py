@@ -6,6 +6,7 @@ from jaxtyping import Float
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import ArrayLike
 from eigenshape._arrays import finite_rows
+from eigenshape._corners import in_length
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_one
 from eigenshape.geometry.conversion import MeshLike, as_mesh
@@ -17,7 +18,6 @@ from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.orientation import orient_outward
 from eigenshape.geometry.requirements import require_oriented
 from eigenshape.geometry.samples.surface_points import SurfacePoints, place_points
-from eigenshape.geometry.simplices import in_length
 from eigenshape.geometry.topology import is_closed
 
 # Points may be this many sizes of the mesh away: products of three distances stay below 1e200, and

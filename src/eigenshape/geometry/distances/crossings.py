@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float, Int
 
+from eigenshape._corners import scaled_corners
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.crossing_loops import crossing_pairs, curve_places, face_boxes
-from eigenshape.geometry.simplices import scaled_corners
 
 # Coordinates are rounded to multiples of 2^-300 of the largest, so that a product of three of them
 # does not underflow and the signs of `predicates.h` are exact.

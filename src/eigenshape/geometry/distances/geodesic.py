@@ -11,12 +11,13 @@ from jaxtyping import Float, Int, Int32
 from certeig.kit.arrays import number_from_zero, positive_values, whole_number, whole_numbers
 from certeig.kit.threads import SpareMemory, map_in_threads, one_blas_thread
 from certeig.kit.typing import ArrayLike, Integer
+from eigenshape._corners import in_length, scaled_corners
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh, as_simplicial
 from eigenshape.geometry.distances.geodesic_loops import choose_farthest, fill_rows, spread_waves
 from eigenshape.geometry.requirements import require_describable
 from eigenshape.geometry.samples.surface_points import SurfacePoints, require_on
-from eigenshape.geometry.simplices import dual_volumes, in_length, scaled_corners
+from eigenshape.geometry.simplices import dual_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import vertex_components
 

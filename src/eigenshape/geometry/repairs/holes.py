@@ -4,12 +4,13 @@ import numpy as np
 from jaxtyping import Int
 
 from certeig.kit.errors import InvalidParameterError
+from eigenshape._corners import half_edges
 from eigenshape._errors import count_nouns
 from eigenshape._vectors import size_one
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.repairs.hole_loops import triangulate
 from eigenshape.geometry.repairs.repair_report import RepairedMesh
-from eigenshape.geometry.topology import boundary_loops, edge_table, half_edges, neighbor_links
+from eigenshape.geometry.topology import boundary_loops, edge_table, neighbor_links
 
 
 def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[TriangleMesh]:
@@ -32,7 +33,7 @@ def fill_holes(mesh: TriangleMesh, *, most_edges: int = 1000) -> RepairedMesh[Tr
     graph, n_long, n_open = neighbor_links(mesh), 0, 0
     # The face of each boundary edge, as a pair of vertices directed as in the face
     places = np.flatnonzero(table.n_faces[table.face_edges.T.ravel()] == 1)
-    sides = map(tuple, half_edges(mesh)[places].tolist())
+    sides = map(tuple, half_edges(mesh.faces)[places].tolist())
     face_of = dict(zip(sides, (places % mesh.n_faces).tolist(), strict=True))
     added: list[Int[np.ndarray, "_ 3"]] = []
     for loop in boundary_loops(mesh):

@@ -6,6 +6,7 @@ from typing import Any, overload
 
 import numpy as np
 
+from eigenshape._corners import scaled_corners
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud, Shape
@@ -31,7 +32,6 @@ from eigenshape.geometry.repairs.repair_steps import (
     weld,
     weld_seams,
 )
-from eigenshape.geometry.simplices import scaled_corners
 from eigenshape.geometry.topology import boundary_loops, vertex_components
 
 # Shares of the area of a surface up to which `suggest_repairs` takes something for a fault of the

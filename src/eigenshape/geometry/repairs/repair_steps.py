@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from certeig.kit.errors import InvalidParameterError
 from eigenshape._arrays import label_components, number_places
+from eigenshape._corners import scaled_corners, side_lengths
 from eigenshape._errors import count_nouns
 from eigenshape._vectors import size_one, triangle_areas
 from eigenshape.geometry.cloud import PointCloud
@@ -19,12 +20,7 @@ from eigenshape.geometry.repairs.repair_report import (
     simplex_noun,
 )
 from eigenshape.geometry.seams import seams
-from eigenshape.geometry.simplices import (
-    MEASURES,
-    degenerate_simplices,
-    scaled_corners,
-    side_lengths,
-)
+from eigenshape.geometry.simplices import MEASURES, degenerate_simplices
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.geometry.topology import (
     edge_table,

@@ -9,9 +9,9 @@ from certeig.kit.arguments import describe_value, require_type
 from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
+from eigenshape._corners import scaled_corners, volumes
 from eigenshape.geometry.conversion import MeshLike, as_simplicial
 from eigenshape.geometry.requirements import require_volumes
-from eigenshape.geometry.simplices import scaled_corners, volumes
 from eigenshape.geometry.simplicial import Mesh
 
 # A point farther from where its weights put it, in extents of the mesh, belongs to another mesh.

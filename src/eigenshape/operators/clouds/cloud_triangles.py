@@ -8,6 +8,7 @@ from certeig.kit.arguments import require_type
 from certeig.kit.arrays import whole_number
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.typing import Integer
+from eigenshape._corners import edge_keys
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_one
 from eigenshape.geometry.cloud import PointCloud
@@ -17,7 +18,6 @@ from eigenshape.operators.clouds.pair_loops import local_rings
 from eigenshape.operators.tufted import (
     MOLLIFY,
     Triangulation,
-    edge_keys,
     flip_to_delaunay,
     mollify_lengths,
     tufted_cover,

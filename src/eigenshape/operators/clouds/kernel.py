@@ -16,11 +16,11 @@ from certeig.kit.arguments import require_choice
 from certeig.kit.arrays import positive_values
 from certeig.kit.errors import InvalidParameterError
 from certeig.kit.memory import require_memory
+from eigenshape._corners import LARGEST_EXPONENT
 from eigenshape._errors import InvalidShapeError
 from eigenshape._vectors import size_one
 from eigenshape.geometry.distances.geodesic import geodesic_balls
 from eigenshape.geometry.samples.quadrature import Quadrature
-from eigenshape.geometry.simplices import LARGEST_EXPONENT
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.choices import Correction, Form
 from eigenshape.operators.clouds.cell_grid import cell_grid, count_partners, gaussian_rows

@@ -7,8 +7,8 @@ from jaxtyping import Float, Int
 
 from certeig.kit.arrays import ReadOnly, freeze, record
 from eigenshape._arrays import face_labels
+from eigenshape._corners import mean_normals
 from eigenshape.geometry.conversion import as_mesh
-from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.orientation import orient_outward

@@ -10,10 +10,10 @@ from scipy.sparse.csgraph import shortest_path
 from certeig.kit.arrays import ReadOnly, record, whole_number
 from certeig.kit.threads import map_in_threads, one_blas_thread
 from certeig.kit.typing import Integer
+from eigenshape._corners import mean_normals
 from eigenshape._errors import InvalidShapeError
 from eigenshape.geometry.conversion import MeshLike, as_mesh
 from eigenshape.geometry.distances.geodesic import farthest_points
-from eigenshape.geometry.measure import mean_normals
 from eigenshape.geometry.mesh import TriangleMesh
 from eigenshape.geometry.normalize import normalize_mesh
 from eigenshape.geometry.orientation import orient_outward

@@ -6,8 +6,9 @@ from jaxtyping import Float, Int
 from certeig.kit.arrays import EPS
 from certeig.kit.errors import ConvergenceError
 from certeig.kit.progress import Progress
+from eigenshape._corners import scaled_corners, triangular_sides
 from eigenshape.geometry.facet_lists import FacetTable
-from eigenshape.geometry.simplices import scaled_corners, simplex_volumes, triangular_sides
+from eigenshape.geometry.simplices import simplex_volumes
 from eigenshape.geometry.simplicial import Mesh
 from eigenshape.operators.crouzeix_raviart import (
     crouzeix_raviart_laplacian,
